@@ -1,0 +1,5 @@
+"""``python -m illumcli`` is the ``illum`` command."""
+
+from illumcli.cli import main
+
+main()

@@ -1,0 +1,76 @@
+"""Which named functions must run to make what is asked for, and in what order."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """A function, the buffer it makes, and the buffer behind each of its parameters."""
+
+    makes: str
+    function: Callable[..., Any]
+    needs: Mapping[str, str]  # parameter -> buffer
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], makes: str | None = None, **renamed: str) -> Recipe:
+        """A recipe whose needs are the function's own parameter names, `renamed` where given.
+
+        A parameter with a default is needed only when `renamed` names its buffer.
+        """
+        name = makes or getattr(function, "__name__", "")
+        needs = {p: renamed.pop(p, p) for p in required(function)}
+        return cls(name, function, {**needs, **renamed})
+
+    def make(self, buffers: Mapping[str, Any]) -> Any:
+        """Run the function on the buffers it needs."""
+        return self.function(**{parameter: buffers[name] for parameter, name in self.needs.items()})
+
+
+def required(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Names of the parameters that have no default and are not bound yet."""
+    if isinstance(function, partial):
+        bound, inner = set(function.keywords), required(function.func)
+        return tuple(name for name in inner[len(function.args) :] if name not in bound)
+    return _parameters(function)
+
+
+@cache
+def _parameters(function: Callable[..., Any]) -> tuple[str, ...]:
+    parameters = inspect.signature(function).parameters.values()
+    return tuple(p.name for p in parameters if p.default is p.empty)
+
+
+def order(book: Mapping[str, Recipe], outputs: Iterable[str], given: Iterable[str] = ()) -> list[Recipe]:
+    """The recipes that `outputs` reach, each after all it needs; `given` buffers need no recipe.
+
+    Raises
+    ------
+    KeyError
+        A buffer that no recipe makes.
+    ValueError
+        Recipes that need each other in a circle.
+    """
+    done, path, steps = set(given), [], []  # type: set[str], list[str], list[Recipe]
+
+    def visit(name: str) -> None:
+        if name in done:
+            return
+        if name in path:
+            raise ValueError(" -> ".join([*path[path.index(name) :], name]))
+        path.append(name)
+        recipe = book[name]
+        for need in recipe.needs.values():
+            visit(need)
+        path.pop()
+        done.add(name)
+        steps.append(recipe)
+
+    for name in outputs:
+        visit(name)
+    return steps

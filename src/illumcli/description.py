@@ -1,0 +1,33 @@
+"""What every description in a scene file is made of: frozen models and strict numbers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+LARGEST = 1e18  # squares and products of three such numbers stay finite in float32's exponent range
+
+
+class Description(BaseModel):
+    """A frozen part of a scene; unknown keys are refused, text is never read as a number."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=False)
+
+
+def _spread(value: Any) -> Any:
+    return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+Number: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+NonNegative: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
+Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]
+Share: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
+
+Vector: TypeAlias = Annotated[tuple[Number, Number, Number], Field(strict=False)]
+
+# one number stands for three equal ones
+Color: TypeAlias = Annotated[
+    tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), BeforeValidator(_spread)
+]
+Albedo: TypeAlias = Annotated[tuple[Share, Share, Share], Field(strict=False), BeforeValidator(_spread)]

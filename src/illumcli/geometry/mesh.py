@@ -1,0 +1,61 @@
+"""Mesh: polygons over shared vertices, exactly as the file has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Polygons over vertices in the file's own order and count; nothing is merged.
+
+    Polygon p owns the corners ``starts[p]:starts[p + 1]``, counter-clockwise seen from outside. Normals and uv
+    are indexed per corner, so seams and creases need no copies of vertices. Arrays are read-only.
+    """
+
+    vertices: NDArray[np.float64]  # (V, 3) as read
+    corners: NDArray[np.int32]  # (C,) vertex of each polygon corner
+    starts: NDArray[np.int32]  # (P + 1,) first corner of each polygon, and the end
+    normals: NDArray[np.float64] | None = None  # (K, 3) as read, unit or not
+    corner_normals: NDArray[np.int32] | None = None  # (C,) row of `normals`, -1 where the corner has none
+    uvs: NDArray[np.float64] | None = None  # (U, 2), v upwards
+    corner_uvs: NDArray[np.int32] | None = None  # (C,) row of `uvs`, -1 where the corner has none
+    material_names: tuple[str, ...] = ()  # names the file selects (`usemtl`)
+    polygon_materials: NDArray[np.int32] | None = None  # (P,) index in `material_names`, -1 none
+    group_names: tuple[str, ...] = ()
+    polygon_groups: NDArray[np.int32] | None = None  # (P,) index in `group_names`, -1 none
+    attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    """Per vertex, (V,) or (V, k), every property the file has; vertex colours are `color`, (V, 3) linear."""
+    materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Material name -> keys of a scene's material, as the file's own library describes them."""
+    repairs: Mapping[str, int] = field(default_factory=dict)
+    """What was wrong and put right while reading: class -> count."""
+
+    def __post_init__(self) -> None:
+        arrays = [getattr(self, name) for name in self.__slots__]
+        for array in [*arrays, *self.attributes.values()]:
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
+
+    @property
+    def polygon_count(self) -> int:
+        return len(self.starts) - 1
+
+    @classmethod
+    def of_triangles(cls, vertices: Any, triangles: Any, **more: Any) -> Mesh:
+        """A mesh of (T, 3) triangles; per-corner index arrays in `more` are (T, 3) or flat."""
+        triangles = np.asarray(triangles, np.int32).reshape(-1, 3)
+        for name in ("corner_normals", "corner_uvs"):
+            if more.get(name) is not None:
+                more[name] = np.ascontiguousarray(more[name], np.int32).ravel()
+        return cls(
+            vertices=np.array(vertices, np.float64).reshape(-1, 3),
+            corners=triangles.ravel().copy(),
+            starts=np.arange(0, triangles.size + 1, 3, dtype=np.int32),
+            **more,
+        )

@@ -1,0 +1,53 @@
+"""What a material parameter may be: a value in its range, or something that varies over the surface."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+
+from pydantic import Discriminator, Tag
+
+from illumcli import description
+from illumcli.description import Description
+
+
+class Texture(Description):
+    """An image looked up by the surface's uv."""
+
+    texture: str
+    """Path of the image, from the scene's folder."""
+    space: Literal["srgb", "linear"] = "srgb"
+    """How the file's numbers code light; a texture of a scalar is data and wants `linear`."""
+    filter: Literal["bilinear", "nearest"] = "bilinear"
+    wrap: Literal["repeat", "clamp"] = "repeat"
+    channel: Literal["r", "g", "b", "a"] = "r"
+    """The channel a scalar parameter reads."""
+
+
+class VertexValues(Description):
+    """A per-vertex attribute of the mesh, interpolated over each triangle."""
+
+    vertex: str
+    """Name of the attribute: `color` for vertex colours, or a scalar property of the file."""
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, Texture) or (isinstance(value, dict) and "texture" in value):
+        return "texture"
+    if isinstance(value, VertexValues) or (isinstance(value, dict) and "vertex" in value):
+        return "vertex"
+    return "value"
+
+
+T = TypeVar("T")
+Varying: TypeAlias = Annotated[
+    Annotated[T, Tag("value")]
+    | Annotated[Texture, Tag("texture")]
+    | Annotated[VertexValues, Tag("vertex")],
+    Discriminator(_kind),
+]
+
+Color: TypeAlias = Varying[description.Color]
+Albedo: TypeAlias = Varying[description.Albedo]
+Share: TypeAlias = Varying[description.Share]
+Positive: TypeAlias = Varying[description.Positive]
+NonNegative: TypeAlias = Varying[description.NonNegative]

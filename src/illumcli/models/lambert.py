@@ -1,0 +1,33 @@
+"""Lambert: an ideally diffuse surface, the same radiance in every direction.
+
+response = diffuse / pi * n_l
+
+References
+----------
+Lambert, J. H. (1760). Photometria.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import Albedo
+
+
+class Lambert(IlluminationModel):
+    model: Literal["lambert"] = "lambert"
+    diffuse: Albedo = (0.8, 0.8, 0.8)
+    """rho, the albedo."""
+
+    reciprocal: ClassVar[bool] = True
+    conserving: ClassVar[bool] = True
+    physical: ClassVar[bool] = True
+
+    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+        """(N, 3) rho / pi * n_l."""
+        (rho,) = like(n_l, self.diffuse)
+        return rho * (n_l / n_l.dtype.type(np.pi))[:, None]

@@ -1,0 +1,94 @@
+"""Open families: one module holds one member, and the module's name is its tag.
+
+A scene names the tag; only the module of that name is imported then, so a family of thirty members costs
+a run what its scene uses. Nothing is registered and no list is kept.
+"""
+
+from __future__ import annotations
+
+import difflib
+import pkgutil
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+
+@cache
+def tags(package: str) -> tuple[str, ...]:
+    """The tags of a family, sorted: its modules, without the helpers that begin with an underscore."""
+    found = pkgutil.iter_modules(import_module(package).__path__)
+    return tuple(sorted(module.name for module in found if not module.name.startswith("_")))
+
+
+@cache
+def member(package: str, tag: str) -> type[Any]:
+    """The one class that the module of this name defines.
+
+    Raises
+    ------
+    LookupError
+        No such module; the text suggests the nearest tag.
+    """
+    if tag not in tags(package):
+        raise LookupError(suggestion(tag, tags(package)))
+    module = import_module(f"{package}.{tag}")
+    classes = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, BaseModel)
+    ]
+    if len(classes) != 1:
+        raise TypeError(f"{module.__name__} must define one class, defines {len(classes)}")
+    return classes[0]
+
+
+def members(package: str) -> tuple[type[Any], ...]:
+    """Every class of a family, by tag."""
+    return tuple(member(package, tag) for tag in tags(package))
+
+
+def suggestion(word: str, known: tuple[str, ...]) -> str:
+    """The way out of a misspelling: the nearest known word, or all of them where none is near."""
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Tagged:
+    """Annotation of a field that takes any member of a family, told apart by its key `tag`."""
+
+    package: str
+    tag: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            self._validate, serialization=core_schema.plain_serializer_function_ser_schema(_dump)
+        )
+
+    def _validate(self, value: Any) -> Any:
+        if isinstance(value, BaseModel):
+            return value
+        if not isinstance(value, dict):
+            raise PydanticCustomError("mapping", "must be a mapping with the key '{tag}'", {"tag": self.tag})
+        name = value.get(self.tag)
+        if not isinstance(name, str):
+            known = ", ".join(tags(self.package))
+            raise PydanticCustomError("tag_missing", "must name its {tag}: {known}", {"tag": self.tag, "known": known})
+        try:
+            chosen = member(self.package, name)
+        except LookupError as error:
+            facts = {"tag": self.tag, "name": name, "way": str(error)}
+            raise PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts) from None
+        return chosen.model_validate(value)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        choices = [handler(each.__pydantic_core_schema__) for each in members(self.package)]
+        return {"oneOf": choices, "discriminator": {"propertyName": self.tag}}
+
+
+def _dump(value: BaseModel) -> dict[str, Any]:
+    return value.model_dump()

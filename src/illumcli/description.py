@@ -19,6 +19,13 @@ def _spread(value: Any) -> Any:
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+def nonzero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The vector itself; a validator for directions, which a zero vector is not."""
+    if not any(vector):
+        raise ValueError("must not be the zero vector")
+    return vector
+
+
 Number: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
 NonNegative: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
 Positive: TypeAlias = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST)]

@@ -77,7 +77,9 @@ class Tagged:
         name = value.get(self.tag)
         if not isinstance(name, str):
             known = ", ".join(tags(self.package))
-            raise PydanticCustomError("tag_missing", "must name its {tag}: {known}", {"tag": self.tag, "known": known})
+            raise PydanticCustomError(
+                "tag_missing", "must name its {tag}: {known}", {"tag": self.tag, "known": known}
+            )
         try:
             chosen = member(self.package, name)
         except LookupError as error:
@@ -85,7 +87,9 @@ class Tagged:
             raise PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts) from None
         return chosen.model_validate(value)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         choices = [handler(each.__pydantic_core_schema__) for each in members(self.package)]
         return {"oneOf": choices, "discriminator": {"propertyName": self.tag}}
 

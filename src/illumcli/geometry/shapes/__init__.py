@@ -1,0 +1,10 @@
+"""Built-in shapes, one file each: the file's name is the tag of ``shape:`` in a scene."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from illumcli.geometry.shapes._base import Shape
+from illumcli.variants import Tagged
+
+AnyShape: TypeAlias = Annotated[Shape, Tagged("illumcli.geometry.shapes", "shape")]

@@ -1,0 +1,63 @@
+"""What every light is: a colour, a name, and the light it sends to points if nothing stands between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from illumcli.arrays import Lanes, Vectors, columns, length
+from illumcli.description import Description
+from illumcli.frame import Frame
+
+NEAREST = 1e-6
+"""Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arriving:
+    """Light arriving at N points if nothing stood between."""
+
+    l: Vectors  # (N, 3) unit, from the point to the light
+    distance: Lanes  # (N,) to the light in radii of the scene, inf for a light at infinity
+    strength: Lanes  # (N,) irradiance facing the light, per unit of the light's colour
+
+
+class Light(Description):
+    """A light of the scene."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][\w-]*$")] | None = None
+    """Names the light's layers; by default its type and number, as in `point1`."""
+    shadows: bool = True
+    """False: the light passes through everything and no shadow ray is cast for it."""
+
+    power: ClassVar[str]
+    """Name of the field that holds the light's colour and strength."""
+
+    def color(self) -> tuple[float, float, float]:
+        """Colour times strength: intensity [W/sr] or irradiance [W/m^2]."""
+        return getattr(self, self.power)
+
+    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+        """Light at `position` [(N, 3), radii from the scene's centre]."""
+        raise NotImplementedError
+
+
+def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Lanes]:
+    """Unit vectors from (N, 3) positions to a light at (3,), and its distances, both in radii.
+
+    A light further than 10^4 radii is reached in float64, where neither the difference nor its square
+    loses anything; nearer ones in the precision of the positions.
+    """
+    far = np.abs(light).max() > 1e4
+    way = columns(light.astype(np.float64 if far else position.dtype) - position)
+    if not far and np.abs(way).max(initial=0) < 1e-15:
+        far, way = True, columns(way, np.float64)
+    distance = np.maximum(length(way), NEAREST)
+    size = length(way)
+    l = way * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
+    if far:
+        return columns(l, position.dtype), distance.astype(position.dtype)
+    return l, distance

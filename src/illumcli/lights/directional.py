@@ -1,0 +1,34 @@
+"""Directional light: parallel light from infinitely far away."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import AfterValidator
+
+from illumcli.arrays import Vectors
+from illumcli.description import Color, Vector, nonzero
+from illumcli.frame import Frame
+from illumcli.lights._base import Arriving, Light
+
+
+class Directional(Light):
+    light: Literal["directional"]
+    direction: Annotated[Vector, AfterValidator(nonzero)]
+    """Where the light goes; any length."""
+    irradiance: Color = (1.0, 1.0, 1.0)
+    """[W/m^2] on a surface that faces the light."""
+
+    power: ClassVar[str] = "irradiance"
+
+    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+        """Light at `position`: the same everywhere, strength 1, distance inf."""
+        lanes = len(position)
+        way = -np.asarray(self.direction) / np.abs(self.direction).max()
+        l = (way / np.linalg.norm(way)).astype(position.dtype)
+        return Arriving(
+            np.broadcast_to(l, (lanes, 3)),
+            np.broadcast_to(position.dtype.type(np.inf), lanes),
+            np.broadcast_to(position.dtype.type(1), lanes),
+        )

@@ -1,0 +1,31 @@
+"""Point light: the same intensity in every direction from one position."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Vectors
+from illumcli.description import Color, Vector
+from illumcli.frame import Frame
+from illumcli.lights._attenuation import InverseSquare, Law
+from illumcli.lights._base import Arriving, Light, towards
+
+
+class Point(Light):
+    light: Literal["point"]
+    position: Vector
+    """[scene units]"""
+    intensity: Color = (1.0, 1.0, 1.0)
+    """[W/sr] under the inverse square; a plain factor under the other laws."""
+    attenuation: Law = InverseSquare(law="inverse_square")
+    """Distance law."""
+
+    power: ClassVar[str] = "intensity"
+
+    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+        """Light at `position`; strength f(d)."""
+        l, distance = towards(frame.inward(self.position), position)
+        scene_units = distance.astype(np.float64) * frame.radius
+        return Arriving(l, distance, self.attenuation.factor(scene_units).astype(position.dtype))

@@ -1,0 +1,361 @@
+"""A scene as data: frozen descriptions, no arrays, no files opened.
+
+The JSON schema in ``schemas/scene.schema.json`` is made from this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from illumcli.description import Color, Description, Number, Positive, Vector, nonzero
+from illumcli.geometry.shapes import AnyShape
+from illumcli.lights import AnyLight
+from illumcli.models import AnyModel
+from illumcli.variants import suggestion
+from illumcli.visibility.falloffs import AnyFalloff
+from illumcli.visibility.falloffs.step import Step
+
+Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z_][\w-]*$")]
+Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
+Count: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)]
+Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Field(strict=False)]
+
+
+class Normals(Description):
+    """How a mesh gets the normals that shading interpolates."""
+
+    source: Literal["file", "computed"] = "file"
+    """`file`: the file's own where it has them, computed ones elsewhere."""
+    weights: Literal["angle", "area", "equal"] = "angle"
+    """What each polygon counts for in a vertex normal."""
+    crease: Annotated[float, Field(ge=0, le=180)] | None = None
+    """Polygons that meet at more than this keep their edge sharp [degrees]."""
+    polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
+    """How a polygon's own normal is found."""
+
+
+class MeshFile(Description):
+    """A mesh read from a file; its suffix says the format."""
+
+    file: str
+    """Path, from the scene's folder."""
+    normals: Normals = Normals()
+    materials: bool = False
+    """True: import the materials that the file's own library describes."""
+
+
+def _mesh_kind(value: Any) -> str:
+    return (
+        "shape"
+        if isinstance(value, dict) and "shape" in value
+        else "file"
+        if not hasattr(value, "mesh")
+        else "shape"
+    )
+
+
+MeshSource: TypeAlias = Annotated[
+    Annotated[MeshFile, Tag("file")] | Annotated[AnyShape, Tag("shape")], Discriminator(_mesh_kind)
+]
+
+
+class Transform(Description):
+    """Where an object stands: fitted, scaled, rotated, translated, in this order, then the matrix."""
+
+    fit: Positive | None = None
+    """Scale and move the mesh so that its bounding sphere has this radius and it stands on y = 0,
+    centred on the y axis [scene units]."""
+    scale: Annotated[Vector, BeforeValidator(lambda v: (v,) * 3 if isinstance(v, int | float) else v)] = (
+        1.0,
+        1.0,
+        1.0,
+    )
+    """One factor, or one per axis; negative ones mirror."""
+    rotate: Vector = (0.0, 0.0, 0.0)
+    """About x, then y, then z [degrees]."""
+    translate: Vector = (0.0, 0.0, 0.0)
+    """[scene units]"""
+    matrix: Annotated[tuple[Row, Row, Row, Row], Field(strict=False)] | None = None
+    """Four rows, applied last to column vectors."""
+
+
+class Grain(Description):
+    """Grain in rings about an axis, as on a turned or brushed disc."""
+
+    axis: Annotated[Vector, AfterValidator(nonzero)] = (0.0, 1.0, 0.0)
+    centre: Vector = (0.0, 0.0, 0.0)
+    """A point on the axis, in the object's own coordinates before its transform."""
+
+
+class Object(Description):
+    """A mesh with a material in a place."""
+
+    mesh: Annotated[
+        Annotated[str, Tag("name")] | Annotated[MeshSource, Tag("mesh")],
+        Discriminator(lambda value: "name" if isinstance(value, str) else "mesh"),
+    ]
+    """The name of a mesh, the path of a mesh file, or a mesh described in place."""
+    name: Name | None = None
+    """By default `object1` and so on."""
+    material: (
+        Annotated[
+            Annotated[str, Tag("name")] | Annotated[AnyModel, Tag("material")],
+            Discriminator(lambda value: "name" if isinstance(value, str) else "material"),
+        ]
+        | None
+    ) = None
+    """The name of a material, or one described in place; by default the materials that the mesh file
+    selects by name, and light grey Lambert for what selects none."""
+    override: dict[str, Any] = {}
+    """Parameters of the material that this object has otherwise."""
+    transform: Transform = Transform()
+    shading: Rate | None = None
+    """By default the scene's."""
+    grain: (
+        Annotated[
+            Annotated[Vector, AfterValidator(nonzero), Tag("direction")] | Annotated[Grain, Tag("radial")],
+            Discriminator(lambda value: "radial" if isinstance(value, dict | Grain) else "direction"),
+        ]
+        | None
+    ) = None
+    """Tangent of anisotropic materials: a direction the grain follows, or rings about an axis;
+    by default the direction of growing u."""
+
+
+class _Camera(Description):
+    position: Vector = (1.8, 1.9, 3.6)
+    """[scene units]; the default looks at an object fitted to radius 1."""
+    target: Vector = (0.0, 0.75, 0.0)
+    up: Annotated[Vector, AfterValidator(nonzero)] = (0.0, 1.0, 0.0)
+    """Any vector not along the line of sight; where it is, another axis is taken."""
+    width: Count | None = None
+    """[pixels]; by default the film's."""
+    height: Count | None = None
+    samples: Count | None = None
+
+    @model_validator(mode="after")
+    def _looking(self) -> _Camera:
+        if self.position == self.target:
+            raise ValueError("position and target must differ")
+        return self
+
+
+class Perspective(_Camera):
+    """A pinhole camera."""
+
+    projection: Literal["perspective"] = "perspective"
+    fov: Annotated[float, Field(gt=0, lt=180)] = 35.0
+    """Vertical field of view [degrees]."""
+
+
+class Orthographic(_Camera):
+    """Parallel rays."""
+
+    projection: Literal["orthographic"]
+    extent: Positive = 2.0
+    """Height of the view [scene units]."""
+
+
+Camera: TypeAlias = Annotated[
+    Annotated[Perspective, Tag("perspective")] | Annotated[Orthographic, Tag("orthographic")],
+    Discriminator(
+        lambda value: (
+            value.get("projection", "perspective")
+            if isinstance(value, dict)
+            else getattr(value, "projection", "perspective")
+        ),
+        custom_error_type="projection_unknown",
+        custom_error_message="no such projection; there are: perspective, orthographic",
+    ),
+]
+
+
+class Filter(Description):
+    """The pixel filter, by sampling positions from it: pixels share no samples."""
+
+    filter: Literal["box", "tent", "gaussian"] = "box"
+    width: Positive = 1.0
+    """Support of box and tent, and two standard deviations of the Gaussian, either side [half pixels]."""
+
+
+class Film(Description):
+    """Size and sampling of the picture."""
+
+    width: Count = 1280
+    height: Count = 720
+    samples: Count = 4
+    """Per pixel; 1 looks through the pixel's centre."""
+    filter: Filter = Filter()
+    background: Color | None = None
+    """Behind everything; by default nothing, with alpha 0."""
+    exposure: Annotated[float, Field(ge=-64, le=64)] = 0.0
+    """Of 8-bit pictures [stops]; EXR keeps the light as it is."""
+
+
+def _ambient(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"form": value, "color": 1.0}
+    return {"color": value} if isinstance(value, int | float | list | tuple) else value
+
+
+class Ambient(Description):
+    """I_a, light from everywhere, weighed by obscurance."""
+
+    color: Color = (0.0, 0.0, 0.0)
+    form: Literal["separate", "coupled"] = "separate"
+    """`separate`: k_a I_a w + direct. `coupled`, as one text prints it: (k_a I_a + direct) w + I_d, with
+    I_d the direct light before the material; it counts direct light twice."""
+
+
+class Obscurance(Description):
+    """w(p) by Monte Carlo: how open each point is to the ambient light."""
+
+    samples: Annotated[int, Field(strict=True, ge=1, le=65536)] = 64
+    """Rays per pixel sample."""
+    falloff: AnyFalloff = Step()
+
+
+LAYERS = (
+    "beauty",
+    "ambient",
+    "diffuse",
+    "specular",
+    "emission",
+    "lights",
+    "shadows",
+    "obscurance",
+    "alpha",
+    "depth",
+    "position",
+    "normal",
+    "geometric_normal",
+    "uv",
+    "object_id",
+    "material_id",
+    "triangle_id",
+)
+Layer: TypeAlias = Literal[
+    "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha", "depth",
+    "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+]  # fmt: skip
+
+
+class Outputs(Description):
+    """What is written."""
+
+    layers: Annotated[tuple[Layer, ...], Field(min_length=1, strict=False)] = ("beauty",)
+    files: Annotated[tuple[str, ...], Field(min_length=1, strict=False)] = ("{scene}.{camera}.png",)
+    """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
+    file per layer (`{layer}` in its name when there are several)."""
+    colour: Literal["half", "float"] = "half"
+    """Precision of colour in EXR; depth, positions, normals and ids are always 32-bit."""
+
+
+class Scene(Description):
+    """Everything a scene file says."""
+
+    version: Literal[1]
+    """Version of the scene format."""
+    camera: Camera | None = None
+    """The one camera, named `main`."""
+    cameras: dict[Name, Camera] = {}
+    """Several cameras by name; instead of `camera`."""
+    film: Film = Film()
+    shading: Rate = "phong"
+    """How often the model is evaluated."""
+    ambient: Annotated[Ambient, BeforeValidator(_ambient)] = Ambient()
+    obscurance: Obscurance | None = None
+    """By default w = 1 and no ray is cast for it."""
+    meshes: dict[Name, MeshSource] = {}
+    materials: dict[Name, AnyModel] = {}
+    objects: Annotated[tuple[Object, ...], Field(strict=False)] = ()
+    lights: Annotated[tuple[AnyLight, ...], Field(strict=False)] = ()
+    outputs: Outputs = Outputs()
+    seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = 0
+    """Of every random number."""
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> Scene:
+        problems = list(self._problems())
+        if problems:
+            raise ValidationError.from_exception_data("Scene", problems)
+        return self
+
+    def _problems(self) -> Iterator[InitErrorDetails]:
+        """Names that lead nowhere or stand twice, each at its place."""
+
+        def problem(fact: str, value: Any, *loc: str | int) -> InitErrorDetails:
+            return InitErrorDetails(
+                type=PydanticCustomError("name", "{fact}", {"fact": fact}), loc=loc, input=value
+            )
+
+        if self.camera and self.cameras:
+            yield problem("give either camera or cameras, not both", None, "camera")
+        for i, thing in enumerate(self.objects):
+            mesh, material = thing.mesh, thing.material
+            if isinstance(mesh, str) and mesh not in self.meshes and "." not in mesh:
+                yield problem(
+                    f"no mesh '{mesh}'; {suggestion(mesh, tuple(self.meshes))}", mesh, "objects", i, "mesh"
+                )
+            if isinstance(material, str) and material not in self.materials:
+                fact = f"no material '{material}'; {suggestion(material, tuple(self.materials))}"
+                yield problem(fact, material, "objects", i, "material")
+            elif thing.override:
+                yield from self._override_problems(i, thing)
+        for kind, names in (
+            ("objects", [o.name for o in self.objects]),
+            ("lights", [l.name for l in self.lights]),
+        ):
+            for i, name in enumerate(names):
+                if name is not None and name in names[:i]:
+                    yield problem(f"the name '{name}' is taken", name, kind, i, "name")
+
+    def _override_problems(self, i: int, thing: Object) -> Iterator[InitErrorDetails]:
+        try:
+            self.material_of(thing)
+        except ValidationError as error:
+            for line in error.errors(include_url=False):
+                fault = PydanticCustomError("override", "{fact}", {"fact": line["msg"]})
+                yield InitErrorDetails(
+                    type=fault, loc=("objects", i, "override", *line["loc"]), input=line["input"]
+                )
+
+    def material_of(self, thing: Object) -> AnyModel | None:
+        """The object's own material with its overrides; None where the mesh selects materials."""
+        own = thing.material
+        model = self.materials[own] if isinstance(own, str) else own
+        if not thing.override:
+            return model
+        base = model if model is not None else default_material()
+        said = {name: getattr(base, name) for name in base.model_fields_set}
+        return type(base).model_validate({**said, **thing.override})
+
+    def named_cameras(self) -> dict[str, Perspective | Orthographic]:
+        """The cameras by name, at least one."""
+        return self.cameras or {"main": self.camera or Perspective()}
+
+    def named_lights(self) -> dict[str, AnyLight]:
+        """The lights by name: their own, or their type and number."""
+        return {l.name or f"{l.light}{i + 1}": l for i, l in enumerate(self.lights)}
+
+    def object_names(self) -> tuple[str, ...]:
+        return tuple(o.name or f"object{i + 1}" for i, o in enumerate(self.objects))
+
+
+def default_material() -> AnyModel:
+    """Light grey Lambert, for what has no material."""
+    from illumcli.models.lambert import Lambert
+
+    return Lambert()

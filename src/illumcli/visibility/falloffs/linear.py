@@ -1,0 +1,20 @@
+"""Linear: mu = d / d_max."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes
+from illumcli.visibility.falloffs._base import Distance, Falloff
+
+
+class Linear(Falloff):
+    falloff: Literal["linear"]
+    max_distance: Distance
+    """d_max, scene units or `0.5r`."""
+
+    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+        """(N,) min(1, d / d_max)."""
+        return np.minimum(distance / reach, 1).astype(distance.dtype)

@@ -1,0 +1,23 @@
+"""Power: mu = (d / d_max)^exponent."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes
+from illumcli.description import Positive
+from illumcli.visibility.falloffs._base import Distance, Falloff
+
+
+class Power(Falloff):
+    falloff: Literal["power"]
+    max_distance: Distance
+    """d_max, scene units or `0.5r`."""
+    exponent: Positive = 0.5
+    """Below 1 near occluders matter most; 1 is the linear falloff."""
+
+    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+        """(N,) min(1, d / d_max)^exponent."""
+        return np.power(np.minimum(distance / reach, 1), self.exponent).astype(distance.dtype)

@@ -1,0 +1,21 @@
+"""Smooth: mu = x^2 (3 - 2 x) of x = d / d_max, level at contact and at d_max."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes
+from illumcli.visibility.falloffs._base import Distance, Falloff
+
+
+class Smooth(Falloff):
+    falloff: Literal["smooth"]
+    max_distance: Distance
+    """d_max, scene units or `0.5r`."""
+
+    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+        """(N,) the cubic step."""
+        x = np.minimum(distance / reach, 1)
+        return (x * x * (3 - 2 * x)).astype(distance.dtype)

@@ -1,0 +1,20 @@
+"""Step: every occluder within reach counts fully, ambient occlusion."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes
+from illumcli.visibility.falloffs._base import Falloff
+
+
+class Step(Falloff):
+    falloff: Literal["step"] = "step"
+
+    step: ClassVar[bool] = True
+
+    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+        """(N,) 1 at and beyond reach, 0 before."""
+        return (distance >= min(reach, np.finfo(distance.dtype).max)).astype(distance.dtype)

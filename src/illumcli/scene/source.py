@@ -1,0 +1,334 @@
+"""YAML text -> plain data in which every part knows its line and column.
+
+The text is read as events, so that depth, size and repetition are limited before anything is built. Numbers
+follow the core schema of YAML 1.2: `1e3` is a number, `012` is twelve, and `no`, `1:30` and dates are text.
+PyYAML itself follows YAML 1.1 and keeps the last of two equal keys; nothing else of ours imports it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, TypeAlias
+
+import yaml
+
+MAX_BYTES = 2**20
+MAX_DEPTH = 32
+MAX_NODES = 100_000
+MAX_ALIASES = 100
+MAX_GROWTH = 10
+MAX_DIGITS = 64
+
+Path: TypeAlias = tuple[str | int, ...]  # keys and list indices from the top of the scene
+Scalar: TypeAlias = str | int | float | bool | None
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_WORDS: dict[str, Scalar] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_WAYS_OUT = (  # words of the parser's messages -> what most often helps
+    ("cannot start any token", "indent with spaces, not tabs, and quote text that begins with a sign"),
+    ("mapping values are not allowed", "check the indentation, and quote text that holds ': '"),
+    ("expected ':'", "write `key: value`"),
+    ("expected key", "check the indentation"),
+    ("<block end>", "check the indentation"),
+    ("quoted scalar", "close the quote"),
+    ("',' or", "close the bracket, or put a comma between its parts"),
+    ("alias", "write `&name` and `*name`, or quote text that begins with * or &"),
+)
+
+
+class Place(NamedTuple):
+    """Where something is written: a file with line and column from 1, or, at line 0, an override."""
+
+    source: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.source}:{self.line}:{self.column}" if self.line else self.source
+
+
+class Problem(NamedTuple):
+    """One fault: where it is written, which part of the scene it concerns, and what is wrong."""
+
+    place: Place
+    path: Path
+    fact: str
+
+    def __str__(self) -> str:
+        parts = (str(self.place), ".".join(map(str, self.path)), self.fact)
+        line = ": ".join(part for part in parts if part)
+        return "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in line)
+
+
+@dataclass(slots=True)
+class Node:
+    """A part of a document: a scalar, a list of nodes or nodes by key. Treat it as read-only."""
+
+    value: Scalar | list[Node] | dict[str, Node]
+    place: Place
+    key: Place | None = None  # of its own key, where it stands in a mapping
+    size: int = 1  # nodes, aliases written out
+    depth: int = 1
+
+    @property
+    def at(self) -> Place:
+        """Where a reader looks for it: its key, or itself in a list."""
+        return self.key or self.place
+
+    def plain(self) -> Any:
+        """Its value as dict, list, str, int, float, bool and None."""
+        match self.value:
+            case dict(entries):
+                return {key: node.plain() for key, node in entries.items()}
+            case list(entries):
+                return [node.plain() for node in entries]
+            case scalar:
+                return scalar
+
+    def find(self, path: Path) -> Node | None:
+        """The node at `path`; None where nothing is written there."""
+        node: Node | None = self
+        for step in path:
+            match node.value if node else None, step:
+                case dict(entries), str(key):
+                    node = entries.get(key)
+                case list(entries), int(index) if index < len(entries):
+                    node = entries[index]
+                case _:
+                    return None
+        return node
+
+    def places(self, path: Path = ()) -> Iterator[tuple[Path, Node]]:
+        """Every node with its path, in the order of the text."""
+        yield path, self
+        match self.value:
+            case dict(entries):
+                for key, node in entries.items():
+                    yield from node.places((*path, key))
+            case list(entries):
+                for index, node in enumerate(entries):
+                    yield from node.places((*path, index))
+
+
+def read(text: bytes, name: str, fixed: Place | None = None) -> tuple[Node | None, list[Problem]]:
+    """The one document in `text`, and every problem found; the faulty scalars stay in it as text.
+
+    Parameters
+    ----------
+    text : bytes
+        UTF-8, at most 1 MiB.
+    name : str
+        The file, as places name it.
+    fixed : Place, optional
+        The place of every part, instead of line and column: for the value of an override.
+
+    Returns
+    -------
+    node : Node or None
+        None where the problems left nothing to go on with.
+    problems : list of Problem
+    """
+    place = fixed or Place(name, 1, 1)
+    if len(text) > MAX_BYTES:
+        return None, [Problem(place, (), f"larger than {MAX_BYTES} bytes; a scene is a small text file")]
+    try:
+        decoded = text.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = text[: error.start].decode("utf-8-sig")
+        at = fixed or _place_after(before, name)
+        return None, [Problem(at, (), f"byte 0x{text[error.start]:02x} is not UTF-8; save the file as UTF-8")]
+    if found := _UNPRINTABLE.search(decoded):
+        at = fixed or _place_after(decoded[: found.start()], name)
+        return None, [Problem(at, (), f"character U+{ord(found[0]):04X} is not text; remove it")]
+    composer = _Composer(decoded, lambda mark: fixed or Place(name, mark.line + 1, mark.column + 1))
+    return composer.document(place), composer.problems
+
+
+def _place_after(text: str, name: str) -> Place:
+    return Place(name, text.count("\n") + 1, len(text) - text.rfind("\n"))
+
+
+class _Refused(Exception):
+    """A fault after which the rest of the text is not read."""
+
+
+@dataclass
+class _Composer:
+    """Builds nodes from events; each method starts at the event that opens its node."""
+
+    text: str
+    place: Callable[[Any], Place]
+    problems: list[Problem] = field(default_factory=list)
+    anchors: dict[str, Node | None] = field(default_factory=dict)  # None while it is being built
+    written: int = 0
+    nodes: int = 0
+    aliases: int = 0
+
+    def document(self, start: Place) -> Node | None:
+        events = yaml.parse(self.text, Loader=_LOADER)
+        root = None
+        try:
+            for event in events:
+                if isinstance(event, yaml.DocumentStartEvent):
+                    if root is not None:
+                        self.refuse(event.start_mark, "a second document; a scene file holds one")
+                    root = self.node(next(events), events, (), 1)
+        except _Refused:
+            return None
+        except yaml.MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            self.problems.append(Problem(self.place(mark) if mark else start, (), _syntax(error)))
+            return None
+        except (yaml.YAMLError, ValueError, OverflowError) as error:  # ValueError: an escape beyond Unicode
+            self.problems.append(Problem(start, (), f"not YAML: {' '.join(str(error).split())}"))
+            return None
+        return root or Node(None, start)
+
+    def refuse(self, mark: Any, fact: str) -> None:
+        self.problem(mark, (), fact)
+        raise _Refused
+
+    def problem(self, mark: Any, path: Path, fact: str) -> None:
+        self.problems.append(Problem(self.place(mark), path, fact))
+
+    def node(self, event: Any, events: Iterator[Any], path: Path, depth: int, key: Any = None) -> Node:
+        """The node that `event` opens, below `path`; `key` is the mark of its own key."""
+        mark = key or event.start_mark
+        if isinstance(event, yaml.AliasEvent):
+            return self.alias(event, mark, path, depth)
+        self.written += 1
+        self.count(mark, 1)
+        if depth > MAX_DEPTH:
+            self.refuse(mark, f"nested deeper than {MAX_DEPTH} levels")
+        if event.anchor is not None:
+            self.anchors[event.anchor] = None
+        if event.tag is not None and event.tag != "!":
+            self.problem(mark, path, f"the tag {short(event.tag)} is not read; write the plain value")
+        value: Scalar | list[Node] | dict[str, Node]
+        parts: list[Node]
+        if isinstance(event, yaml.ScalarEvent):
+            value, parts = self.scalar(event, mark, path), []
+        elif isinstance(event, yaml.SequenceStartEvent):
+            value = parts = self.sequence(events, path, depth)
+        else:
+            value = self.mapping(events, path, depth)
+            parts = list(value.values())
+        size = 1 + sum(part.size for part in parts)
+        node = Node(
+            value,
+            self.place(event.start_mark),
+            None,
+            size,
+            1 + max((part.depth for part in parts), default=0),
+        )
+        if event.anchor is not None:
+            self.anchors[event.anchor] = node
+        return node
+
+    def count(self, mark: Any, more: int) -> None:
+        self.nodes += more
+        if self.nodes > MAX_NODES:
+            self.refuse(mark, f"more than {MAX_NODES} parts; keep large data in mesh files")
+
+    def alias(self, event: Any, mark: Any, path: Path, depth: int) -> Node:
+        name = short(event.anchor)
+        node = self.anchors.get(event.anchor)
+        self.aliases += 1
+        if self.aliases > MAX_ALIASES:
+            self.refuse(mark, f"more than {MAX_ALIASES} aliases")
+        if node is None:
+            fact = (
+                "stands inside itself" if event.anchor in self.anchors else f"has no anchor &{name} before it"
+            )
+            self.problem(mark, path, f"the alias *{name} {fact}")
+            return Node(f"*{name}", self.place(mark))
+        if depth + node.depth > MAX_DEPTH:
+            self.refuse(mark, f"nested deeper than {MAX_DEPTH} levels by aliases")
+        self.count(mark, node.size)
+        if self.nodes > MAX_GROWTH * (self.written + MAX_ALIASES):
+            self.refuse(mark, f"the aliases write out more than {MAX_GROWTH} times the text")
+        return node
+
+    def sequence(self, events: Iterator[Any], path: Path, depth: int) -> list[Node]:
+        parts: list[Node] = []
+        while not isinstance(event := next(events), yaml.SequenceEndEvent):
+            parts.append(self.node(event, events, (*path, len(parts)), depth + 1))
+        return parts
+
+    def mapping(self, events: Iterator[Any], path: Path, depth: int) -> dict[str, Node]:
+        entries: dict[str, Node] = {}
+        merged: dict[str, Node] = {}
+        while not isinstance(event := next(events), yaml.MappingEndEvent):
+            mark = event.start_mark
+            if not isinstance(event, yaml.ScalarEvent):
+                self.refuse(mark, "a key must be text")
+            key, at = event.value, self.place(mark)
+            value = self.node(next(events), events, (*path, key), depth + 1, mark)
+            if key == "<<" and event.implicit[0]:
+                merged |= self.merged(value, path, mark)
+            elif key in entries:
+                first = entries[key].at
+                where = f", first in line {first.line}" if first.line else ""
+                self.problem(mark, path, f"the key '{short(key)}' stands twice{where}; remove one")
+            else:
+                entries[key] = replace(value, key=at)
+        return merged | entries
+
+    def merged(self, value: Node, path: Path, mark: Any) -> dict[str, Node]:
+        """What `<<:` brings: the entries of a mapping or of several, the first of which wins."""
+        found: dict[str, Node] = {}
+        for part in value.value if isinstance(value.value, list) else [value]:
+            if isinstance(part.value, dict):
+                found = part.value | found
+            else:
+                self.problem(mark, path, "<< must name mappings, as in `<<: *name`")
+        return found
+
+    def scalar(self, event: Any, mark: Any, path: Path) -> Scalar:
+        text = event.value
+        if not event.implicit[0] or event.style:
+            return text
+        if text in _WORDS:
+            return _WORDS[text]
+        if _NOT_FINITE.fullmatch(text):
+            self.problem(mark, path, f"must be a finite number, is {text}")
+            return text
+        whole = _INTEGER.fullmatch(text)
+        if not whole and not _FLOAT.fullmatch(text):
+            return text
+        if len(text) > MAX_DIGITS:
+            self.problem(
+                event.start_mark, path, f"a number of {len(text)} digits; at most {MAX_DIGITS} count"
+            )
+            return text
+        if whole:
+            base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+            return int(text, base)
+        number = float(text)
+        if not math.isfinite(number):
+            self.problem(mark, path, f"must be a finite number, is {text}")
+            return text
+        return number
+
+
+def _syntax(error: yaml.MarkedYAMLError) -> str:
+    said = " ".join(f"{error.problem or ''} {error.context or ''}".split())
+    way = next((way for words, way in _WAYS_OUT if words in said), "correct the text here or just above")
+    return f"not YAML: {short(said, 160)}; {way}"
+
+
+def short(text: str, most: int = 40) -> str:
+    """`text` on one line, cut where it is long."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else f"{line[: most - 1]}…"

@@ -1,0 +1,200 @@
+"""Places a scene's meshes in one World: triangles of unit radius with their object, material and corners."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, columns
+from illumcli.frame import Frame
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.triangulate import triangulate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """One object of the scene: a mesh, where it stands, and its numbers in the World."""
+
+    mesh: Mesh
+    matrix: NDArray[np.float64]  # (4, 4), object to scene
+    mirrored: bool  # the matrix turns left into right: corners run the other way round
+    first_vertex: int
+    first_corner: int
+    first_polygon: int
+    first_triangle: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class World:
+    """All triangles of the scene, in radii from its centre. Arrays are read-only."""
+
+    frame: Frame
+    placed: tuple[Placed, ...]
+    vertices: NDArray[np.float32]  # (V, 3), exactly what the ray core sees
+    triangles: NDArray[np.int32]  # (T, 3) vertex numbers
+    corners: NDArray[np.int32]  # (T, 3) corner numbers, for normals and uv
+    polygons: NDArray[np.int32]  # (T,) polygon numbers
+    objects: NDArray[np.int32]  # (T,) object numbers
+    repairs: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        for array in (self.vertices, self.triangles, self.corners, self.polygons, self.objects):
+            array.setflags(write=False)
+
+
+def transform_matrix(transform: Any, mesh: Mesh) -> NDArray[np.float64]:
+    """(4, 4) float64: fit, scale, rotate about x, y, z, translate, then the scene's own matrix."""
+    matrix = np.eye(4)
+    if transform.fit is not None and len(mesh.corners):
+        low, high = bounds(mesh.vertices[np.unique(mesh.corners)])
+        radius = np.linalg.norm((high - low) / 2) or 1.0
+        size = transform.fit / radius
+        middle = (low + high) / 2
+        matrix[:3, :3] *= size
+        matrix[:3, 3] = -size * np.array([middle[0], low[1], middle[2]])
+    matrix = np.diag([*transform.scale, 1.0]) @ matrix
+    for axis, degrees in enumerate(transform.rotate):
+        matrix = rotation(axis, degrees) @ matrix
+    matrix[:3, 3] += transform.translate
+    return matrix if transform.matrix is None else np.asarray(transform.matrix, np.float64) @ matrix
+
+
+def rotation(axis: int, degrees: float) -> NDArray[np.float64]:
+    """(4, 4) right-handed rotation about a coordinate axis; quarter turns are exact."""
+    quarter, rest = divmod(degrees, 90.0)
+    cosine, sine = np.cos(np.radians(rest)), np.sin(np.radians(rest))
+    for _ in range(int(quarter) % 4):
+        cosine, sine = -sine, cosine
+    i, j = ((1, 2), (2, 0), (0, 1))[axis]
+    matrix = np.eye(4)
+    matrix[i, i] = matrix[j, j] = cosine
+    matrix[j, i], matrix[i, j] = sine, -sine
+    return matrix
+
+
+def bounds(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner of the points' box; a point at the origin where there are none."""
+    if not len(points):
+        return np.zeros(3), np.zeros(3)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> World:
+    """Mesh i under matrix i, all in one World whose box has its centre at 0 and half its diagonal 1.
+
+    The move and the scaling happen in float64, before anything is rounded to float32.
+    """
+    placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
+    repairs: dict[str, int] = {}
+    first = {"vertex": 0, "corner": 0, "polygon": 0, "triangle": 0}
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
+        cut = triangulate(mesh)
+        moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
+        own = cut.corners[:, ::-1] if mirrored else cut.corners
+        used = moved[mesh.corners] if len(mesh.corners) < len(moved) else moved[np.unique(mesh.corners)]
+        if len(used):
+            low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+        placed.append(
+            Placed(
+                mesh, matrix, mirrored, first["vertex"], first["corner"], first["polygon"], first["triangle"]
+            )
+        )
+        vertices.append(moved)
+        triangles.append(mesh.corners[own] + np.int32(first["vertex"]))
+        corners.append(own + np.int32(first["corner"]))
+        polygons.append(cut.polygon + np.int32(first["polygon"]))
+        objects.append(np.full(len(own), number, np.int32))
+        first["vertex"] += len(mesh.vertices)
+        first["corner"] += len(mesh.corners)
+        first["polygon"] += mesh.polygon_count
+        first["triangle"] += len(own)
+        for what, count in mesh.repairs.items():
+            repairs[what] = repairs.get(what, 0) + count
+        unused = len(mesh.vertices) - int(
+            np.count_nonzero(np.bincount(mesh.corners, minlength=len(mesh.vertices)))
+        )
+        if unused:
+            repairs["unused vertices"] = repairs.get("unused vertices", 0) + unused
+    if not np.isfinite(low).all():
+        low, high = np.zeros(3), np.zeros(3)
+    centre = (low + high) / 2
+    radius = float(np.linalg.norm((high - low) / 2)) or 1.0
+    frame = Frame((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+    return World(
+        frame=frame,
+        placed=tuple(placed),
+        vertices=columns(_joined([frame.inward(v) for v in vertices], np.zeros((0, 3))), F),
+        triangles=columns(_joined(triangles, np.zeros((0, 3), np.int32))),
+        corners=columns(_joined(corners, np.zeros((0, 3), np.int32))),
+        polygons=_joined(polygons, np.zeros(0, np.int32)),
+        objects=_joined(objects, np.zeros(0, np.int32)),
+        repairs=repairs,
+    )
+
+
+def _joined(arrays: list[NDArray[Any]], empty: NDArray[Any]) -> NDArray[Any]:
+    return np.concatenate(arrays) if arrays else empty
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CornerVectors:
+    """A vector per corner of the World, kept once where corners share it."""
+
+    values: NDArray[np.float32]  # (K, 3) or (K, 2)
+    index: NDArray[np.int32]  # (C,) row of `values`, -1 where the corner has none
+
+
+def world_normals(world: World, normals: Sequence[Any]) -> CornerVectors:
+    """Unit shading normals of every corner in scene directions, from each object's own
+    (`geometry.normals.CornerNormals`), by the inverse transpose of its matrix."""
+    values, index, first = [], [], 0
+    for placed, own in zip(world.placed, normals, strict=True):
+        linear = placed.matrix[:3, :3]
+        scale = np.abs(linear).max() or 1.0
+        turned = own.normals @ cofactors(linear / scale).T
+        if placed.mirrored:
+            turned = -turned
+        size = np.linalg.norm(turned, axis=1, keepdims=True)
+        values.append(np.divide(turned, size, out=np.zeros_like(turned), where=size > 0))
+        index.append(np.where(own.index >= 0, own.index + first, -1).astype(np.int32))
+        first += len(own.normals)
+    return CornerVectors(columns(_joined(values, np.zeros((0, 3))), F), _joined(index, np.zeros(0, np.int32)))
+
+
+def cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) cofactor matrix: det times the inverse transpose, defined for singular matrices too."""
+    a, b, c = matrix
+    return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+
+
+def world_uvs(world: World) -> CornerVectors:
+    """Texture coordinates of every corner; -1 where a mesh has none."""
+    values, index, first = [], [], 0
+    for placed in world.placed:
+        mesh = placed.mesh
+        if mesh.uvs is None or mesh.corner_uvs is None:
+            index.append(np.full(len(mesh.corners), -1, np.int32))
+            continue
+        values.append(mesh.uvs)
+        index.append(np.where(mesh.corner_uvs >= 0, mesh.corner_uvs + first, -1).astype(np.int32))
+        first += len(mesh.uvs)
+    return CornerVectors(columns(_joined(values, np.zeros((0, 2))), F), _joined(index, np.zeros(0, np.int32)))
+
+
+def polygon_centres(world: World) -> NDArray[np.float32]:
+    """(P, 3) mean of each polygon's vertices, in radii from the scene's centre."""
+    centres = []
+    for placed in world.placed:
+        mesh = placed.mesh
+        if not mesh.polygon_count:
+            continue
+        points = world.vertices[mesh.corners + placed.first_vertex].astype(np.float64)
+        sums = np.add.reduceat(points, mesh.starts[:-1], axis=0)
+        centres.append(sums / np.diff(mesh.starts)[:, None])
+    return columns(_joined(centres, np.zeros((0, 3))), F)

@@ -1,0 +1,126 @@
+"""Random numbers keyed by what they are for, and well-spread point sets.
+
+Every number is a hash of (seed, purpose, pixel or vertex number, sample): more outputs, other tiles, more
+threads and another order change none of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F
+
+U32 = np.uint32
+GOLDEN = 0.6180339887498949
+PLASTIC = 1.32471795724474602596
+"""Root of x^3 = x + 1; 1/x and 1/x^2 step the R2 sequence (Roberts 2018)."""
+
+
+def stream(seed: int, purpose: str) -> int:
+    """A 32-bit key for one use of random numbers."""
+    return int.from_bytes(hashlib.blake2b(f"{seed}:{purpose}".encode(), digest_size=4).digest(), "little")
+
+
+def hashed(key: int, number: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """32 random bits per number: two rounds of multiply and xorshift (lowbias32, Wellons 2018)."""
+    x = number ^ U32(key)
+    for multiplier in (0x7FEB352D, 0x846CA68B):
+        x = (x ^ (x >> U32(16))) * U32(multiplier)
+        x ^= x >> U32(15)
+    return (x ^ (x >> U32(16))) + U32(key)
+
+
+def unit_interval(bits: NDArray[np.uint32]) -> NDArray[np.float64]:
+    """[0, 1) float64 from 32 bits."""
+    return bits * 2.0**-32
+
+
+@lru_cache(maxsize=32)
+def sobol(count: int) -> NDArray[np.uint32]:
+    """(2, count) uint32: the first points of Sobol's (0, 2)-sequence, bit-reversed for `owen`."""
+    number = np.arange(count, dtype=U32)
+    second, matrix, rest = np.zeros_like(number), U32(1 << 31), number.copy()
+    while rest.any():
+        second ^= np.where(rest & U32(1), matrix, U32(0))
+        rest >>= U32(1)
+        matrix ^= matrix >> U32(1)
+    points = np.stack([number, reverse_bits(second)])
+    points.setflags(write=False)
+    return points
+
+
+def reverse_bits(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Bits of each uint32 in reverse order."""
+    x = x.byteswap()
+    for shift, mask in ((4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        x = ((x >> U32(shift)) & U32(mask)) | ((x & U32(mask)) << U32(shift))
+    return x
+
+
+def owen(reversed_bits: NDArray[np.uint32], seed: NDArray[np.uint32]) -> NDArray[np.float64]:
+    """[0, 1) coordinates: a nested uniform scramble of bit-reversed points, by hashing.
+
+    Each step lets a bit depend on lower bits only, so that on reversed input a digit depends on the
+    digits before it, as Owen's scramble has it.
+
+    References
+    ----------
+    Laine, S. and Karras, T. (2011). Stratified sampling for stochastic transparency. EGSR.
+    Burley, B. (2020). Practical hash-based Owen scrambling. JCGT 9(4); constants of Vegdahl (2021).
+    """
+    x = reversed_bits ^ (reversed_bits * U32(0x3D20ADEA))
+    x = x + seed
+    x = x * ((seed >> U32(16)) | U32(1))
+    x = x ^ (x * U32(0x05526C56))
+    x = x ^ (x * U32(0x53A22864))
+    return unit_interval(reverse_bits(x))
+
+
+def pixel_points(key: int, pixel: NDArray[np.uint32], count: int) -> NDArray[np.float64]:
+    """(N * count, 2) in [0, 1)^2: `count` points per pixel, an Owen-scrambled Sobol set each.
+
+    One point is the pixel's centre.
+    """
+    if count == 1:
+        return np.full((len(pixel), 2), 0.5, order="F")
+    out = np.empty((len(pixel), count, 2))
+    for axis, base in enumerate(sobol(count)):
+        seeds = hashed(key + axis & 0xFFFFFFFF, pixel)
+        out[:, :, axis] = owen(base[None, :], seeds[:, None])
+    return out.reshape(-1, 2)
+
+
+@lru_cache(maxsize=64)
+def spiral_table(count: int, phases: int = 16) -> NDArray[np.float32]:
+    """(phases, count, 3) unit directions about +z, cosine-weighted: golden-angle spirals on the disc.
+
+    r^2 = (i + (k + 1/2) / phases) / count. Projected on the disc the cosine disappears; with the phase drawn
+    at random every point is uniform in its own ring, so the mean is unbiased for any count.
+    """
+    i = np.arange(count)
+    phase = (np.arange(phases)[:, None] + 0.5) / phases
+    r2 = (i + phase) / count
+    angle = 2 * np.pi * ((i * GOLDEN) % 1.0)
+    r = np.sqrt(r2)
+    table = np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r2)], axis=-1).astype(F)
+    table.setflags(write=False)
+    return table
+
+
+def dither(
+    key: int, x: NDArray[np.int64], y: NDArray[np.int64], sample: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(2, N) in [0, 1): turn and phase of each pixel's spiral from the R2 sequence over the pixel grid.
+
+    Neighbouring pixels then err in different directions, and a small blur removes more of the error than
+    it would of independent noise. Samples of one pixel are shifted by golden-ratio steps.
+    """
+    a, b = 1 / PLASTIC, 1 / PLASTIC**2
+    start = unit_interval(hashed(key, np.array([0, 1], U32)))
+    turn = (a * x + b * y + GOLDEN * sample + start[0]) % 1.0
+    phase = (b * x + (a * b) * y + GOLDEN * GOLDEN * sample + start[1]) % 1.0
+    return np.stack([turn, phase])

@@ -1,0 +1,55 @@
+"""Samples to pixels: what a layer is made of and how its samples become one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """A layer of the picture."""
+
+    name: str
+    buffer: str  # what fills it
+    channels: tuple[str, ...]  # full channel names, in order
+    data: bool = False  # never filtered: the sample nearest to the pixel's centre, in 32 bits
+
+
+def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: int) -> NDArray[np.float32]:
+    """(P, k) mean over each pixel's samples of (M, k) values at the samples seen, 0 elsewhere.
+
+    Summed in float64; a pixel's samples always stand together, so that tiles change nothing.
+    """
+    values = values if values.ndim == 2 else values[:, None]
+    if samples == 1:
+        out = np.zeros((pixels, values.shape[1]), F)
+        out[lane] = values
+        return out
+    spread = np.zeros((pixels * samples, values.shape[1]))
+    spread[lane] = values
+    return spread.reshape(pixels, samples, -1).mean(axis=1).astype(F)
+
+
+def pixel_nearest(values: NDArray[np.float32], lane: Ids, nearest: Ids, pixels: int) -> NDArray[np.float32]:
+    """(P, k) of the sample nearest to each pixel's centre, 0 where that sample sees nothing.
+
+    Parameters
+    ----------
+    nearest : (P,) int32
+        That sample's lane in the tile.
+    """
+    values = values if values.ndim == 2 else values[:, None]
+    row = np.full(
+        int(nearest.max(initial=-1)) + 1 if not lane.size else max(int(nearest.max()), int(lane.max())) + 1,
+        -1,
+    )
+    row[lane] = np.arange(len(lane))
+    which = row[nearest]
+    out = np.zeros((pixels, values.shape[1]), F)
+    out[which >= 0] = values[which[which >= 0]]
+    return out

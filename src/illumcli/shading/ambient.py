@@ -1,0 +1,27 @@
+"""Light that needs no lamp: emission, and the ambient light weighed by obscurance."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Lanes, Vectors
+
+
+def ambient_light(
+    ambient_color: Vectors, light: tuple[float, float, float], obscurance: Lanes | None
+) -> Vectors:
+    """(M, 3) k_a I_a w; w is 1 where no obscurance is asked for."""
+    out = ambient_color * np.asarray(light, F)
+    return out if obscurance is None else out * obscurance[:, None]
+
+
+def coupled(
+    ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, unlit: Vectors, w: Lanes
+) -> NDArray[np.float32]:
+    """(M, 3) (k_a I_a + direct) w + I_d, as one text prints it (Theoharis et al. 2008, eq. 12.75).
+
+    `direct` is the material's response to all lights, `unlit` (I_d) the light that arrives, its cosine
+    included; direct light counts twice, once with and once without the material.
+    """
+    return (ambient_color * np.asarray(light, F) + direct) * w[:, None] + unlit

@@ -1,0 +1,76 @@
+"""One light: groups the lit points by material and asks each model for its response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids, Vectors, rows
+from illumcli.models._base import IlluminationModel
+from illumcli.shading.terms import evaluate, words
+from illumcli.visibility.arriving import Lit
+
+
+def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
+    """Which lanes have which number of 0..count-1: (number, lanes), only numbers that occur."""
+    if count == 1:
+        return [(0, slice(None))] if len(number) else []
+    have = np.flatnonzero(np.bincount(number, minlength=count))
+    if len(have) == 1:
+        return [(int(have[0]), slice(None))]
+    return [(int(k), np.flatnonzero(number == k).astype(np.int32)) for k in have]
+
+
+def pick(values: NDArray[Any], lanes: Ids | slice) -> NDArray[Any]:
+    """Values of these lanes, without a copy where it is all of them."""
+    return values if isinstance(lanes, slice) else rows(values, lanes)
+
+
+def response(
+    models: Sequence[IlluminationModel],
+    lobes: Sequence[Mapping[str, Any]],
+    material: Ids,
+    lit: Lit,
+    color: tuple[float, float, float],
+    given: Mapping[str, Vectors],
+) -> dict[str, Vectors]:
+    """Light leaving towards the eye at every point, per lobe, shadows not yet applied.
+
+    Parameters
+    ----------
+    models, lobes : sequences
+        By material number; a material without lobes is not evaluated.
+    material : (E,) int32
+        Of each point.
+    lit : Lit
+        The points the light reaches.
+    color : (3,)
+        Intensity or irradiance of the light.
+    given : mapping
+        (E, 3) words of the models at all points: `n`, and `v`, `t` where some model wants them.
+
+    Returns
+    -------
+    dict
+        `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
+    """
+    names = sorted({name for each in lobes for name in each})
+    out = {name: np.zeros((lit.count, 3), F, order="F") for name in names}
+    power = np.asarray(color, F)
+    for number, lanes in groups(material.take(lit.lane), len(models)):
+        if not lobes[number]:
+            continue
+        at = pick(lit.lane, lanes)
+        wanted = words(lobes[number])
+        here = {word: rows(given[word], at) for word in wanted if word in given}
+        here["l"] = pick(lit.l, lanes)
+        if "light" in wanted:
+            here["light"] = power / max(power.max(), np.finfo(F).tiny)
+        values = evaluate(dict(lobes[number]), here)
+        arriving = pick(lit.strength, lanes)[:, None] * power
+        for name, value in values.items():
+            out[name][at] = value * arriving
+    return out

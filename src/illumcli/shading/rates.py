@@ -1,0 +1,144 @@
+"""Shading rates: where a model is evaluated, and how its values come back to the samples.
+
+constant   once per polygon seen, with the polygon's own normal
+gouraud    once per vertex seen, intensities interpolated (Gouraud 1971)
+phong      once per sample, normals interpolated linearly (Phong 1975)
+quadratic  once per sample, normals interpolated quadratically (van Overveld and Wyvill 1997)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, rows
+from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.rays.surface import Facets, Hits, facing, interpolated, quadratic
+
+RATES = ("constant", "gouraud", "phong", "quadratic")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Where models are evaluated, E points on triangles, and how values return to the M samples seen."""
+
+    triangle: Ids  # (E,)
+    u: Lanes  # (E,)
+    v: Lanes  # (E,)
+    position: Vectors  # (E, 3) float32, in radii
+    n: Vectors  # (E, 3) float32 unit shading normal on the side the eye sees
+    spread: Callable[[NDArray[Any]], NDArray[Any]]
+    """(E, k) values at the points to (M, k) values at the samples."""
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+
+def points(
+    world: World,
+    hits: Hits,
+    facet: Facets,
+    rates: Sequence[str],
+    normals: CornerVectors | None = None,
+    centres: NDArray[np.float32] | None = None,
+    polygon_normals: NDArray[np.float32] | None = None,
+) -> Points:
+    """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``."""
+    if len(set(rates)) == 1:
+        return _POINTS[rates[0]](world, hits, facet, normals, centres, polygon_normals)
+    rate = np.array([RATES.index(name) for name in rates], np.int8)
+    of_sample = rate.take(world.objects.take(hits.triangle))
+    groups, parts = [], []
+    for number, name in enumerate(RATES):
+        group = np.flatnonzero(of_sample == number)
+        if group.size:
+            groups.append(group)
+            some = Hits(*(getattr(hits, field).take(group) for field in Hits.__slots__))
+            own = Facets(*(rows(getattr(facet, field), group) for field in Facets.__slots__))
+            parts.append(_POINTS[name](world, some, own, normals, centres, polygon_normals))
+    if not parts:
+        return _samples(hits, facet, facet.ng)
+
+    def spread(values: NDArray[Any]) -> NDArray[Any]:
+        out = np.empty((len(hits.triangle), *values.shape[1:]), values.dtype, order="F")
+        first = 0
+        for group, part in zip(groups, parts, strict=True):
+            out[group] = part.spread(values[first : first + len(part)])
+            first += len(part)
+        return out
+
+    joined = {
+        name: columns(np.concatenate([getattr(part, name) for part in parts]))
+        for name in ("triangle", "u", "v", "position", "n")
+    }
+    return Points(**joined, spread=spread)
+
+
+def _samples(hits: Hits, facet: Facets, n: Vectors) -> Points:
+    return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, _same)
+
+
+def _same(values: NDArray[Any]) -> NDArray[Any]:
+    return values
+
+
+def _phong(
+    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+) -> Points:
+    n = facet.ng if normals is None else interpolated(world, normals, hits.triangle, hits.u, hits.v, facet)
+    return _samples(hits, facet, n)
+
+
+def _quadratic(
+    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+) -> Points:
+    return _samples(hits, facet, quadratic(world, normals, hits.triangle, hits.u, hits.v, facet))
+
+
+def _constant(
+    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+) -> Points:
+    """One point per polygon and side seen: its centre, its normal."""
+    polygon = world.polygons.take(hits.triangle)
+    key, first, back = np.unique(polygon * 2 + facet.behind, return_index=True, return_inverse=True)
+    own = key // 2
+    third = np.full(len(key), 1 / 3, F)
+    n = facing(rows(polygon_normals, own), facet.behind.take(first))
+    return Points(
+        hits.triangle.take(first), third, third, rows(centres, own), n, lambda values: rows(values, back)
+    )
+
+
+def _gouraud(
+    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+) -> Points:
+    """One point per vertex and side seen, where vertices with several normals count as several."""
+    corner = np.concatenate([world.corners[:, k].take(hits.triangle) for k in range(3)])
+    behind = np.tile(facet.behind, 3)
+    # corners that share vertex, normal and side share their value; uv may differ between them
+    key, first, back = np.unique(corner.astype(np.int64) * 2 + behind, return_index=True, return_inverse=True)
+    which, sample = np.divmod(first, len(hits.triangle))
+    triangle = hits.triangle.take(sample)
+    vertex = world.triangles[triangle, which]
+    n = facing(rows(normals.values, normals.index.take(corner.take(first))), behind.take(first))
+    a, b, c = back.reshape(3, -1)
+    w0, w1, w2 = 1 - hits.u - hits.v, hits.u, hits.v
+
+    def spread(values: NDArray[Any]) -> NDArray[Any]:
+        return w0[:, None] * rows(values, a) + w1[:, None] * rows(values, b) + w2[:, None] * rows(values, c)
+
+    return Points(
+        triangle, (which == 1).astype(F), (which == 2).astype(F), rows(world.vertices, vertex), n, spread
+    )
+
+
+_POINTS: dict[str, Callable[..., Points]] = {
+    "constant": _constant,
+    "gouraud": _gouraud,
+    "phong": _phong,
+    "quadratic": _quadratic,
+}

@@ -1,0 +1,434 @@
+"""The stages that join folders which do not know each other: thin functions from buffers to buffers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, rows
+from illumcli.geometry import assemble
+from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.mesh import Mesh
+from illumcli.lights._base import Light
+from illumcli.rays import sampling, surface
+from illumcli.rays.camera import axes as camera_axes
+from illumcli.rays.camera import camera_rays, film_points
+from illumcli.rays.offsets import lifted
+from illumcli.rays.surface import Facets, Hits
+from illumcli.rays.tracer import Tracer
+from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
+from illumcli.shading import direct as shading
+from illumcli.shading import rates as shading_rates
+from illumcli.shading.ambient import ambient_light
+from illumcli.shading.ambient import coupled as coupled_light
+from illumcli.shading.materials import Materials, colors_at, materials
+from illumcli.shading.rates import Points
+from illumcli.visibility import shadows
+from illumcli.visibility.arriving import Lit
+from illumcli.visibility.arriving import lit as lit_lanes
+from illumcli.visibility.obscurance import obscurance as open_share
+
+# --- once: geometry ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sources:
+    """The mesh of every object, read once per source, and the normals settings of each."""
+
+    meshes: tuple[Mesh, ...]
+    sources: tuple[Any, ...]
+
+
+def meshes(scene: Scene, folder: Path) -> Sources:
+    """Every object's mesh; a source that several objects name is read once."""
+    from illumcli.geometry.readers import read_mesh
+    from illumcli.scene.load import resolve
+
+    known: dict[str, Mesh] = {}
+    found, sources = [], []
+    for thing in scene.objects:
+        source = thing.mesh
+        if isinstance(source, str):
+            source = scene.meshes[source] if source in scene.meshes else MeshFile(file=source)
+        key = source.file if isinstance(source, MeshFile) else repr(source)
+        if key not in known:
+            known[key] = (
+                read_mesh(resolve(folder, source.file)) if isinstance(source, MeshFile) else source.mesh()
+            )
+        found.append(known[key])
+        sources.append(source)
+    return Sources(tuple(found), tuple(sources))
+
+
+def world(scene: Scene, meshes: Sources) -> World:
+    """All triangles, placed, recentred and scaled to unit radius."""
+    matrices = [
+        assemble.transform_matrix(thing.transform, mesh)
+        for thing, mesh in zip(scene.objects, meshes.meshes, strict=True)
+    ]
+    return assemble.place(meshes.meshes, matrices)
+
+
+def tracer_over(world: World) -> Tracer:
+    """The ray core over the world's triangles."""
+    return Tracer(world.vertices, world.triangles)
+
+
+def corner_normals(scene: Scene, rate: list[str], meshes: Sources, world: World) -> CornerVectors:
+    """Shading normals of every corner; of flat-shaded objects their polygons' own."""
+    from illumcli.geometry.normals import corner_normals as of_mesh
+
+    known: dict[tuple[int, str], Any] = {}
+    own = []
+    for mesh, source, how in zip(meshes.meshes, meshes.sources, rate, strict=True):
+        key = (id(mesh), "flat" if how == "constant" else repr(getattr(source, "normals", "")))
+        if key not in known:
+            if how == "constant":
+                known[key] = of_mesh(mesh, crease=0.0, use_file=False)
+            elif isinstance(source, MeshFile):
+                said = source.normals
+                known[key] = of_mesh(mesh, said.weights, said.crease, said.source == "file", said.polygon)
+            else:
+                known[key] = of_mesh(mesh)
+        own.append(known[key])
+    return assemble.world_normals(world, own)
+
+
+def uvs(world: World) -> CornerVectors:
+    """Texture coordinates of every corner."""
+    return assemble.world_uvs(world)
+
+
+def polygon_centres(world: World) -> NDArray[np.float32]:
+    """(P, 3) the centre of every polygon, in radii."""
+    return assemble.polygon_centres(world)
+
+
+def polygon_normals(scene: Scene, meshes: Sources, world: World) -> NDArray[np.float32]:
+    """(P, 3) unit normal of every polygon, in scene directions."""
+    from illumcli.geometry.normals import polygon_normals as of_mesh
+
+    parts = []
+    for mesh, source, placed in zip(meshes.meshes, meshes.sources, world.placed, strict=True):
+        method = source.normals.polygon if isinstance(source, MeshFile) else "newell"
+        turned = of_mesh(mesh, method) @ assemble.cofactors(placed.matrix[:3, :3]).T
+        size = np.linalg.norm(turned, axis=1, keepdims=True)
+        sign = -1 if placed.mirrored else 1
+        parts.append(np.divide(sign * turned, size, out=np.zeros_like(turned), where=size > 0))
+    return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
+
+
+def materials_of(scene: Scene, meshes: Sources, world: World) -> Materials:
+    """The materials of all triangles."""
+    own = [scene.material_of(thing) for thing in scene.objects]
+    names = [
+        thing.material if isinstance(thing.material, str) and not thing.override else name
+        for thing, name in zip(scene.objects, scene.object_names(), strict=True)
+    ]
+    imported = [isinstance(source, MeshFile) and source.materials for source in meshes.sources]
+    return materials(world, scene.materials, own, names, imported, default_material())
+
+
+# --- per tile: samples and what they see --------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A rectangle of pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """The samples of a tile, pixel by pixel, row by row from the top."""
+
+    x: NDArray[np.int64]  # (N,) pixel
+    y: NDArray[np.int64]  # (N,)
+    sample: NDArray[np.int64]  # (N,) number within the pixel
+    points: NDArray[np.float64]  # (N, 2) in [0, 1)^2
+    per_pixel: int
+    nearest: Ids  # (P,) the sample nearest to each pixel's centre
+
+
+def samples(seed: int, view: Any, tile: Tile) -> Samples:
+    """Where the tile's samples lie, keyed by pixel number."""
+    count = view.samples
+    y, x = np.divmod(np.arange(tile.width * tile.height), tile.width)
+    x, y = x + tile.x, y + tile.y
+    points = sampling.pixel_points(
+        sampling.stream(seed, "pixel"), (y * view.width + x).astype(np.uint32), count
+    )
+    distance = np.square(points - 0.5).sum(axis=1).reshape(-1, count)
+    nearest = (np.argmin(distance, axis=1) + np.arange(len(x)) * count).astype(np.int32)
+    sample = np.tile(np.arange(count), len(x))
+    return Samples(np.repeat(x, count), np.repeat(y, count), sample, points, count, nearest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rays:
+    """Primary rays of a tile."""
+
+    origins: Vectors
+    directions: Vectors
+    skipped: NDArray[np.float64]  # (N,) from the eye to the origin, in radii
+
+
+def rays(film_filter: Any, world: World, view: Any, samples: Samples) -> Rays:
+    """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
+    if samples.per_pixel == 1:
+        points = np.stack([samples.x + 0.5, samples.y + 0.5], axis=1)
+    else:
+        points = film_points(samples.x, samples.y, samples.points, film_filter)
+    return Rays(*camera_rays(view.camera, world.frame, view.width, view.height, points))
+
+
+def hits(tracer: Tracer, rays: Rays) -> Hits:
+    """What the samples see."""
+    return surface.seen(tracer.closest(rays.origins, rays.directions))
+
+
+def facets(world: World, rays: Rays, hits: Hits) -> Facets:
+    """Where they see it."""
+    towards_eye = -rows(rays.directions, hits.lane)
+    return surface.facets(world, hits.triangle, hits.u, hits.v, towards_eye)
+
+
+def points(
+    rate: list[str],
+    world: World,
+    hits: Hits,
+    facets: Facets,
+    normals: CornerVectors | None = None,
+    centres: NDArray[np.float32] | None = None,
+    polygon_normals: NDArray[np.float32] | None = None,
+) -> Points:
+    """Where models are evaluated."""
+    return shading_rates.points(world, hits, facets, rate, normals, centres, polygon_normals)
+
+
+def material(world: World, materials: Materials, points: Points) -> Ids:
+    """(E,) material number at every point."""
+    return materials.number(world, points.triangle)
+
+
+def view_vectors(view: Any, world: World, points: Points) -> Vectors:
+    """(E, 3) float32 unit vectors to the eye."""
+    if view.camera.projection == "orthographic":
+        backward = (-camera_axes(view.camera)[2]).astype(F)
+        return np.asfortranarray(np.broadcast_to(backward, points.position.shape))
+    from illumcli.lights._base import towards
+
+    return towards(world.frame.inward(view.camera.position), points.position)[0]
+
+
+def tangents(scene: Scene, world: World, uvs: CornerVectors, points: Points) -> Vectors:
+    """(E, 3) float32 unit tangents: the grain of each object, or the direction of growing u."""
+    grain = surface.along_u(world, uvs, points.triangle)
+    number = world.objects.take(points.triangle)
+    for i, (thing, placed) in enumerate(zip(scene.objects, world.placed, strict=True)):
+        if thing.grain is None:
+            continue
+        own = np.flatnonzero(number == i)
+        linear = placed.matrix[:3, :3]
+        if isinstance(thing.grain, tuple):
+            grain[own] = (linear @ thing.grain).astype(F)
+        else:
+            axis = assemble.cofactors(linear) @ thing.grain.axis
+            centre = world.frame.inward(linear @ thing.grain.centre + placed.matrix[:3, 3])
+            ring = np.cross(axis / np.linalg.norm(axis), rows(points.position, own) - centre)
+            grain[own] = ring.astype(F)
+    return surface.tangent(points.n, surface.unit(grain))
+
+
+# --- per tile: light ----------------------------------------------------------------------------------
+
+
+def lit(light: Light, world: World, points: Points) -> Lit:
+    """The points a light reaches if nothing stands between."""
+    return lit_lanes(light, world.frame, points.position, points.n)
+
+
+def reach(light: Light, world: World, facets: Facets) -> Lit:
+    """The samples whose vertices or polygons a light may reach."""
+    return lit_lanes(light, world.frame, columns(facets.position, F))
+
+
+def same(lit: Lit) -> Lit:
+    """The points are the samples."""
+    return lit
+
+
+def shadow_origins(world: World, hits: Hits, facets: Facets, normals: CornerVectors | None = None) -> Vectors:
+    """(M, 3) where shadow rays start."""
+    return shadows.shadow_origins(world, hits, facets, normals)
+
+
+def shadow(tracer: Tracer, shadow_origins: Vectors, reach: Lit) -> Lanes:
+    """(M,) delta of one light."""
+    return shadows.shadow(tracer, shadow_origins, reach)
+
+
+def no_shadow(hits: Hits) -> Lanes:
+    """(M,) delta of a light that casts no shadow."""
+    return np.ones(len(hits.lane), F)
+
+
+def black(hits: Hits) -> Vectors:
+    """(M, 3) nothing."""
+    return np.zeros((len(hits.lane), 3), F, order="F")
+
+
+def direct(
+    light: Light,
+    materials: Materials,
+    material: Ids,
+    points: Points,
+    lit: Lit,
+    v: Vectors | None = None,
+    t: Vectors | None = None,
+) -> dict[str, Vectors]:
+    """One light's response per lobe at the samples, its shadow not applied."""
+    given = {"n": points.n} | ({"v": v} if v is not None else {}) | ({"t": t} if t is not None else {})
+    at_points = shading.response(materials.models, materials.lobes, material, lit, light.color(), given)
+    return {name: points.spread(value) for name, value in at_points.items()}
+
+
+def lobe_sum(hits: Hits, direct: dict[str, Vectors], shadow: Lanes | None = None) -> Vectors:
+    """(M, 3) one light with its shadow."""
+    return _shadowed(total(hits, **direct), shadow)
+
+
+def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Lanes | None = None) -> Vectors:
+    """(M, 3) one lobe of one light with its shadow."""
+    return _shadowed(direct[name] if name in direct else black(hits), shadow)
+
+
+def arriving_light(light: Light, points: Points, lit: Lit, shadow: Lanes | None = None) -> Vectors:
+    """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
+    out = np.zeros((lit.count, 3), F, order="F")
+    cosine = dot(rows(points.n, lit.lane), lit.l)
+    out[lit.lane] = (lit.strength * cosine)[:, None] * np.asarray(light.color(), F)
+    return _shadowed(points.spread(out), shadow)
+
+
+def _shadowed(value: Vectors, shadow: Lanes | None) -> Vectors:
+    return value if shadow is None else value * shadow[:, None]
+
+
+def total(hits: Hits, **parts: Vectors) -> Vectors:
+    """(M, 3) the sum of the parts, in their order."""
+    if not parts:
+        return black(hits)
+    first, *others = parts.values()
+    if not others:
+        return first
+    out = first + others[0]
+    for part in others[1:]:
+        out += part
+    return out
+
+
+def obscurance_origins(facets: Facets) -> Vectors:
+    """(M, 3) where obscurance rays start."""
+    return lifted(facets.position, facets.ng, facets.edge)
+
+
+def obscurance(
+    settings: Obscurance,
+    seed: int,
+    tracer: Tracer,
+    world: World,
+    samples: Samples,
+    hits: Hits,
+    facets: Facets,
+    obscurance_origins: Vectors,
+) -> Lanes:
+    """(M,) w of every sample seen."""
+    key = sampling.stream(seed, "obscurance")
+    lane = hits.lane
+    draws = sampling.dither(key, samples.x[lane], samples.y[lane], samples.sample[lane])
+    return open_share(
+        tracer, obscurance_origins, facets.ng, draws, settings.samples, settings.falloff, world.frame.radius
+    )
+
+
+def ambient_color(materials: Materials, material: Ids, points: Points) -> Vectors:
+    """(M, 3) k_a."""
+    return points.spread(colors_at([model.ambient_color() for model in materials.models], material))
+
+
+def ambient(color: Any, ambient_color: Vectors, obscurance: Lanes | None = None) -> Vectors:
+    """(M, 3) k_a I_a w."""
+    return ambient_light(ambient_color, color, obscurance)
+
+
+def coupled(
+    color: Any, ambient_color: Vectors, direct: Vectors, unlit: Vectors, obscurance: Lanes | None = None
+) -> Vectors:
+    """(M, 3) (k_a I_a + direct) w + I_d."""
+    w = np.ones(len(ambient_color), F) if obscurance is None else obscurance
+    return coupled_light(ambient_color, color, direct, unlit, w)
+
+
+def emission(materials: Materials, material: Ids, points: Points) -> Vectors:
+    """(M, 3) L_e."""
+    return points.spread(colors_at([model.emission for model in materials.models], material))
+
+
+# --- per tile: data layers ----------------------------------------------------------------------------
+
+
+def alpha(hits: Hits) -> Lanes:
+    """(M,) 1 where a surface is seen."""
+    return np.ones(len(hits.lane), F)
+
+
+def depth(view: Any, world: World, facets: Facets) -> Lanes:
+    """(M,) distance from the eye's plane along the line of sight [scene units]."""
+    forward = camera_axes(view.camera)[2]
+    eye = world.frame.inward(view.camera.position)
+    along = dot(facets.position - eye, forward[None, :])
+    return (along * world.frame.radius).astype(F)
+
+
+def world_position(world: World, facets: Facets) -> Vectors:
+    """(M, 3) [scene units]."""
+    return columns(world.frame.outward(facets.position), F)
+
+
+def normal(points: Points) -> Vectors:
+    """(M, 3) unit shading normal on the side the eye sees."""
+    return surface.unit(points.spread(points.n))
+
+
+def geometric_normal(facets: Facets) -> Vectors:
+    """(M, 3) unit facet normal on the side the eye sees."""
+    return facets.ng
+
+
+def uv(world: World, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
+    """(M, 2) texture coordinates."""
+    return surface.uv(world, uvs, hits.triangle, hits.u, hits.v)
+
+
+def object_id(world: World, hits: Hits) -> Lanes:
+    """(M,) number of the object, from 1."""
+    return (world.objects.take(hits.triangle) + 1).astype(F)
+
+
+def material_id(world: World, materials: Materials, hits: Hits) -> Lanes:
+    """(M,) number of the material, from 1."""
+    return (materials.number(world, hits.triangle) + 1).astype(F)
+
+
+def triangle_id(hits: Hits) -> Lanes:
+    """(M,) number of the triangle, from 1."""
+    return (hits.triangle + 1).astype(F)

@@ -1,0 +1,359 @@
+"""Normals of polygons, and of their corners from the polygons around each vertex.
+
+All work is in float64 on the corners of ragged polygons at once; a single polygon is the case of one. Sums
+stand on vectors from the polygon's first corner, so a mesh far from the origin keeps its digits. Every
+polygon has at least three corners.
+
+References
+----------
+Gouraud, H. (1971). Continuous shading of curved surfaces. IEEE Trans. Computers C-20. Equal weights.
+Sutherland, I. E., Sproull, R. F., Schumacker, R. A. (1974). A characterization of ten hidden-surface
+    algorithms. ACM Computing Surveys 6. The Martin-Newell normal.
+Thürmer, G., Wüthrich, C. A. (1998). Computing vertex normals from polygonal facets. J. Graphics Tools 3.
+    Angle weights.
+Theoharis, T. et al. (2008). Graphics and Visualization, eq. 12.31 to 12.33.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from illumcli.arrays import Lanes, Vectors, cross, dot, length, rows, unit
+from illumcli.geometry.mesh import Mesh
+
+PolygonMethod: TypeAlias = Literal["cross", "edge_average", "newell", "plane"]
+Weights: TypeAlias = Literal["equal", "area", "angle"]
+
+EPS = np.finfo(np.float64).eps
+SAME_ANGLE = 1e-9  # [rad] polygons that meet at exactly the crease angle are still averaged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CornerNormals:
+    """Unit normals and which of them each corner has. Arrays are read-only."""
+
+    normals: Vectors  # (K, 3) float64; rows that no corner names may be zero
+    index: NDArray[np.int32]  # (C,) row of `normals`, -1 where neither vertex nor polygon has a normal
+    repairs: Mapping[str, int]
+    """What was wrong and put right: class -> corners."""
+
+    def __post_init__(self) -> None:
+        self.normals.setflags(write=False)
+        self.index.setflags(write=False)
+
+
+def polygon_normals(mesh: Mesh, method: PolygonMethod = "newell") -> Vectors:
+    """(P, 3) float64 unit normals, on the side from which the polygon runs counter-clockwise.
+
+    Parameters
+    ----------
+    method : {"newell", "cross", "edge_average", "plane"}
+        `newell` suits every polygon. The others are the textbook ones: `cross` of the edges at the first
+        corner (turned round where that corner is reflex), `edge_average` of the unit cross products at all
+        corners, `plane` through the first three corners, on Newell's side. Where one of these finds nothing
+        (corners on a line) Newell's stands in.
+
+    Returns
+    -------
+    (P, 3) float64; zero for degenerate polygons: all corners on a line, as far as doubles tell.
+    """
+    newell = unit(area_vectors(mesh))
+    if method == "newell":
+        return newell
+    first = mesh.starts[:-1]
+    if method == "cross":
+        normals = unit(rows(corner_crosses(mesh), first))
+    elif method == "edge_average":
+        normals = unit(_per_polygon(unit(corner_crosses(mesh)), mesh.starts))
+    else:
+        a, b, fans = _fans(mesh)
+        normals = unit(cross(rows(a, fans[:-1]), rows(b, fans[:-1])))
+        normals = normals * np.where(dot(normals, newell) < 0, -1.0, 1.0)[:, None]
+    found = dot(normals, normals) > 0
+    return np.where((found & (dot(newell, newell) > 0))[:, None], normals, newell)
+
+
+def area_vectors(mesh: Mesh) -> Vectors:
+    """(P, 3) Newell's vectors, twice the polygons' area along their normals; zero for degenerate polygons.
+
+    The sum of the cross products of the fan from the first corner, which is Newell's sum with that corner as
+    the origin. Also right for concave polygons.
+    """
+    a, b, fans = _fans(mesh)
+    vectors = _per_polygon(cross(a, b), fans)
+    noise = 4 * EPS * _per_polygon(dot(a, a) + dot(b, b), fans)
+    return vectors * (length(vectors) > noise)[:, None]
+
+
+def corner_crosses(mesh: Mesh) -> Vectors:
+    """(C, 3) cross product of the edges that leave each corner, next x previous, not normalised.
+
+    Outward at a convex corner of a counter-clockwise polygon, the other way at a reflex one.
+    """
+    following, previous = _corner_edges(mesh)
+    return cross(following, previous)
+
+
+def corner_normals(
+    mesh: Mesh,
+    weights: Weights = "angle",
+    crease: float | None = None,
+    use_file: bool = True,
+    polygon_method: PolygonMethod = "newell",
+) -> CornerNormals:
+    """The normal of every corner: the file's own where it has one, or the mean of the polygons at the vertex.
+
+    Parameters
+    ----------
+    weights : {"angle", "area", "equal"}
+        What a polygon counts at its vertex. Only `angle` does not depend on how faces are cut into polygons.
+    crease : float, optional
+        [degrees] A corner averages the polygons at its vertex that stand within this angle of its own; by
+        default all of them.
+    use_file : bool
+        Take the file's normals. Those that are zero or not finite are computed instead, and counted.
+    polygon_method : {"newell", "cross", "edge_average", "plane"}
+        How the polygons' own normals are made.
+
+    Returns
+    -------
+    CornerNormals
+        Where the polygons at a vertex cancel (two sheets back to back) a corner has its polygon's normal;
+        counted.
+    """
+    if not use_file or mesh.normals is None or mesh.corner_normals is None:
+        return _computed(mesh, weights, crease, polygon_method)
+    own, good = _file_normals(mesh.normals)
+    named = mesh.corner_normals >= 0
+    kept = named & good[mesh.corner_normals]
+    if kept.all():
+        return CornerNormals(own, mesh.corner_normals.astype(np.int32), {})
+    made = _computed(mesh, weights, crease, polygon_method)
+    index = np.where(kept, mesh.corner_normals, np.where(made.index < 0, -1, made.index + len(own)))
+    bad = int(np.count_nonzero(named & ~kept))
+    repairs = {**made.repairs, **({"zero or non-finite normals": bad} if bad else {})}
+    return CornerNormals(np.concatenate([own, made.normals]), index.astype(np.int32), repairs)
+
+
+# One polygon or one vertex: the case of one
+
+
+def cross_normal(vertices: ArrayLike, index: int) -> NDArray[np.float64]:
+    """(3,) cross product at one vertex of a polygon, (v[i+1] - v[i]) x (v[i-1] - v[i]); not normalised."""
+    return corner_crosses(_single(vertices))[index]
+
+
+def edge_average_normal(vertices: ArrayLike) -> NDArray[np.float64]:
+    """(3,) unit mean of the unit cross products at all vertices of a polygon."""
+    return polygon_normals(_single(vertices), "edge_average")[0]
+
+
+def newell_plane(vertices: ArrayLike) -> NDArray[np.float64]:
+    """(4,) [a, b, c, d] of the plane a x + b y + c z + d = 0 by Martin-Newell, through the first vertex.
+
+    (a, b, c) is twice the polygon's area vector.
+    """
+    normal = area_vectors(_single(vertices))[0]
+    return np.append(normal, -normal @ np.asarray(vertices, np.float64)[0])
+
+
+def plane_solve(p1: ArrayLike, p2: ArrayLike, p3: ArrayLike) -> NDArray[np.float64]:
+    """(3,) the solution of p_i . (a, b, c) = -1 for three points, formed as -N / (N . p1).
+
+    Its length is 1 / (distance of the plane from the origin); it points to the origin's side whatever the
+    winding. Not finite where the plane meets the origin or the points lie on a line.
+    """
+    normal = corner_crosses(_single(np.stack([p1, p2, p3])))[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return -normal / (normal @ np.asarray(p1, np.float64))
+
+
+def vertex_normal(
+    vertex: ArrayLike, ring: ArrayLike, closed: bool, weighting: Weights
+) -> NDArray[np.float64]:
+    """(3,) unit normal of a vertex amid a ring of triangles (vertex, ring[i], ring[i + 1]).
+
+    Parameters
+    ----------
+    ring : (k, 3) float
+        Neighbours in counter-clockwise order.
+    closed : bool
+        Whether a triangle joins the last neighbour to the first.
+    """
+    around = np.asarray(ring, np.float64)
+    first = np.arange(1, len(around) + 1)
+    second = np.roll(first, -1)
+    triangles = np.stack([np.zeros_like(first), first, second], axis=1)[: len(around) if closed else -1]
+    mesh = Mesh.of_triangles(np.vstack([np.asarray(vertex, np.float64), around]), triangles)
+    made = corner_normals(mesh, weighting, use_file=False)
+    return made.normals[made.index[0]]
+
+
+# How it is done
+
+
+def _single(vertices: ArrayLike) -> Mesh:
+    points = np.array(vertices, np.float64)
+    count = len(points)
+    return Mesh(points, np.arange(count, dtype=np.int32), np.array([0, count], np.int32))
+
+
+def _corner_points(mesh: Mesh) -> NDArray[np.float64]:
+    """(C, 3) where each corner is, components contiguous."""
+    return rows(np.asfortranarray(mesh.vertices), mesh.corners)
+
+
+def _ends(mesh: Mesh) -> tuple[Any, Any]:
+    """Index of the first and of the last corner of every polygon; slices where all have as many corners."""
+    size = np.diff(mesh.starts)
+    if len(size) and (size == size[0]).all():
+        return slice(0, None, int(size[0])), slice(int(size[0]) - 1, None, int(size[0]))
+    return mesh.starts[:-1], mesh.starts[1:] - 1
+
+
+def _corner_edges(mesh: Mesh) -> tuple[Vectors, Vectors]:
+    """(C, 3) from each corner to the next, and to the previous one, of its polygon."""
+    points = _corner_points(mesh)
+    first, last = _ends(mesh)
+    following, previous = np.empty_like(points), np.empty_like(points)
+    for p, ahead, back in zip(points.T, following.T, previous.T, strict=True):
+        np.subtract(p[1:], p[:-1], out=ahead[:-1])
+        ahead[last] = p[first] - p[last]
+        np.negative(ahead[:-1], out=back[1:])
+        back[first] = -ahead[last]
+    return following, previous
+
+
+def _fans(mesh: Mesh) -> tuple[Vectors, Vectors, NDArray[Any]]:
+    """(F, 3) both edges of each fan triangle from its first corner, and (P + 1,) where the fans start."""
+    points = _corner_points(mesh)
+    count = np.maximum(np.diff(mesh.starts) - 2, 0)
+    fans = np.concatenate([[0], np.cumsum(count)])
+    if (count == 1).all():
+        origin, second, third = points[::3], points[1::3], points[2::3]
+    else:
+        at = np.arange(fans[-1]) - np.repeat(fans[:-1] - mesh.starts[:-1] - 1, count)
+        origin, second, third = (
+            rows(points, np.repeat(mesh.starts[:-1], count)),
+            rows(points, at),
+            rows(points, at + 1),
+        )
+    return second - origin, third - origin, fans
+
+
+def _per_polygon(values: NDArray[Any], starts: NDArray[Any]) -> NDArray[Any]:
+    """(P, ...) sums of the values between successive `starts`; 0 where there are none."""
+    if len(values) == len(starts) - 1 and (np.diff(starts) == 1).all():
+        return values
+    out = np.zeros((len(starts) - 1, *values.shape[1:]), values.dtype, order="F")
+    some = np.diff(starts) > 0
+    if some.any():
+        out[some] = np.add.reduceat(values, starts[:-1][some], axis=0)
+    return out
+
+
+def _file_normals(normals: NDArray[np.float64]) -> tuple[Vectors, NDArray[np.bool_]]:
+    """The file's normals made unit, and which of them are directions at all."""
+    largest = np.abs(normals).max(axis=1, initial=0.0)
+    good = (largest > 0) & np.isfinite(largest)
+    scaled = np.zeros_like(normals, order="F")
+    np.divide(normals, largest[:, None], out=scaled, where=good[:, None])
+    return unit(scaled), good
+
+
+def _computed(mesh: Mesh, weights: Weights, crease: float | None, method: PolygonMethod) -> CornerNormals:
+    polygons = polygon_normals(mesh, method)
+    weight = _corner_weights(mesh, weights, polygons)
+    owner = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
+    if crease is None:
+        sums, total = _vertex_sums(mesh, weight, polygons, owner)
+        index = mesh.corners
+    else:
+        sums, total = _creased_sums(mesh, weight, polygons, owner, np.radians(crease))
+        index = np.arange(len(mesh.corners), dtype=np.int32)
+    return _with_polygons_own(sums, total, index, polygons, owner)
+
+
+def _with_polygons_own(
+    sums: Vectors, total: Lanes, index: NDArray[np.int32], polygons: Vectors, owner: NDArray[np.int32]
+) -> CornerNormals:
+    """The sums made unit; corners whose sum cancels have their polygon's own normal."""
+    cancelled = length(sums) <= 16 * EPS * total
+    lost = np.flatnonzero(cancelled[index])
+    if not len(lost):
+        return CornerNormals(unit(sums), index.astype(np.int32), {})
+    replaced, row = np.unique(owner[lost], return_inverse=True)
+    own = rows(polygons, replaced)
+    some = dot(own, own)[row] > 0
+    index = index.copy()
+    index[lost] = np.where(some, len(sums) + row, -1)
+    count = int(np.count_nonzero(some))
+    repairs = {"vertices whose polygons cancel": count} if count else {}
+    return CornerNormals(np.concatenate([unit(sums), own]), index.astype(np.int32), repairs)
+
+
+def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Lanes | None:
+    """(C,) what each corner's polygon counts at the corner's vertex; None for all the same."""
+    size = np.diff(mesh.starts)
+    if weights == "equal":
+        return None
+    if weights == "area":
+        return np.repeat(length(area_vectors(mesh)), size)
+    following, previous = _corner_edges(mesh)
+    normal = cross(following, previous)
+    angle = np.arctan2(length(normal), dot(following, previous))
+    if mesh.polygon_count and size.max() > 3:  # a reflex corner spans more than half a turn
+        reflex = dot(normal, rows(polygons, np.repeat(np.arange(len(size)), size))) < 0
+        angle = np.where(reflex, 2 * np.pi - angle, angle)
+    return angle
+
+
+def _vertex_sums(
+    mesh: Mesh, weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32]
+) -> tuple[Vectors, Lanes]:
+    """(V, 3) weighted sums of the polygon normals at each vertex, and (V,) of the weights."""
+    count = len(mesh.vertices)
+    sums = np.empty((count, 3), order="F")
+    for axis in range(3):
+        part = polygons[:, axis][owner]
+        sums[:, axis] = np.bincount(mesh.corners, part if weight is None else part * weight, count)
+    return sums, np.bincount(mesh.corners, weight, count).astype(np.float64)
+
+
+def _creased_sums(
+    mesh: Mesh, weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32], crease: float
+) -> tuple[Vectors, Lanes]:
+    """(C, 3) weighted sums over the polygons within `crease` [rad] of a corner's own, (C,) sums of weights.
+
+    Corners are ordered by vertex, the busiest vertices first; step k pairs each with the k-th after it round
+    its vertex. The work is the sum of squared valences, the memory a few values per corner.
+    """
+    near = 2 * np.sin(min(crease, np.pi) / 2) + SAME_ANGLE  # compared as a chord, exact for small angles
+    valence = np.bincount(mesh.corners, minlength=len(mesh.vertices)).astype(np.int32)
+    busy = np.argsort(-valence, kind="stable")
+    rank = np.empty_like(busy)
+    rank[busy] = np.arange(len(busy))
+    order = np.argsort(rank[mesh.corners], kind="stable").astype(np.int32)
+    span = np.repeat(valence[busy], valence[busy])
+    end = np.repeat(np.cumsum(valence[busy], dtype=np.int32), valence[busy])
+    normal = rows(polygons, owner[order])
+    value = np.ones(len(order)) if weight is None else weight[order]
+    sums, total = normal * value[:, None], value.copy()
+    here = np.arange(len(order), dtype=np.int32)
+    for step in range(1, int(span.max(initial=1))):
+        many = int(np.searchsorted(-span, -step))  # corners of the vertices with more polygons than `step`
+        other = here[:many] + np.int32(step)
+        other -= np.where(other >= end[:many], span[:many], np.int32(0))
+        there = rows(normal, other)
+        apart = there - normal[:many]
+        counts = np.where(dot(apart, apart) <= near * near, value[other], 0.0)
+        sums[:many] += there * counts[:, None]
+        total[:many] += counts
+    back = np.empty_like(order)
+    back[order] = here
+    return rows(sums, back), total[back]

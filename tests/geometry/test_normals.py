@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import json
+import lzma
+from importlib.resources import files
+from itertools import product
+
+import hypothesis.extra.numpy as hnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.normals import (
+    area_vectors,
+    corner_normals,
+    cross_normal,
+    edge_average_normal,
+    newell_plane,
+    plane_solve,
+    polygon_normals,
+    vertex_normal,
+)
+
+FORMULAS = {
+    "polygon_normal_cross": cross_normal,
+    "polygon_normal_edge_average": edge_average_normal,
+    "newell_plane": newell_plane,
+    "plane_solve": plane_solve,
+    "vertex_normal": vertex_normal,
+}
+METHODS = ("newell", "cross", "edge_average", "plane")
+CORNER = np.ones(3) / np.sqrt(3)
+
+
+def cases():
+    text = lzma.decompress((files("illumcli") / "data/vectors.json.xz").read_bytes())
+    return [pytest.param(c, id=c["id"]) for c in json.loads(text) if c["model"] in FORMULAS]
+
+
+def ragged(*polygons, vertices, **more):
+    starts = np.cumsum([0, *map(len, polygons)]).astype(np.int32)
+    return Mesh(np.array(vertices, float), np.concatenate(polygons).astype(np.int32), starts, **more)
+
+
+CUBE = np.array(list(product((0.0, 1.0), repeat=3)))
+SIDES = ([0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3])
+
+
+def cube(**more):
+    return ragged(*SIDES, vertices=CUBE, **more)
+
+
+@pytest.mark.parametrize("case", cases())
+def test_the_reference_vectors(case):
+    value, expected = FORMULAS[case["model"]](**case["inputs"]), np.array(case["expected"])
+    assert np.abs(value - expected).max() <= case["atol"] + case["rtol"] * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_polygons_of_all_sizes_at_once(method):
+    pentagon = [[0, 0, 0], [2, 0, 0], [3, 2, 0], [1, 3, 0], [-1, 2, 0]]
+    mesh = ragged([0, 1, 2], [0, 1, 2, 3, 4], [4, 3, 2, 1], vertices=pentagon)
+    np.testing.assert_allclose(polygon_normals(mesh, method), [[0, 0, 1], [0, 0, 1], [0, 0, -1]], atol=1e-15)
+    np.testing.assert_allclose(area_vectors(mesh)[:, 2], [4, 16, -12], rtol=1e-14)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_polygon_without_area_has_no_normal(method):
+    line = [[0.1, 0.3, 0.7], [0.3, 0.9, 2.1], [0.7, 2.1, 4.9], [0.1, 0.3, 0.5]]
+    mesh = ragged([0, 1, 2], [0, 1, 1], [0, 1, 2, 1], [0, 2, 3], vertices=line)
+    normals = polygon_normals(mesh, method)
+    np.testing.assert_array_equal(normals[:3], 0)
+    assert np.linalg.norm(normals[3]) == pytest.approx(1, abs=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_straight_first_corner_leaves_no_hole(method):
+    mesh = ragged([0, 1, 2, 3, 4], vertices=[[1, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 0]])
+    np.testing.assert_allclose(polygon_normals(mesh, method), [[0, 0, 1]], atol=1e-15)
+    mesh = ragged([0, 1, 2, 3, 4], vertices=[[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    np.testing.assert_allclose(polygon_normals(mesh, method), [[0, 0, 1]], atol=1e-15)
+
+
+def test_newell_and_the_plane_know_the_side_of_a_concave_polygon():
+    arrow = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 1, 0], [0, 4, 0]]
+    for start in range(5):
+        mesh = ragged(np.roll(range(5), start), vertices=arrow)
+        for method in ("newell", "plane"):
+            np.testing.assert_allclose(polygon_normals(mesh, method), [[0, 0, 1]], atol=1e-15)
+    reflex_first = ragged([3, 4, 0, 1, 2], vertices=arrow)
+    np.testing.assert_allclose(polygon_normals(reflex_first, "cross"), [[0, 0, -1]], atol=1e-15)
+
+
+@given(
+    hnp.arrays(float, (6, 3), elements=st.integers(-50, 50).map(float)),
+    st.integers(0, 5),
+    hnp.arrays(float, 3, elements=st.integers(-1000, 1000).map(float)),
+)
+def test_newell_ignores_where_the_polygon_starts_and_stands(points, start, offset):
+    here = ragged(range(6), vertices=points)
+    there = ragged(np.roll(range(6), start), vertices=points + offset)
+    np.testing.assert_allclose(area_vectors(here), area_vectors(there), atol=1e-9)
+    flipped = ragged(range(6)[::-1], vertices=points)
+    np.testing.assert_allclose(area_vectors(flipped), -area_vectors(here), atol=1e-9)
+
+
+@given(st.lists(st.booleans(), min_size=6, max_size=6), st.lists(st.booleans(), min_size=6, max_size=6))
+def test_angle_weights_give_a_cube_corner_its_diagonal_however_it_is_cut(cut, other_diagonal):
+    polygons = []
+    for side, split, other in zip(SIDES, cut, other_diagonal, strict=True):
+        a, b, c, d = np.roll(side, int(other))
+        polygons += [[a, b, c], [a, c, d]] if split else [[a, b, c, d]]
+    made = corner_normals(ragged(*polygons, vertices=CUBE))
+    np.testing.assert_allclose(made.normals, (2 * CUBE - 1) / np.sqrt(3), atol=1e-15)
+
+
+def test_a_reflex_corner_counts_more_than_half_a_turn():
+    """An L-shaped floor with a wall in its reflex corner, whole and cut in triangles."""
+    points = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [1, 1, 1], [2, 1, 1]]
+    wall = [3, 2, 7, 6]  # faces -y
+    whole = corner_normals(ragged([0, 1, 2, 3, 4, 5], wall, vertices=points))
+    cut = corner_normals(ragged([0, 1, 3], [1, 2, 3], [3, 4, 0], [4, 5, 0], wall, vertices=points))
+    np.testing.assert_allclose(whole.normals[3], cut.normals[3], atol=1e-15)
+    tilted = np.array([0, -1, 3]) / np.sqrt(10)  # a quarter turn of wall, three of floor
+    np.testing.assert_allclose(whole.normals[3], tilted, atol=1e-15)
+
+
+@pytest.mark.parametrize("weights", ["equal", "area", "angle"])
+def test_a_crease_keeps_the_faces_of_a_box_flat(weights):
+    flat = corner_normals(cube(), weights, crease=89.9)
+    own = np.repeat(polygon_normals(cube()), 4, axis=0)
+    np.testing.assert_allclose(flat.normals[flat.index], own, atol=1e-15)
+    round_ = corner_normals(cube(), weights, crease=90.0)
+    smooth = corner_normals(cube(), weights)
+    np.testing.assert_allclose(round_.normals[round_.index], smooth.normals[smooth.index], atol=1e-15)
+
+
+def test_a_crease_averages_only_the_polygons_within_it():
+    """Four facets 10 degrees apart meet at one vertex: a corner sees its neighbours to each side."""
+    angle = np.radians([0, 10, 20, 30, 40])
+    rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    apex = [0.0, 0.0, 5.0]
+    fan = [[5, i, i + 1] for i in range(4)]
+    mesh = ragged(*fan, vertices=[*rim, apex])
+    facets = polygon_normals(mesh)
+    made = corner_normals(mesh, "equal", crease=12.0)
+    for polygon in range(4):
+        near = facets[max(polygon - 1, 0) : polygon + 2].sum(axis=0)
+        np.testing.assert_allclose(
+            made.normals[made.index[3 * polygon]], near / np.linalg.norm(near), atol=1e-14
+        )
+
+
+def test_the_files_normals_are_kept_and_the_bad_ones_replaced():
+    own = np.array([[0, 0, 3.0], [0, 0, 0], [np.nan, 0, 1], [1e-200, 0, 0]])
+    mesh = cube(normals=own, corner_normals=np.array([0, 1, 2, 3] + [0] * 20, np.int32))
+    made = corner_normals(mesh)
+    corner = made.normals[made.index]
+    np.testing.assert_array_equal(corner[[0, 3, 4]], [[0, 0, 1], [1, 0, 0], [0, 0, 1]])
+    np.testing.assert_allclose(corner[1:3], (2 * CUBE[[1, 3]] - 1) / np.sqrt(3))
+    assert made.repairs == {"zero or non-finite normals": 2}
+    ignored = corner_normals(mesh, use_file=False)
+    np.testing.assert_allclose(ignored.normals[ignored.index[0]], -CORNER)
+
+
+def test_corners_without_a_normal_of_the_file_are_computed_and_not_called_bad():
+    mesh = cube(normals=np.array([[0, 0, 3.0]]), corner_normals=np.array([-1] + [0] * 23, np.int32))
+    made = corner_normals(mesh)
+    np.testing.assert_allclose(made.normals[made.index[0]], -CORNER)
+    assert made.repairs == {}
+
+
+def test_two_sheets_back_to_back_keep_their_own_sides():
+    mesh = ragged([0, 1, 2], [2, 1, 0], vertices=[[0.1, 0, 0], [1, 0.3, 0], [0, 1, 0.7]])
+    made = corner_normals(mesh)
+    np.testing.assert_allclose(
+        made.normals[made.index], np.repeat(polygon_normals(mesh), 3, axis=0), atol=1e-15
+    )
+    assert made.repairs == {"vertices whose polygons cancel": 6}
+
+
+def test_a_degenerate_polygon_weighs_nothing_and_alone_has_no_normal():
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [5, 5, 5], [6, 6, 6], [7, 7, 7]]
+    made = corner_normals(ragged([0, 1, 2], [0, 3, 1], [4, 5, 6], vertices=points))
+    np.testing.assert_allclose(made.normals[made.index[[0, 1, 2, 3, 5]]], [[0, 0, 1]] * 5)
+    assert made.index[[4, 6, 7, 8]].tolist() == [-1] * 4
+
+
+def test_a_mesh_far_from_the_origin_keeps_its_normals():
+    near, far = polygon_normals(cube()), polygon_normals(ragged(*SIDES, vertices=CUBE + 2.0**40))
+    np.testing.assert_array_equal(near, far)
+
+
+def test_an_empty_mesh_has_none():
+    empty = Mesh(np.zeros((2, 3)), np.zeros(0, np.int32), np.zeros(1, np.int32))
+    for crease in (None, 30.0):
+        assert corner_normals(empty, crease=crease).index.shape == (0,)
+    assert polygon_normals(empty, "plane").shape == (0, 3)

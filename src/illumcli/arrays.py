@@ -63,7 +63,7 @@ def mirror(l: Vectors, n: Vectors, n_l: Lanes) -> Vectors:
     return (2 * n_l)[:, None] * n - l
 
 
-def like(lanes: NDArray[Any], *parameters: ArrayLike) -> list[NDArray[Any]]:
+def like(lanes: NDArray[Any], *parameters: Any) -> list[NDArray[Any]]:
     """The parameters as arrays in the precision of `lanes`.
 
     A parameter is a number or a colour of the scene, or one value per lane where it varies over the

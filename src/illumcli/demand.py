@@ -37,6 +37,8 @@ def required(function: Callable[..., Any]) -> tuple[str, ...]:
     if isinstance(function, partial):
         bound, inner = set(function.keywords), required(function.func)
         return tuple(name for name in inner[len(function.args) :] if name not in bound)
+    if inspect.ismethod(function):  # remembered by its function: the cache must not keep the object alive
+        return _parameters(function.__func__)[1:]
     return _parameters(function)
 
 

@@ -15,7 +15,8 @@ class Description(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=False)
 
 
-def _spread(value: Any) -> Any:
+def spread(value: Any) -> Any:
+    """One number as three equal ones; anything else unchanged."""
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
@@ -35,6 +36,6 @@ Vector: TypeAlias = Annotated[tuple[Number, Number, Number], Field(strict=False)
 
 # one number stands for three equal ones
 Color: TypeAlias = Annotated[
-    tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), BeforeValidator(_spread)
+    tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), BeforeValidator(spread)
 ]
-Albedo: TypeAlias = Annotated[tuple[Share, Share, Share], Field(strict=False), BeforeValidator(_spread)]
+Albedo: TypeAlias = Annotated[tuple[Share, Share, Share], Field(strict=False), BeforeValidator(spread)]

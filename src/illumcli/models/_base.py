@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from illumcli.description import Description
 from illumcli.models._parameters import Color, Texture, VertexValues
 
 Lobe = Callable[..., Any]
+D = TypeVar("D", bound=Description)
 
 
 class IlluminationModel(Description):
@@ -20,7 +21,10 @@ class IlluminationModel(Description):
     the terms they need (`shading.terms`); each returns the light leaving towards the eye per unit of
     irradiance facing the light, the cosine included, as (N, 3) in the precision of the lanes. Lanes that
     face away from the light never reach a model. A field read inside a lobe is a number or a colour, or,
-    where the parameter varies over the surface, one value per lane: (N,) or (N, 3).
+    where the parameter varies over the surface, one value per lane: (N,) or (N, 3), put there by `at`.
+
+    Claims hold for every value of the numbers, at the default of each choice (a word, a flag, an option
+    left out); the shared tests check every claim.
     """
 
     emission: Color = (0.0, 0.0, 0.0)
@@ -61,9 +65,37 @@ class IlluminationModel(Description):
         return getattr(self, "diffuse", (0.0, 0.0, 0.0))
 
     def varying(self) -> dict[str, Texture | VertexValues]:
-        """The parameters that vary over the surface, by field name."""
-        return {name: value for name, value in self if isinstance(value, Texture | VertexValues)}
+        """The parameters that vary over the surface, by path: `specular`, or `distribution.m`."""
+        return dict(_varying(self))
+
+    def at(self, values: Mapping[str, Any]) -> Self:
+        """This model with arrays in place of parameters, by path; nothing is validated again.
+
+        Parameters
+        ----------
+        values : mapping
+            Path, as `varying` names it -> (N,) numbers or (N, 3) colours, one per lane.
+        """
+        return _placed(self, values)
 
     def _is_zero(self, name: str) -> bool:
         value = getattr(self, name)
-        return not isinstance(value, Texture | VertexValues) and not np.any(value)
+        return value is not None and not isinstance(value, Texture | VertexValues) and not np.any(value)
+
+
+def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture | VertexValues]]:
+    for name, value in part:
+        if isinstance(value, Texture | VertexValues):
+            yield prefix + name, value
+        elif isinstance(value, Description):
+            yield from _varying(value, f"{prefix}{name}.")
+
+
+def _placed(part: D, values: Mapping[str, Any]) -> D:
+    here = {path: value for path, value in values.items() if "." not in path}
+    for name in {path.partition(".")[0] for path in values if "." in path}:
+        inner = {
+            path.removeprefix(f"{name}."): v for path, v in values.items() if path.startswith(f"{name}.")
+        }
+        here[name] = _placed(getattr(part, name), inner)
+    return part.model_copy(update=here)

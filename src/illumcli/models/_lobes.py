@@ -1,12 +1,14 @@
-"""Lobe shapes that several models share, in forms that keep their digits."""
+"""Lobe shapes and weights that several models share, in forms that keep their digits."""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Lanes, Vectors
 
 
 def lobe(gap: Lanes, exponent: Any) -> Lanes:
@@ -15,6 +17,32 @@ def lobe(gap: Lanes, exponent: Any) -> Lanes:
     A power of a rounded cosine loses exponent * 2^-53 of its value; with the gap formed as half the squared
     distance of two unit vectors, exp(e log1p(-gap)) keeps its digits for exponents of 10^6 and more.
     """
-    inside = gap < 1
-    safe = np.where(inside, gap, 0)
-    return np.where(inside, np.exp(exponent * np.log1p(-safe)), 0)
+    below_one = 1 - float(np.finfo(gap.dtype).epsneg)
+    return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * (gap < 1)
+
+
+def log_cos(cosine: Lanes, sin2: Lanes) -> Lanes:
+    """(N,) logarithm of a cosine above 0: from sin^2 near 0 degrees, where the cosine has lost its digits."""
+    near = sin2 < 0.5
+    return np.log1p(-np.minimum(sin2, 0.5)) / 2 * near + np.log(cosine) * ~near
+
+
+def channels(lanes: Lanes, color: Any) -> NDArray[Any]:
+    """A colour in the precision of `lanes`, channel by channel: (3, 1), or (3, N) where it varies.
+
+    Its product with (N,) lanes is (3, N), whose transpose is (N, 3) column by column in memory.
+    """
+    values = np.asarray(color, lanes.dtype)
+    return values[:, None] if values.ndim == 1 else values.T
+
+
+def tint(color: Any, lanes: Lanes) -> Vectors:
+    """(N, 3) the lanes weighted by a colour, or by one colour per lane."""
+    return (channels(lanes, color) * lanes).T
+
+
+@cache
+def gauss_legendre(order: int) -> tuple[tuple[float, float], ...]:
+    """(node, weight) pairs on [-1, 1], exact for polynomials of degree 2 order - 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    return tuple(zip(nodes.tolist(), weights.tolist(), strict=True))

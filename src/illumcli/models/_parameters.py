@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Discriminator, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from illumcli import description
 from illumcli.description import Description
@@ -40,9 +40,7 @@ def _kind(value: Any) -> str:
 
 T = TypeVar("T")
 Varying: TypeAlias = Annotated[
-    Annotated[T, Tag("value")]
-    | Annotated[Texture, Tag("texture")]
-    | Annotated[VertexValues, Tag("vertex")],
+    Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
     Discriminator(_kind),
 ]
 
@@ -51,3 +49,23 @@ Albedo: TypeAlias = Varying[description.Albedo]
 Share: TypeAlias = Varying[description.Share]
 Positive: TypeAlias = Varying[description.Positive]
 NonNegative: TypeAlias = Varying[description.NonNegative]
+
+_Refraction = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.01, le=1e3)]
+_Extinction = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e3)]
+
+# a slope; below 1e-4 single precision holds no lobe
+Roughness: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=10)]]
+# an angle in radians, less than a quarter turn
+HalfHeight: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=1.57)]]
+# indices of refraction
+Index: TypeAlias = Varying[_Refraction]
+IndexColor: TypeAlias = Varying[
+    Annotated[
+        tuple[_Refraction, _Refraction, _Refraction], Field(strict=False), BeforeValidator(description.spread)
+    ]
+]
+ExtinctionColor: TypeAlias = Varying[
+    Annotated[
+        tuple[_Extinction, _Extinction, _Extinction], Field(strict=False), BeforeValidator(description.spread)
+    ]
+]

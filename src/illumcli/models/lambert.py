@@ -13,8 +13,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Lanes, Vectors
 from illumcli.models._base import IlluminationModel
+from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo
 
 
@@ -29,5 +30,4 @@ class Lambert(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Lanes) -> Vectors:
         """(N, 3) rho / pi * n_l."""
-        (rho,) = like(n_l, self.diffuse)
-        return rho * (n_l / n_l.dtype.type(np.pi))[:, None]
+        return tint(self.diffuse, n_l / np.pi)

@@ -3,18 +3,22 @@
 A term is a function whose parameter names are the terms it needs; `evaluate` runs only those a lobe
 reaches. The given words are the unit vectors `n` (shading normal), `l` (to the light), `v` (to the eye), `t`
 (tangent, at right angles to `n`), and `light` (the light's colour, largest component 1).
-With s = l + v: |s|^2 = 2 (1 + l.v) and h = s / |s|.
+With s = l + v: |s|^2 = 2 (1 + l.v) and h = s / |s|. `b` is n x t.
+
+Cosines that stand in denominators (`n_v`, `n_h`) are kept at or above the rounding level of one: below it
+their digits are noise, and no quotient overflows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, cross, dot, length, mirror, unit
-from illumcli.demand import Recipe, order
+from illumcli.demand import Recipe, order, required
 
 GIVEN = ("n", "l", "v", "t", "light")
 
@@ -27,7 +31,7 @@ def n_l(n: Vectors, l: Vectors) -> Lanes:
 def n_v(n: Vectors, v: Vectors) -> Lanes:
     """Cosine at the eye, kept above 0: an interpolated normal may turn away where its facet does not."""
     cosine = np.abs(dot(n, v))
-    return np.maximum(cosine, np.finfo(cosine.dtype).tiny)
+    return np.maximum(cosine, np.finfo(cosine.dtype).eps)
 
 
 def l_v(l: Vectors, v: Vectors) -> Lanes:
@@ -49,19 +53,26 @@ def h(s: Vectors) -> Vectors:
     return unit(s)
 
 
-def v_h(s: Vectors) -> Lanes:
+def v_h(s_s: Lanes) -> Lanes:
     """v.h = l.h = |s| / 2, without the cancellation of sqrt((1 + l.v) / 2)."""
-    return length(s) / 2
+    return np.minimum(np.sqrt(s_s) / 2, 1)
 
 
-def n_h(n: Vectors, h: Vectors) -> Lanes:
-    return dot(n, h)
+def n_s(n: Vectors, s: Vectors) -> Lanes:
+    """n.s, equal to n.l + n.v."""
+    return dot(n, s)
 
 
-def gap_nh(n: Vectors, h: Vectors) -> Lanes:
-    """1 - n.h = |n - h|^2 / 2; 1 (no highlight) where h is undefined."""
+def n_h(n_s: Lanes, s_s: Lanes) -> Lanes:
+    """Cosine between normal and half vector, within (0, 1]."""
+    limits = np.finfo(s_s.dtype)
+    return np.clip(n_s / np.sqrt(np.maximum(s_s, limits.tiny)), limits.eps, 1)
+
+
+def gap_nh(n: Vectors, h: Vectors, s_s: Lanes) -> Lanes:
+    """1 - n.h = |n - h|^2 / 2; at least 1 (no highlight) where h is undefined."""
     d = n - h
-    return dot(d, d) / 2 + (dot(h, h) == 0)
+    return dot(d, d) / 2 + (s_s == 0)
 
 
 def r(l: Vectors, n: Vectors, n_l: Lanes) -> Vectors:
@@ -79,19 +90,38 @@ def nxs(n: Vectors, s: Vectors) -> Vectors:
     return cross(n, s)
 
 
-def tan2_h(nxs: Vectors, n: Vectors, s: Vectors) -> Lanes:
-    """tan^2 of the angle between n and h = |n x s|^2 / (n.s)^2."""
-    return dot(nxs, nxs) / np.square(dot(n, s))
+def sin2_h(nxs: Vectors, s_s: Lanes) -> Lanes:
+    """sin^2 of the angle between n and h = |n x s|^2 / |s|^2; keeps its digits where 1 - (n.h)^2 has none."""
+    return dot(nxs, nxs) / np.maximum(s_s, np.finfo(s_s.dtype).tiny)
 
 
-def sin_l(n: Vectors, l: Vectors) -> Lanes:
+def nxl(n: Vectors, l: Vectors) -> Vectors:
+    return cross(n, l)
+
+
+def nxv(n: Vectors, v: Vectors) -> Vectors:
+    return cross(n, v)
+
+
+def sin_l(nxl: Vectors) -> Lanes:
     """Sine of the angle of incidence, |n x l|."""
-    return length(cross(n, l))
+    return length(nxl)
 
 
-def sin_v(n: Vectors, v: Vectors) -> Lanes:
+def sin_v(nxv: Vectors) -> Lanes:
     """Sine of the angle at the eye, |n x v|."""
-    return length(cross(n, v))
+    return length(nxv)
+
+
+def cos_phi(nxl: Vectors, nxv: Vectors, sin_l: Lanes, sin_v: Lanes) -> Lanes:
+    """Cosine of the azimuth between l and v; 0 where either stands on the normal and has none."""
+    sines = sin_l * sin_v
+    return np.clip(dot(nxl, nxv) / np.maximum(sines, np.finfo(sines.dtype).tiny), -1, 1)
+
+
+def sin_theta_d(l: Vectors, v: Vectors) -> Lanes:
+    """Sine of the angle between l and h = |l - v| / 2."""
+    return length(l - v) / 2
 
 
 def b(n: Vectors, t: Vectors) -> Vectors:
@@ -115,23 +145,68 @@ def b_v(b: Vectors, v: Vectors) -> Lanes:
     return dot(b, v)
 
 
-TERMS: dict[str, Recipe] = {
-    f.__name__: Recipe.of(f)
-    for f in (n_l, n_v, l_v, s, s_s, h, v_h, n_h, gap_nh, r, gap_rv, nxs, tan2_h, sin_l, sin_v, b, t_l, t_v, b_l, b_v)
-}
+def t_s(t: Vectors, s: Vectors) -> Lanes:
+    return dot(t, s)
+
+
+def b_s(b: Vectors, s: Vectors) -> Lanes:
+    return dot(b, s)
+
+
+def sin_tl(t: Vectors, l: Vectors) -> Lanes:
+    """Sine of the angle between tangent and light, |t x l|."""
+    return length(cross(t, l))
+
+
+def sin_tv(t: Vectors, v: Vectors) -> Lanes:
+    """Sine of the angle between tangent and eye, |t x v|."""
+    return length(cross(t, v))
+
+
+# fmt: off
+FUNCTIONS = (
+    n_l, n_v, l_v, s, s_s, h, v_h, n_s, n_h, gap_nh, r, gap_rv,
+    nxs, sin2_h, nxl, nxv, sin_l, sin_v, cos_phi, sin_theta_d,
+    b, t_l, t_v, b_l, b_v, t_s, b_s, sin_tl, sin_tv,
+)
+# fmt: on
+TERMS: dict[str, Recipe] = {function.__name__: Recipe.of(function) for function in FUNCTIONS}
+
+
+@cache
+def steps(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Recipe, ...]:
+    """The terms that `needs` reach, each after those it is formed from."""
+    return tuple(order(TERMS, needs, given))
 
 
 def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dict[str, Any]:
-    """Each lobe's value on the lanes of `given`; terms that lobes share are formed once."""
-    book = TERMS | {name: Recipe.of(lobe, name) for name, lobe in lobes.items()}
+    """Each lobe's value on the lanes of `given`; terms that lobes share are formed once.
+
+    Parameters
+    ----------
+    lobes : dict
+        Name -> function of terms, as a model's `lobes()` has them.
+    given : dict
+        The words the lobes reach: (N, 3) vectors of one precision, column by column in memory. Terms that
+        are known already may be given too.
+
+    Returns
+    -------
+    dict
+        Name -> (N, 3), in the precision of the lanes.
+    """
     buffers = dict(given)
-    for recipe in order(book, lobes, given):
+    for recipe in steps(_needs(lobes), tuple(given)):
         buffers[recipe.makes] = recipe.make(buffers)
-    return {name: buffers[name] for name in lobes}
+    return {name: lobe(**{need: buffers[need] for need in required(lobe)}) for name, lobe in lobes.items()}
 
 
 def words(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
     """The given words (`n`, `l`, `v`, `t`, `light`) that these lobes reach."""
-    book = TERMS | {name: Recipe.of(lobe, name) for name, lobe in lobes.items()}
-    steps = order(book, lobes, GIVEN)
-    return frozenset(need for step in steps for need in step.needs.values() if need in GIVEN)
+    needs = _needs(lobes)
+    reached = {need for step in steps(needs) for need in step.needs.values()}
+    return frozenset(reached.union(needs).intersection(GIVEN))
+
+
+def _needs(lobes: dict[str, Callable[..., Any]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(need for lobe in lobes.values() for need in required(lobe)))

@@ -1,0 +1,100 @@
+"""Published values, and what evaluating a model on them takes."""
+
+from __future__ import annotations
+
+import json
+import lzma
+from collections import defaultdict
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import pytest
+
+from illumcli.arrays import columns, dot, unit
+from illumcli.shading.terms import TERMS, evaluate, steps
+
+Case = dict[str, Any]
+
+
+def unit_vectors(inputs: dict[str, Any]) -> dict[str, np.ndarray]:
+    """(1, 3) unit vectors of a case in float64; the tangent at right angles to the normal."""
+    words = {
+        word: unit(columns([inputs[word]], np.float64))
+        for word in ("n", "l", "v", "t", "h")
+        if word in inputs
+    }
+    if {"n", "t"} <= words.keys():
+        n, t = words["n"], words["t"]
+        words["t"] = unit(t - dot(n, t)[:, None] * n)
+    return words
+
+
+@pytest.fixture(scope="session")
+def frame() -> Callable[[dict[str, Any]], dict[str, np.ndarray]]:
+    """A case's vectors: (1, 3), unit, float64."""
+    return unit_vectors
+
+
+@pytest.fixture(scope="session")
+def cases() -> Callable[[str], list[Case]]:
+    """Model name -> its cases in the vectors file."""
+    text = lzma.decompress((files("illumcli") / "data" / "vectors.json.xz").read_bytes())
+    by_model: dict[str, list[Case]] = defaultdict(list)
+    for case in json.loads(text):
+        by_model[case["model"]].append(case)
+    return lambda name: by_model[name]
+
+
+@pytest.fixture(scope="session")
+def term() -> Callable[..., Any]:
+    """A term's value on given vectors: term("n_h", n=..., l=..., v=...)."""
+
+    def value(name: str, **given: np.ndarray) -> np.ndarray:
+        buffers = dict(given)
+        for recipe in steps((name,), tuple(given)):
+            buffers[recipe.makes] = recipe.make(buffers)
+        assert name in TERMS
+        return buffers[name]
+
+    return value
+
+
+@pytest.fixture(scope="session")
+def respond() -> Callable[..., np.ndarray]:
+    """The sum of a model's lobes on a case's vectors, (3,) float64; 0 where light or eye is below."""
+
+    def response(model: Any, inputs: dict[str, Any]) -> np.ndarray:
+        given = unit_vectors(inputs)
+        if "n" in given and min(dot(given["n"], given["l"]), dot(given["n"], given["v"])) <= 0:
+            return np.zeros(3)
+        return sum((lobe[0] for lobe in evaluate(model.lobes(), given).values()), np.zeros(3))
+
+    return response
+
+
+@pytest.fixture(scope="session")
+def brdf(respond: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+    """The response over n.l, (3,) float64."""
+
+    def value(model: Any, inputs: dict[str, Any]) -> np.ndarray:
+        given = unit_vectors(inputs)
+        return respond(model, inputs) / dot(given["n"], given["l"])
+
+    return value
+
+
+@pytest.fixture(scope="session")
+def agree() -> Callable[[Any, Case], None]:
+    """Assert that a result is as close to the case's expected value as the case asks for."""
+
+    def check(result: Any, case: Case) -> None:
+        expected = np.atleast_1d(np.asarray(case["expected"], np.float64))
+        error = np.abs(np.asarray(result, np.float64) - expected).max()
+        limit = case["atol"] + case["rtol"] * np.abs(expected).max()
+        assert error <= limit, (
+            f"{case['id']} ({case['note']}): {result} against {expected}, off by {error / limit:.3g} limits"
+        )
+
+    return check

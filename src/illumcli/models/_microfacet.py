@@ -1,0 +1,212 @@
+"""Facet distributions D and the V-groove term G: formulas, and the choices a scene has.
+
+theta is the angle between the normal and the half vector. Distributions take its cosine `n_h` (above 0) and
+`sin2_h` = sin^2, so that sharp lobes keep their digits near the normal and wide ones at grazing; no angle
+is formed except where the formula itself is of the angle. Every function works element by element.
+
+A *normalised* D satisfies: the integral of D cos(theta) over the hemisphere is 1. [1/sr]
+
+References
+----------
+Beckmann, P., Spizzichino, A. (1963). The scattering of electromagnetic waves from rough surfaces.
+Torrance, K. E., Sparrow, E. M. (1967). Theory for off-specular reflection from roughened surfaces. JOSA 57.
+Trowbridge, T. S., Reitz, K. P. (1975). Average irregularity representation of a rough surface. JOSA 65(5).
+Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. SIGGRAPH '77.
+Walter, B., et al. (2007). Microfacet models for refraction through rough surfaces. EGSR '07, eq. 25, 33.
+Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-based BRDFs. JCGT 3(2).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from pydantic import Field
+
+from illumcli.arrays import Lanes, like
+from illumcli.description import Description
+from illumcli.models._lobes import gauss_legendre, log_cos
+from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
+
+
+def gaussian(n_h: Any, sin2_h: Any, m: Any) -> Any:
+    """exp(-(theta / m)^2), 1 at the normal; `gaussian_constant(m)` times this is normalised."""
+    return np.exp(-np.square(np.arctan2(np.sqrt(sin2_h), n_h) / m))
+
+
+def gaussian_constant(m: Any) -> Any:
+    """The c that normalises c exp(-(theta / m)^2), in float64; near 1 / (pi m^2) for small m.
+
+    1 / c = pi times the integral of exp(-(theta / m)^2) sin(2 theta) over 0..pi/2.
+    """
+    m = np.asarray(m, np.float64)
+    end = np.minimum(np.pi / 2, 7 * m)
+    area = np.zeros_like(m)
+    for node, weight in gauss_legendre(48):
+        theta = end * (1 + node) / 2
+        area = area + weight * np.exp(-np.square(theta / m)) * np.sin(2 * theta)
+    return 2 / (np.pi * end * area)
+
+
+def beckmann(n_h: Any, sin2_h: Any, m: Any) -> Any:
+    """exp(-tan^2 / m^2) / (pi m^2 cos^4), normalised; m is the RMS slope.
+
+    The exponential meets 1 / cos^4 = (1 + tan^2)^2 only where it is not yet 0.
+    """
+    tan2 = sin2_h / np.square(n_h)
+    return np.exp(-tan2 / np.square(m)) * np.square((1 + tan2) / m) / np.pi
+
+
+def beckmann_slope1d(n_h: Any, sin2_h: Any, m: Any) -> Any:
+    """exp(-tan^2 / m^2) / (sqrt(pi) m cos^2): density of one profile's slope angle.
+
+    One text prints m^2 in place of m; its integral is 1 / m then.
+    """
+    tan2 = sin2_h / np.square(n_h)
+    return np.exp(-tan2 / np.square(m)) * (1 + tan2) / (np.sqrt(np.pi) * m)
+
+
+def power_cosine(n_h: Any, sin2_h: Any, exponent: Any) -> Any:
+    """cos(theta)^exponent, 1 at the normal; (exponent + 2) / (2 pi) times this is normalised."""
+    return np.exp(exponent * log_cos(n_h, sin2_h))
+
+
+def ggx(n_h: Any, sin2_h: Any, alpha: Any) -> Any:
+    """alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), normalised."""
+    wide = np.square(alpha * n_h) + sin2_h
+    return np.square(alpha / wide) / np.pi
+
+
+def power_of_half_height(beta: Any) -> Any:
+    """c1 = -ln 2 / ln cos(beta): cos^c1 is one half at beta. One text prints it without the minus."""
+    return -2 * np.log(2) / np.log1p(-np.square(np.sin(beta)))
+
+
+def m_of_half_height(beta: Any) -> Any:
+    """m = beta / sqrt(ln 2): exp(-(theta / m)^2) is one half at beta. One text prints beta / sqrt(2)."""
+    return beta / np.sqrt(np.log(2))
+
+
+def alpha_of_half_height(beta: Any) -> Any:
+    """c3 = sin(beta) / sqrt(sqrt(2) - cos^2(beta)): pi alpha^2 GGX is one half at beta."""
+    return np.sin(beta) / np.sqrt(np.sqrt(2) - np.square(np.cos(beta)))
+
+
+def vgroove(n_l: Any, n_v: Any, s_s: Any) -> Any:
+    """Torrance and Sparrow's share of a V-groove that is lit and seen, 0..1.
+
+    min(1, 2 n_h n_v / v_h, 2 n_h n_l / v_h) with n_h = (n_l + n_v) / |s|, v_h = |s| / 2. Texts print it
+    without the 1, or as the share that is blocked.
+    """
+    tiny = np.finfo(np.result_type(s_s)).tiny
+    return np.minimum(1, 4 * np.minimum(n_l, n_v) * (n_l + n_v) / np.maximum(s_s, tiny))
+
+
+def vgroove_over_4ab(n_l: Any, n_v: Any, s_s: Any) -> Any:
+    """G / (4 n_l n_v), finite where n_l or n_v goes to 0: 1 / max(4 a b, max(a, b) |s|^2 / (a + b))."""
+    larger = np.maximum(n_l, n_v)
+    blocked = larger * s_s / (n_l + n_v)
+    return 1 / np.maximum(4 * n_l * n_v, np.maximum(blocked, np.finfo(blocked.dtype).tiny))
+
+
+class Gaussian(Description, defer_build=True):
+    """Torrance and Sparrow's Gaussian of the angle, by its width."""
+
+    D: Literal["gaussian"] = "gaussian"
+    m: Roughness = 0.3
+    """m, angle in radians at which D has fallen to 1/e."""
+    c: Positive | None = None
+    """c, height at the normal [1/sr]; left out, the c that normalises D."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) c exp(-(theta / m)^2)."""
+        m, c = like(n_h, self.m, gaussian_constant(self.m) if self.c is None else self.c)
+        return c * gaussian(n_h, sin2_h, m)
+
+
+class Beckmann(Description, defer_build=True):
+    """Beckmann's distribution of a surface with Gaussian slopes."""
+
+    D: Literal["beckmann"] = "beckmann"
+    m: Roughness = 0.3
+    """m, RMS slope: 0.05 polished, 1 very rough."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) normalised; printed with 1 / (m^2 cos^4), pi times that."""
+        (m,) = like(n_h, self.m)
+        density = beckmann(n_h, sin2_h, m)
+        return density * np.pi if printed else density
+
+
+class Blinn(Description, defer_build=True):
+    """Blinn's power of the cosine, by its half-height angle."""
+
+    D: Literal["blinn"] = "blinn"
+    beta: HalfHeight = 0.3
+    """beta, angle in radians at which D is half its height."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) normalised; printed with height 1."""
+        (exponent,) = like(n_h, power_of_half_height(self.beta))
+        height = 1 if printed else (exponent + 2) / (2 * np.pi)
+        return power_cosine(n_h, sin2_h, exponent) * height
+
+
+class PowerCosine(Description, defer_build=True):
+    """Blinn's power of the cosine, by its exponent; about 2 / m^2 - 2 matches Beckmann."""
+
+    D: Literal["power"] = "power"
+    exponent: NonNegative = 20.0
+    """n, the exponent; 0 to 10^6 and beyond."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) (n + 2) / (2 pi) cos^n, normalised."""
+        (exponent,) = like(n_h, self.exponent)
+        return power_cosine(n_h, sin2_h, exponent) * ((exponent + 2) / (2 * np.pi))
+
+
+class TorranceSparrow(Description, defer_build=True):
+    """Torrance and Sparrow's Gaussian of the angle, by its half-height angle."""
+
+    D: Literal["torrance_sparrow"] = "torrance_sparrow"
+    beta: HalfHeight = 0.3
+    """beta, angle in radians at which D is half its height."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) normalised; printed with height 1."""
+        width = m_of_half_height(self.beta)
+        m, c = like(n_h, width, 1 if printed else gaussian_constant(width))
+        return c * gaussian(n_h, sin2_h, m)
+
+
+class TrowbridgeReitz(Description, defer_build=True):
+    """Trowbridge and Reitz's ellipsoids, by their half-height angle."""
+
+    D: Literal["trowbridge_reitz"] = "trowbridge_reitz"
+    beta: HalfHeight = 0.3
+    """beta, angle in radians at which D is half its height."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) normalised; printed with height 1."""
+        (alpha,) = like(n_h, alpha_of_half_height(self.beta))
+        density = ggx(n_h, sin2_h, alpha)
+        return density * (np.pi * np.square(alpha)) if printed else density
+
+
+class GGX(Description, defer_build=True):
+    """Walter's GGX: Trowbridge and Reitz by roughness."""
+
+    D: Literal["ggx"] = "ggx"
+    alpha: Roughness = 0.3
+    """alpha, slope scale: 0.05 polished, 1 very rough; longer tails than Beckmann."""
+
+    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+        """(N,) normalised."""
+        (alpha,) = like(n_h, self.alpha)
+        return ggx(n_h, sin2_h, alpha)
+
+
+Distribution: TypeAlias = Annotated[
+    Gaussian | Beckmann | Blinn | PowerCosine | TorranceSparrow | TrowbridgeReitz | GGX,
+    Field(discriminator="D"),
+]

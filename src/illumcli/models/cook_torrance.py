@@ -1,0 +1,102 @@
+"""Cook-Torrance: a rough surface of V-shaped grooves whose facets mirror by Fresnel's law.
+
+response = n_l * (kd * rho / pi + ks * D G F / (4 n_l n_v))          convention: microfacet, D normalised
+response = n_l * (kd * rho / pi + ks * D G F / (pi n_l n_v))         convention: printed, D as printed
+
+D is the facet distribution, G the V-groove term, F Fresnel's reflectance at the facet, kd + ks = 1. A BRDF
+times the cosine. With the printed constants, 1 / (m^2 cos^4) and 1 / pi, Beckmann's highlight is exactly four
+times as bright and does not conserve energy; the 1 / (4 m^2 cos^4) of other texts with 1 / pi is the
+microfacet form.
+
+Not followed: G without min(1, ...); Fresnel's g as sqrt(n^2 + c^2) - 1 or with + 1, and with n.l for c; the
+colour shift multiplied by F once more; a factor n_l n_v that has slipped from the denominator.
+
+References
+----------
+Cook, R. L., Torrance, K. E. (1982). A reflectance model for computer graphics. ACM Trans. Graph. 1(1).
+Torrance, K. E., Sparrow, E. M. (1967). Theory for off-specular reflection from roughened surfaces. JOSA 57.
+Walter, B., et al. (2007). Microfacet models for refraction through rough surfaces. EGSR '07, eq. 20.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel, Lobe
+from illumcli.models._fresnel import Dielectric, Fresnel, Shifted
+from illumcli.models._lobes import tint
+from illumcli.models._microfacet import Beckmann, Distribution, vgroove_over_4ab
+from illumcli.models._parameters import Albedo, Share
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+class CookTorrance(IlluminationModel):
+    model: Literal["cook_torrance"] = "cook_torrance"
+    diffuse: Albedo = (0.8, 0.8, 0.8)
+    """rho, the albedo of the diffuse part."""
+    diffuse_weight: Share | None = None
+    """kd, the share of diffuse reflection; left out, 1 - ks."""
+    specular_weight: Share = 0.5
+    """ks, the share of specular reflection."""
+    distribution: Distribution = Beckmann()
+    """D, how facets are spread about the normal."""
+    fresnel: Fresnel = Dielectric()
+    """F, what a facet reflects at each angle."""
+    convention: Literal["microfacet", "printed"] = "microfacet"
+    """Constants: normalised D over 4 n_l n_v, or those of the texts over pi n_l n_v."""
+
+    scales: ClassVar[dict[str, tuple[str, ...]]] = {
+        "diffuse_lobe": ("diffuse", "diffuse_weight"),
+        "specular_lobe": ("specular_weight",),
+    }
+    reciprocal: ClassVar[bool] = True
+    conserving: ClassVar[bool] = True
+    physical: ClassVar[bool] = True
+
+    def lobes(self) -> dict[str, Lobe]:
+        """The lobes that are not black; the specular one asks for the light's colour only where F does."""
+        found = super().lobes()
+        if "specular" in found and isinstance(self.fresnel, Shifted) and self.fresnel.grazing == "light":
+            found["specular"] = self.colored_lobe
+        return found
+
+    def diffuse_color(self) -> Any:
+        """kd * rho."""
+        (kd,) = like(np.zeros(0), self._diffuse_weight())
+        return np.asarray(self.diffuse) * (kd[:, None] if kd.ndim else kd)
+
+    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+        """(N, 3) kd * rho / pi * n_l."""
+        (kd,) = like(n_l, self._diffuse_weight())
+        return tint(self.diffuse, n_l * (kd / np.pi))
+
+    def specular_lobe(
+        self, n_l: Lanes, n_v: Lanes, s_s: Lanes, v_h: Lanes, n_h: Lanes, sin2_h: Lanes
+    ) -> Vectors:
+        """(N, 3) ks * D G F / (4 n_v)."""
+        return self.colored_lobe(n_l, n_v, s_s, v_h, n_h, sin2_h, None)
+
+    def colored_lobe(
+        self,
+        n_l: Lanes,
+        n_v: Lanes,
+        s_s: Lanes,
+        v_h: Lanes,
+        n_h: Lanes,
+        sin2_h: Lanes,
+        light: Vectors | None,
+    ) -> Vectors:
+        """(N, 3) the specular lobe of a facet whose colour goes over to the light's at grazing."""
+        printed = self.convention == "printed"
+        (ks,) = like(n_l, self.specular_weight)
+        shape = self.distribution.density(n_h, sin2_h, printed) * (n_l * vgroove_over_4ab(n_l, n_v, s_s))
+        shape *= ks * (4 / np.pi) if printed else ks
+        F = self.fresnel.reflectance(v_h, light)
+        return tint(WHITE, F * shape) if F.ndim == 1 else (F * shape).T
+
+    def _diffuse_weight(self) -> Any:
+        return 1 - np.asarray(self.specular_weight) if self.diffuse_weight is None else self.diffuse_weight

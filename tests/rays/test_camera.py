@@ -1,0 +1,59 @@
+"""Cameras: centre, corners, distance, and filters that keep their mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.frame import Frame
+from illumcli.rays.camera import axes, camera_rays, film_points
+from illumcli.scene.spec import Filter, Orthographic, Perspective
+
+UNIT = Frame((0.0, 0.0, 0.0), 1.0)
+
+
+def test_the_centre_looks_at_the_target_and_corners_open_by_the_field_of_view():
+    camera = Perspective(position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), fov=90.0)
+    points = np.array([[100.0, 50.0], [100.0, 0.0], [0.0, 50.0], [200.0, 100.0]])
+    o, d, skipped = camera_rays(camera, UNIT, 200, 100, points)
+    np.testing.assert_allclose(d[0], [0, 0, -1], atol=1e-7)
+    np.testing.assert_allclose(d[1], np.array([0, 1, -1]) / 2**0.5, atol=1e-7)
+    np.testing.assert_allclose(d[2], np.array([-2, 0, -1]) / 5**0.5, atol=1e-7)
+    np.testing.assert_allclose(d[3], np.array([2, -1, -1]) / 6**0.5, atol=1e-7)
+    np.testing.assert_allclose(o + (0 - skipped[:, None]) * d, [[0, 0, 3]] * 4, atol=1e-6)
+
+
+def test_orthographic_rays_are_parallel_and_span_the_extent():
+    camera = Orthographic(projection="orthographic", position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), extent=4.0)
+    o, d, _ = camera_rays(camera, UNIT, 200, 100, np.array([[100.0, 0.0], [200.0, 50.0]]))
+    np.testing.assert_allclose(d, [[0, 0, -1]] * 2, atol=1e-7)
+    np.testing.assert_allclose(o[:, :2], [[0, 2], [4, 0]], atol=1e-6)
+
+
+def test_a_camera_a_million_radii_away_aims_as_well_as_a_near_one():
+    for distance in (3.0, 1e6):
+        camera = Orthographic(projection="orthographic", position=(0.3, 0.2, distance), target=(0.3, 0.2, 0.0))
+        o, _, skipped = camera_rays(camera, UNIT, 100, 100, np.array([[50.5, 50.5]]))
+        np.testing.assert_allclose(o[0], [0.31, 0.19, 1.25], atol=1e-6)
+        assert skipped[0] == pytest.approx(distance - 1.25)
+
+
+@pytest.mark.parametrize("up", [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -5.0)])
+def test_axes_are_orthonormal_and_right_handed_even_with_up_along_the_view(up):
+    camera = Perspective(position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), up=up)
+    right, true_up, forward = axes(camera)
+    frame = np.array([right, true_up, -forward])
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("name", "width"), [("box", 1.0), ("tent", 2.0), ("gaussian", 2.0)])
+def test_filters_are_centred_bounded_and_have_their_deviation(name, width):
+    side = 512
+    grid = (np.stack(np.meshgrid(*[np.arange(side) + 0.5] * 2), axis=-1) / side).reshape(-1, 2)
+    zero = np.zeros(len(grid), int)
+    offset = film_points(zero, zero, grid, Filter(filter=name, width=width)) - 0.5
+    deviation = {"box": width / 12**0.5, "tent": width / 24**0.5, "gaussian": width / 4}[name]
+    np.testing.assert_allclose(offset.mean(axis=0), 0, atol=1e-3)
+    np.testing.assert_allclose(offset.std(axis=0), deviation, rtol=5e-3)
+    assert np.abs(offset).max() <= (width if name == "gaussian" else width / 2)

@@ -1,0 +1,60 @@
+"""Point sets: nets stay nets, numbers depend on what they are for and on nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.rays import sampling
+
+
+@pytest.mark.parametrize("power", [2, 4, 6, 8])
+def test_every_elementary_interval_of_a_scrambled_net_holds_one_point(power):
+    count = 1 << power
+    points = sampling.pixel_points(5, np.arange(32, dtype=np.uint32), count).reshape(32, count, 2)
+    for split in range(power + 1):
+        cell = (points[..., 0] * (1 << split)).astype(int) * (1 << (power - split))
+        cell += (points[..., 1] * (1 << (power - split))).astype(int)
+        assert (np.sort(cell, axis=1) == np.arange(count)).all()
+
+
+def test_points_of_a_pixel_do_not_depend_on_its_company():
+    pixels = np.arange(100, dtype=np.uint32)
+    whole = sampling.pixel_points(9, pixels, 7).reshape(100, 7, 2)
+    assert np.array_equal(whole[40:43].reshape(-1, 2), sampling.pixel_points(9, pixels[40:43], 7))
+
+
+def test_seed_and_purpose_both_change_the_key():
+    keys = {sampling.stream(seed, purpose) for seed in range(3) for purpose in ("pixel", "obscurance")}
+    assert len(keys) == 6
+
+
+def test_one_point_is_the_centre():
+    assert (sampling.pixel_points(3, np.arange(5, dtype=np.uint32), 1) == 0.5).all()
+
+
+def test_hashed_numbers_are_uniform():
+    x = sampling.unit_interval(sampling.hashed(12345, np.arange(1 << 16, dtype=np.uint32)))
+    counts = np.histogram(x, bins=64, range=(0, 1))[0]
+    chi2 = (np.square(counts - 1024) / 1024).sum()
+    assert 25 < chi2 < 120  # 63 degrees of freedom: mean 63, deviation 11
+
+
+@pytest.mark.parametrize("count", [1, 5, 64, 100])
+def test_spiral_directions_are_unit_up_and_cosine_weighted(count):
+    table = sampling.spiral_table(count).astype(float)
+    assert table.shape == (16, count, 3)
+    np.testing.assert_allclose(np.linalg.norm(table, axis=2), 1, atol=1e-6)
+    assert (table[..., 2] > 0).all()
+    # every ring of the disc, r^2 in [i/N, (i+1)/N), holds one point
+    ring = np.floor(np.square(table[..., :2]).sum(axis=2) * count * (1 - 1e-6))
+    assert (np.sort(ring, axis=1) == np.arange(count)).all()
+
+
+def test_dither_spreads_over_small_neighbourhoods():
+    y, x = np.divmod(np.arange(64 * 64), 64)
+    turn, phase = sampling.dither(1, x, y, np.zeros_like(x))
+    for draws in (turn, phase):
+        block = draws.reshape(64, 64)[10:14, 20:24].ravel()
+        gaps = np.diff(np.sort(block), append=np.sort(block)[0] + 1)
+        assert gaps.max() < 4 / 16

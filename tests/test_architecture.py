@@ -1,0 +1,85 @@
+"""Who may import whom, and what start-up costs: read from the imports, and from fresh processes."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[1] / "src" / "illumcli"
+MODULES = sorted(SOURCE.rglob("*.py"))
+
+LEAVES = {"errors", "arrays", "demand", "variants", "description", "frame", "pixels", "docstrings", "__init__"}
+MAY = {
+    "cli": {"jobs"},
+    "jobs": {"plan", "scene", "film", "files", "shading", "visibility", "rays", "geometry", "models", "lights"},
+    "plan": {"scene", "shading", "film", "files", "visibility", "rays", "geometry", "models", "lights"},
+    "scene": {"models", "lights", "geometry", "visibility"},
+    "visibility": {"rays", "geometry", "lights"},
+    "rays": {"geometry"},
+    "shading": {"models", "visibility", "rays", "geometry", "lights"},
+    "film": set(),
+    "files": set(),
+    "geometry": set(),
+    "models": set(),
+    "lights": set(),
+}
+HOMES = {
+    "click": ("cli",),
+    "yaml": ("scene/source.py",),
+    "embreex": ("rays/",),
+    "OpenImageIO": ("files/images.py",),
+    "matplotlib": ("jobs/",),
+}
+
+
+def imports(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text())
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def layer(path: Path) -> str:
+    parts = path.relative_to(SOURCE).parts
+    return parts[0] if len(parts) > 1 else path.stem
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_imports_follow_the_layers(path):
+    own = layer(path)
+    for name in imports(path):
+        if name.startswith("illumcli."):
+            other = name.split(".")[1]
+            if other not in MAY and other not in LEAVES:
+                continue  # a name of the package itself
+            allowed = other in LEAVES or other == own or other in MAY.get(own, set()) or own == "__main__"
+            assert allowed, f"{path.relative_to(SOURCE)} imports {name}"
+        home = HOMES.get(name.split(".")[0])
+        if home:
+            place = str(path.relative_to(SOURCE))
+            assert place.startswith(home), f"{place} imports {name}, which lives in {home}"
+
+
+def loaded_after(code: str) -> set[str]:
+    script = f"import sys\n{code}\nprint(' '.join(m.partition('.')[0] for m in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_help_loads_nothing_heavy():
+    code = "from illumcli.cli import illum\ntry:\n    illum(['--help'])\nexcept SystemExit: pass"
+    assert not loaded_after(code) & {"numpy", "pydantic", "yaml", "embreex", "OpenImageIO"}
+
+
+def test_plan_loads_no_ray_core(root):
+    scene = next(iter(sorted((root / "scenes").glob("*.yaml"))))
+    code = f"from illumcli.cli import illum\ntry:\n    illum(['plan', {str(scene)!r}])\nexcept SystemExit: pass"
+    assert not loaded_after(code) & {"embreex", "OpenImageIO"}

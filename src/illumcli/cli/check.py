@@ -1,0 +1,24 @@
+"""``illum check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from illumcli.cli._options import overrides_option, scenes_argument
+
+
+@click.command()
+@scenes_argument
+@overrides_option
+def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
+    """Validate each SCENE and say every problem at once; nothing is rendered and no mesh is read."""
+    from illumcli.errors import InputError
+    from illumcli.jobs.check import run
+
+    valid, problems = run(scenes, overrides)
+    for path in valid:
+        click.echo(f"{path}: ok")
+    if problems:
+        raise InputError(problems)

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 LARGEST = 1e18  # squares and products of three such numbers stay finite in float32's exponent range
 
@@ -12,7 +21,20 @@ LARGEST = 1e18  # squares and products of three such numbers stay finite in floa
 class Description(BaseModel):
     """A frozen part of a scene; unknown keys are refused, text is never read as a number."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, validate_default=False, defer_build=True
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _noted(cls, value: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        """Note in the context, if there is one, which class refused `value`: messages name its keys."""
+        try:
+            return handler(value)
+        except ValidationError:
+            if info.context is not None:
+                info.context[id(value)] = cls
+            raise
 
 
 def spread(value: Any) -> Any:

@@ -18,7 +18,7 @@ scenes_argument = click.argument("scenes", metavar="SCENE...", type=SCENE, nargs
 
 
 def overrides_option(command: C) -> C:
-    """Adds `-D` as the parameter `overrides`, and `--allow`, which reaches `scene.load` by the environment."""
+    """Adds `-D` as the parameter `overrides`, and `--allow`, which reaches `load` by the environment."""
     replaced = click.option(
         "-D",
         "overrides",

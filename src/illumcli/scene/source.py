@@ -26,7 +26,7 @@ Path: TypeAlias = tuple[str | int, ...]  # keys and list indices from the top of
 Scalar: TypeAlias = str | int | float | bool | None
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f]")
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
@@ -148,7 +148,7 @@ def read(text: bytes, name: str, fixed: Place | None = None) -> tuple[Node | Non
         before = text[: error.start].decode("utf-8-sig")
         at = fixed or _place_after(before, name)
         return None, [Problem(at, (), f"byte 0x{text[error.start]:02x} is not UTF-8; save the file as UTF-8")]
-    if found := _UNPRINTABLE.search(decoded):
+    if found := _CONTROL.search(decoded):
         at = fixed or _place_after(decoded[: found.start()], name)
         return None, [Problem(at, (), f"character U+{ord(found[0]):04X} is not text; remove it")]
     composer = _Composer(decoded, lambda mark: fixed or Place(name, mark.line + 1, mark.column + 1))

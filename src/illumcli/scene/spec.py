@@ -5,7 +5,6 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
@@ -23,14 +22,16 @@ from illumcli.description import Color, Description, Number, Positive, Vector, n
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
-from illumcli.variants import suggestion
+from illumcli.scene.references import reference_faults
 from illumcli.visibility.falloffs import AnyFalloff
-from illumcli.visibility.falloffs.step import Step
 
 Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z_][\w-]*$")]
 Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
 Count: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)]
 Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Field(strict=False)]
+
+
+DEFAULTS: Any = Field(default_factory=dict, validate_default=True)  # a description with all its defaults
 
 
 class Normals(Description):
@@ -51,7 +52,7 @@ class MeshFile(Description):
 
     file: str
     """Path, from the scene's folder."""
-    normals: Normals = Normals()
+    normals: Normals = DEFAULTS
     materials: bool = False
     """True: import the materials that the file's own library describes."""
 
@@ -118,9 +119,9 @@ class Object(Description):
     ) = None
     """The name of a material, or one described in place; by default the materials that the mesh file
     selects by name, and light grey Lambert for what selects none."""
-    override: dict[str, Any] = {}
+    override: dict[str, Any] = Field(default_factory=dict)
     """Parameters of the material that this object has otherwise."""
-    transform: Transform = Transform()
+    transform: Transform = DEFAULTS
     shading: Rate | None = None
     """By default the scene's."""
     grain: (
@@ -197,7 +198,7 @@ class Film(Description):
     height: Count = 720
     samples: Count = 4
     """Per pixel; 1 looks through the pixel's centre."""
-    filter: Filter = Filter()
+    filter: Filter = DEFAULTS
     background: Color | None = None
     """Behind everything; by default nothing, with alpha 0."""
     exposure: Annotated[float, Field(ge=-64, le=64)] = 0.0
@@ -224,7 +225,8 @@ class Obscurance(Description):
 
     samples: Annotated[int, Field(strict=True, ge=1, le=65536)] = 64
     """Rays per pixel sample."""
-    falloff: AnyFalloff = Step()
+    falloff: AnyFalloff = Field(default={"falloff": "step"}, validate_default=True)
+    """By default every occluder counts fully: ambient occlusion."""
 
 
 LAYERS = (
@@ -247,8 +249,8 @@ LAYERS = (
     "triangle_id",
 )
 Layer: TypeAlias = Literal[
-    "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha", "depth",
-    "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+    "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha",
+    "depth", "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
 ]  # fmt: skip
 
 
@@ -270,67 +272,31 @@ class Scene(Description):
     """Version of the scene format."""
     camera: Camera | None = None
     """The one camera, named `main`."""
-    cameras: dict[Name, Camera] = {}
+    cameras: dict[Name, Camera] = Field(default_factory=dict)
     """Several cameras by name; instead of `camera`."""
-    film: Film = Film()
+    film: Film = DEFAULTS
     shading: Rate = "phong"
     """How often the model is evaluated."""
-    ambient: Annotated[Ambient, BeforeValidator(_ambient)] = Ambient()
+    ambient: Annotated[Ambient, BeforeValidator(_ambient)] = DEFAULTS
     obscurance: Obscurance | None = None
     """By default w = 1 and no ray is cast for it."""
-    meshes: dict[Name, MeshSource] = {}
-    materials: dict[Name, AnyModel] = {}
+    meshes: dict[Name, MeshSource] = Field(default_factory=dict)
+    materials: dict[Name, AnyModel] = Field(default_factory=dict)
     objects: Annotated[tuple[Object, ...], Field(strict=False)] = ()
     lights: Annotated[tuple[AnyLight, ...], Field(strict=False)] = ()
-    outputs: Outputs = Outputs()
+    outputs: Outputs = DEFAULTS
     seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = 0
     """Of every random number."""
 
     @model_validator(mode="after")
     def _names_exist(self) -> Scene:
-        problems = list(self._problems())
-        if problems:
-            raise ValidationError.from_exception_data("Scene", problems)
+        found = [
+            InitErrorDetails(type=PydanticCustomError("name", "{fact}", {"fact": fact}), loc=path, input=None)
+            for path, fact in reference_faults(self)
+        ]
+        if found:
+            raise ValidationError.from_exception_data("Scene", found)
         return self
-
-    def _problems(self) -> Iterator[InitErrorDetails]:
-        """Names that lead nowhere or stand twice, each at its place."""
-
-        def problem(fact: str, value: Any, *loc: str | int) -> InitErrorDetails:
-            return InitErrorDetails(
-                type=PydanticCustomError("name", "{fact}", {"fact": fact}), loc=loc, input=value
-            )
-
-        if self.camera and self.cameras:
-            yield problem("give either camera or cameras, not both", None, "camera")
-        for i, thing in enumerate(self.objects):
-            mesh, material = thing.mesh, thing.material
-            if isinstance(mesh, str) and mesh not in self.meshes and "." not in mesh:
-                yield problem(
-                    f"no mesh '{mesh}'; {suggestion(mesh, tuple(self.meshes))}", mesh, "objects", i, "mesh"
-                )
-            if isinstance(material, str) and material not in self.materials:
-                fact = f"no material '{material}'; {suggestion(material, tuple(self.materials))}"
-                yield problem(fact, material, "objects", i, "material")
-            elif thing.override:
-                yield from self._override_problems(i, thing)
-        for kind, names in (
-            ("objects", [o.name for o in self.objects]),
-            ("lights", [l.name for l in self.lights]),
-        ):
-            for i, name in enumerate(names):
-                if name is not None and name in names[:i]:
-                    yield problem(f"the name '{name}' is taken", name, kind, i, "name")
-
-    def _override_problems(self, i: int, thing: Object) -> Iterator[InitErrorDetails]:
-        try:
-            self.material_of(thing)
-        except ValidationError as error:
-            for line in error.errors(include_url=False):
-                fault = PydanticCustomError("override", "{fact}", {"fact": line["msg"]})
-                yield InitErrorDetails(
-                    type=fault, loc=("objects", i, "override", *line["loc"]), input=line["input"]
-                )
 
     def material_of(self, thing: Object) -> AnyModel | None:
         """The object's own material with its overrides; None where the mesh selects materials."""
@@ -348,7 +314,7 @@ class Scene(Description):
 
     def named_lights(self) -> dict[str, AnyLight]:
         """The lights by name: their own, or their type and number."""
-        return {l.name or f"{l.light}{i + 1}": l for i, l in enumerate(self.lights)}
+        return {l.name or f"{dict(l)['light']}{i + 1}": l for i, l in enumerate(self.lights)}
 
     def object_names(self) -> tuple[str, ...]:
         return tuple(o.name or f"object{i + 1}" for i, o in enumerate(self.objects))

@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+import re
+from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import Field
+from pydantic import AfterValidator, Discriminator, Tag, WithJsonSchema
 
 from illumcli.arrays import Lanes
-from illumcli.description import Description, Positive
+from illumcli.description import LARGEST, Description, Positive
 
-Distance = Positive | Annotated[str, Field(pattern=r"^[0-9.]+([eE][-+]?[0-9]+)?r$")]
+
+def _radii(text: str) -> str:
+    share = re.fullmatch(RADII, text)
+    if not share or not 0 < float(share[1]) <= LARGEST:
+        raise ValueError(
+            f"must be a distance above 0, or a share of the radius such as '0.5r', is text {text!r}"
+        )
+    return text
+
+
+RADII = r"([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]{1,3})?)r"
+Radii: TypeAlias = Annotated[
+    str, AfterValidator(_radii), WithJsonSchema({"type": "string", "pattern": f"^{RADII}$"})
+]
+Distance: TypeAlias = Annotated[
+    Annotated[Positive, Tag("units")] | Annotated[Radii, Tag("radii")],
+    Discriminator(lambda value: "radii" if isinstance(value, str) else "units"),
+]
 
 
 class Falloff(Description):

@@ -1,0 +1,298 @@
+"""Scene files: read, extend, override, validate; every problem at once."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from illumcli.errors import InputError
+from illumcli.scene import source
+from illumcli.scene.faults import Fault, faults, shown
+from illumcli.scene.override import Override, assign, parse
+from illumcli.scene.references import reference_faults
+from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
+from illumcli.scene.spec import Scene
+from illumcli.variants import suggestion
+
+MAX_EXTENDS = 8  # files, one extending the next
+MAX_FILES = 64
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
+STUDIO = Path(__file__).with_name("studio.yaml")
+CHOICES = ("model", "shape", "falloff", "law")  # keys that say what a mapping is
+PATHS = ("file", "texture")  # keys whose text is a path, besides an object's `mesh`
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A valid scene and what was written to get it."""
+
+    scene: Scene
+    path: Path
+    folder: Path
+    """Where the paths in the scene begin."""
+    name: str
+    """The file's name without its suffix."""
+    overrides: dict[str, Any]
+    """Value by path, as given with -D, for patterns of file names."""
+    tree: Node = field(repr=False)
+    """The scene as written, extended and overridden, with the place of every part."""
+    roots: tuple[Path, ...] = field(repr=False)
+    """The folders that the scene may read from."""
+
+
+def load(path: Path, overrides: Sequence[str] = ()) -> Loaded:
+    """The scene in the file `path`, or the studio scene around `path` where that is a mesh.
+
+    Parameters
+    ----------
+    path : Path
+        A scene, or a mesh file.
+    overrides : sequence of str
+        `PATH=VALUE`, applied in turn; the value is YAML, and `null` takes a part away.
+
+    It may read files in its own folder, the folder above, the current one and those of ILLUM_ALLOW.
+
+    Raises
+    ------
+    InputError
+        Every problem of the scene, by place.
+    """
+    reading = _Reading(_roots(path.parent))
+    changes = [change for text in overrides if (change := parse(text, reading.problems))]
+    if path.suffix.lower() in MESH_SUFFIXES:
+        tree = reading.file(STUDIO, ())
+        mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
+        changes = [mesh, *changes]
+    else:
+        tree = reading.file(path, ())
+    if tree is not None:
+        for change in changes:
+            tree = assign(tree, change, reading.problems) or tree
+    scene = None if tree is None else _validated(tree, reading.problems)
+    if scene is None or tree is None or reading.problems:
+        raise InputError(_lines(reading.problems, overrides))
+    values = {change.text: change.value.plain() for change in changes if change.text}
+    return Loaded(scene, path, path.parent, path.stem, values, tree, reading.roots)
+
+
+def resolve(loaded: Loaded, path: str) -> Path:
+    """The file that a scene means by `path`: regular, and inside the folders it may read from.
+
+    Raises
+    ------
+    InputError
+        With the place in the scene, and the way out.
+    """
+    found = _inside(path, loaded.folder, loaded.roots)
+    if isinstance(found, Path):
+        return found
+    said = ((at, node) for at, node in _paths(loaded.tree) if node.value == path)
+    at, node = next(said, ((), loaded.tree))
+    raise InputError(str(_problem(node.at, at, found)))
+
+
+def file_problems(loaded: Loaded) -> list[str]:
+    """What `resolve` has against each path in the scene."""
+    found = [
+        (at, node, _inside(str(node.value), loaded.folder, loaded.roots)) for at, node in _paths(loaded.tree)
+    ]
+    return _lines([_problem(node.at, at, fact) for at, node, fact in found if isinstance(fact, str)])
+
+
+@dataclass
+class _Reading:
+    """Scene files being read, one extending the next."""
+
+    roots: tuple[Path, ...]
+    problems: list[Problem] = field(default_factory=list)
+    files: int = 0
+    nodes: int = 0
+
+    def file(self, path: Path, above: tuple[Path, ...]) -> Node | None:
+        """The tree of a scene with all it extends; `above` are the files that led here."""
+        self.files += 1
+        try:
+            with path.open("rb") as stream:
+                text = stream.read(MAX_BYTES + 1)
+        except (OSError, ValueError) as error:
+            fact = getattr(error, "strerror", None) or str(error)
+            self.problems.append(Problem(Place(str(path)), (), f"cannot be read: {fact}"))
+            return None
+        tree, problems = source.read(text, str(path))
+        self.problems += problems
+        if tree is None or not isinstance(tree.value, dict):
+            if tree is not None:
+                fact = f"a scene is a mapping, this is {shown(tree.value)}; begin with `version: 1`"
+                self.problems.append(Problem(tree.place, (), fact))
+            return None
+        self.nodes += tree.size
+        if self.nodes > MAX_NODES:
+            self.problems.append(Problem(tree.place, (), f"more than {MAX_NODES} parts with all it extends"))
+            return None
+        entries = dict(tree.value)
+        extends = entries.pop("extends", None)
+        own = replace(tree, value=entries)
+        if extends is None:
+            return own
+        base: Node | None = None
+        for node in extends.value if isinstance(extends.value, list) else [extends]:
+            found = self.base(node, path, (*above, path))
+            if found is None:
+                return None
+            base = found if base is None else merged(base, found)
+        return own if base is None else merged(base, own)
+
+    def base(self, node: Node, path: Path, above: tuple[Path, ...]) -> Node | None:
+        """The tree of one file that `path` extends, its own paths rewritten from the folder of `path`."""
+        if fact := self.against(node, path, above):
+            self.problems.append(Problem(node.at, ("extends",), fact))
+            return None
+        tree = self.file(path.parent / str(node.value), above)
+        folder = os.path.dirname(str(node.value))
+        return _moved(tree, folder) if tree and folder else tree
+
+    def against(self, node: Node, path: Path, above: tuple[Path, ...]) -> str | None:
+        """What is wrong with the file that `path` extends."""
+        if not isinstance(node.value, str):
+            return f"must be the path of a scene, is {shown(node.value)}"
+        found = _inside(node.value, path.parent, self.roots)
+        if isinstance(found, str):
+            return found
+        if any(found.samefile(each) for each in above):
+            return f"{node.value} extends itself; take one extends: away"
+        if len(above) > MAX_EXTENDS:
+            return f"more than {MAX_EXTENDS} files, each extending the next"
+        return f"more than {MAX_FILES} files in all" if self.files >= MAX_FILES else None
+
+
+def merged(base: Node, over: Node) -> Node:
+    """`over` on top of `base`: mappings merge, anything else replaces, `null` removes.
+
+    A mapping that says what it is (`model: phong`) replaces one that is something else.
+    """
+    if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
+        return over
+    if (kind := _kind(over.value)) and kind != _kind(base.value):
+        return over
+    entries = dict(base.value)
+    for key, node in over.value.items():
+        if key in entries and node.value is None:
+            del entries[key]
+        else:
+            entries[key] = merged(entries[key], node) if key in entries else node
+    return replace(over, value=entries)
+
+
+def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
+    said = {key: entries[key].value for key in CHOICES if key in entries}
+    return said | {key: True for key in ("file", "texture", "vertex") if key in entries}
+
+
+def _validated(tree: Node, problems: list[Problem]) -> Scene | None:
+    """The scene, or None after adding what is wrong with it to `problems`."""
+    plain = tree.plain()
+    classes: dict[int, type[BaseModel]] = {}
+    found: list[Fault] = []
+    scene = None
+    try:
+        scene = Scene.model_validate(plain, context=classes)
+    except ValidationError as error:
+        found = [*faults(error, plain, classes), *reference_faults(plain)]
+    known = {problem.place for problem in problems}
+    for path, fact in dict.fromkeys(found):
+        place = _nearest(tree, path).at
+        if place not in known:
+            problems.append(_problem(place, path, fact))
+    return scene
+
+
+def _nearest(tree: Node, path: source.Path) -> Node:
+    """The node at `path`, or the innermost one above it that is written."""
+    while (node := tree.find(path)) is None:
+        path = path[:-1]
+    return node
+
+
+def _problem(place: Place, path: source.Path, fact: str) -> Problem:
+    """A problem with the part of `path` that its place does not say already: an override names its own."""
+    if place.source.startswith("-D "):
+        path = path[place.source.partition("=")[0].count(".") + 1 :]
+    return Problem(place, path, fact)
+
+
+def _lines(problems: Sequence[Problem], overrides: Sequence[str] = ()) -> list[str]:
+    """One line each, once: files as they were read, by line; then the overrides as they were given."""
+    read = [problem.place.source for problem in problems if problem.place.line]
+    sources = list(dict.fromkeys([*read, *(f"-D {text}" for text in overrides)]))
+
+    def order(problem: Problem) -> tuple[int, int, int]:
+        name, line, column = problem.place
+        return sources.index(name) if name in sources else -1, line, column
+
+    return list(dict.fromkeys(str(problem) for problem in sorted(problems, key=order)))
+
+
+def _paths(tree: Node) -> Iterator[tuple[source.Path, Node]]:
+    """The texts of a tree that are paths of files."""
+    for path, node in tree.places():
+        key = path[-1] if path else None
+        if isinstance(node.value, str) and (key in PATHS or (key == "mesh" and "." in node.value)):
+            yield path, node
+
+
+def _moved(tree: Node, folder: str) -> Node:
+    """The tree with its paths, written from `folder`, rewritten from the folder above."""
+    for path, node in list(_paths(tree)):
+        tree = _with(tree, path, replace(node, value=os.path.join(folder, str(node.value))))
+    return tree
+
+
+def _with(tree: Node, path: source.Path, node: Node) -> Node:
+    if not path:
+        return node
+    step, rest = path[0], path[1:]
+    if isinstance(tree.value, dict) and isinstance(step, str):
+        return replace(tree, value={**tree.value, step: _with(tree.value[step], rest, node)})
+    assert isinstance(tree.value, list)
+    assert isinstance(step, int)
+    parts = list(tree.value)
+    parts[step] = _with(parts[step], rest, node)
+    return replace(tree, value=parts)
+
+
+def _roots(folder: Path) -> tuple[Path, ...]:
+    """The scene's folder, its parent and the current one, none of them the whole disk; those allowed."""
+    near = [each.resolve() for each in (folder, folder.resolve().parent, Path.cwd())]
+    given = [Path(text).resolve() for text in os.environ.get("ILLUM_ALLOW", "").split(os.pathsep) if text]
+    return tuple([each for each in near if each != each.parent] + given)
+
+
+def _inside(text: str, folder: Path, roots: Sequence[Path]) -> Path | str:
+    """The file at `text`, or what is wrong with it; outside the roots nothing is looked at."""
+    path = folder / text
+    try:
+        target = path.resolve()
+        if not any(target.is_relative_to(root) for root in roots):
+            return f"{path} lies outside the folders a scene may read; allow it with --allow {target.parent}"
+        mode = target.stat().st_mode
+    except (OSError, ValueError, RuntimeError) as error:
+        if isinstance(error, FileNotFoundError):
+            return f"no file {path}{_near(path)}"
+        return f"{path} cannot be read: {getattr(error, 'strerror', None) or error}"
+    return path if stat.S_ISREG(mode) else f"{path} is not a regular file"
+
+
+def _near(path: Path) -> str:
+    """The way out of a misspelt name: the nearest name in its folder."""
+    try:
+        names = tuple(sorted(each.name for each in path.parent.iterdir()))
+    except OSError:
+        return f"; there is no folder {path.parent}"
+    way = suggestion(path.name, names)
+    return f"; {way}" if way.startswith("did you mean") else ""

@@ -1,0 +1,81 @@
+"""Names in a scene that lead nowhere, stand twice or exclude each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from illumcli.scene.faults import Fault, faults
+from illumcli.variants import member, suggestion
+
+
+def reference_faults(scene: Any) -> Iterator[Fault]:
+    """Every such fault with its path.
+
+    Parameters
+    ----------
+    scene
+        A `Scene`, or its text as dicts and lists, which may hold any other fault: what cannot be understood
+        is passed over.
+    """
+    if _get(scene, "camera") is not None and _get(scene, "cameras"):
+        yield ("camera",), "give either camera or cameras, not both"
+    meshes, materials = (_names(_get(scene, kind)) for kind in ("meshes", "materials"))
+    for i, thing in enumerate(_parts(_get(scene, "objects"))):
+        mesh, material = _get(thing, "mesh"), _get(thing, "material")
+        if isinstance(mesh, str) and mesh not in meshes and "." not in mesh:
+            yield ("objects", i, "mesh"), _no("mesh", mesh, meshes)
+        if isinstance(material, str) and material not in materials:
+            yield ("objects", i, "material"), _no("material", material, materials)
+        elif isinstance(override := _get(thing, "override"), dict) and override:
+            own = materials[material] if isinstance(material, str) else material
+            for path, fact in _override_faults(own, override):
+                yield ("objects", i, "override", *path), fact
+    for kind in ("objects", "lights"):
+        seen: set[str] = set()
+        for i, thing in enumerate(_parts(_get(scene, kind))):
+            name = _get(thing, "name")
+            if isinstance(name, str) and name in seen:
+                yield (kind, i, "name"), f"the name '{name}' is taken"
+            elif isinstance(name, str):
+                seen.add(name)
+
+
+def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:
+    """Faults of the overrides alone; those of the material itself are found where it stands."""
+    if isinstance(own, BaseModel):
+        base = {name: getattr(own, name) for name in own.model_fields_set} | {"model": _get(own, "model")}
+    else:
+        base = own if isinstance(own, dict) else {"model": "lambert"}
+    try:
+        model = member("illumcli.models", base["model"])
+    except (LookupError, TypeError):
+        return
+    classes: dict[int, type[BaseModel]] = {}
+    merged = {**base, **override}
+    try:
+        model.model_validate(merged, context=classes)
+    except ValidationError as error:
+        for path, fact in faults(error, merged, classes):
+            if path[:1] and path[0] in override:
+                yield path, fact
+
+
+def _no(kind: str, name: str, known: Mapping[str, Any]) -> str:
+    plural = {"mesh": "meshes", "material": "materials"}[kind]
+    way = suggestion(name, tuple(known)) if known else f"the scene has no {plural}"
+    return f"no {kind} '{name}'; {way}"
+
+
+def _get(thing: Any, key: str) -> Any:
+    return thing.get(key) if isinstance(thing, dict) else getattr(thing, key, None)
+
+
+def _names(thing: Any) -> Mapping[str, Any]:
+    return thing if isinstance(thing, dict) else {}
+
+
+def _parts(thing: Any) -> Any:
+    return thing if isinstance(thing, list | tuple) else ()

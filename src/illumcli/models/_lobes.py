@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Lanes, Vectors
+from illumcli.description import Description
 
 
 def lobe(gap: Lanes, exponent: Any) -> Lanes:
@@ -39,6 +40,14 @@ def channels(lanes: Lanes, color: Any) -> NDArray[Any]:
 def tint(color: Any, lanes: Lanes) -> Vectors:
     """(N, 3) the lanes weighted by a colour, or by one colour per lane."""
     return (channels(lanes, color) * lanes).T
+
+
+def weighed(color: Any, weight: Any) -> Any:
+    """A colour times a number, or (N, 3) where either varies; unchanged while either is still a texture."""
+    if isinstance(color, Description) or isinstance(weight, Description):
+        return color
+    product = np.asarray(color) * np.asarray(weight)[..., None]
+    return tuple(product.tolist()) if product.ndim == 1 else product
 
 
 @cache

@@ -57,6 +57,8 @@ _Extinction = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=
 Roughness: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=10)]]
 # an angle in radians, less than a quarter turn
 HalfHeight: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=1.57)]]
+# the spread of facet slopes, an angle in radians up to a quarter turn
+Spread: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1.5708)]]
 # indices of refraction
 Index: TypeAlias = Varying[_Refraction]
 IndexColor: TypeAlias = Varying[

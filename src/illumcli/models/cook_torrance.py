@@ -25,9 +25,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, like
+from illumcli.description import Description
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Dielectric, Fresnel, Shifted
-from illumcli.models._lobes import tint
+from illumcli.models._lobes import tint, weighed
 from illumcli.models._microfacet import Beckmann, Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Albedo, Share
 
@@ -66,8 +67,7 @@ class CookTorrance(IlluminationModel):
 
     def diffuse_color(self) -> Any:
         """kd * rho."""
-        (kd,) = like(np.zeros(0), self._diffuse_weight())
-        return np.asarray(self.diffuse) * (kd[:, None] if kd.ndim else kd)
+        return weighed(self.diffuse, self._diffuse_weight())
 
     def diffuse_lobe(self, n_l: Lanes) -> Vectors:
         """(N, 3) kd * rho / pi * n_l."""
@@ -99,4 +99,7 @@ class CookTorrance(IlluminationModel):
         return tint(WHITE, F * shape) if F.ndim == 1 else (F * shape).T
 
     def _diffuse_weight(self) -> Any:
-        return 1 - np.asarray(self.specular_weight) if self.diffuse_weight is None else self.diffuse_weight
+        if self.diffuse_weight is not None:
+            return self.diffuse_weight
+        ks = self.specular_weight
+        return ks if isinstance(ks, Description) else 1 - np.asarray(ks)

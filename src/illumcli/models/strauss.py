@@ -1,0 +1,110 @@
+"""Strauss: a model for users, of colour, smoothness, metalness and transparency.
+
+response = n_l * r_d * d * c + r_s * c_s
+r_d = (1 - s^3) (1 - t),  d = 1 - m s,  r_n = (1 - t) s^3
+r_s = max(0, r.v)^(3 / (1 - s)) * min(1, r_n + (r_n + k_j) F(x_i) G(x_i) G(x_r))
+c_s = 1 + m (1 - F(x_i)) (c - 1)
+
+x_i and x_r are the angles of light and eye to the normal over pi / 2; in radians F has its pole at 1.12,
+inside the range. F stands for Fresnel, G for masking:
+
+F(x) = (1 / (x - k_f)^2 - 1 / k_f^2) / (1 / (1 - k_f)^2 - 1 / k_f^2)
+G(x) = (1 / (1 - k_g)^2 - 1 / (x - k_g)^2) / (1 / (1 - k_g)^2 - 1 / k_g^2)
+
+An intensity model: cosine included, not reciprocal. Ambient light is reflected by r_d * c. At s = 1 the
+highlight is a mirror image and shows only where r and v agree to rounding.
+
+Not followed: the exponent 3 / (1.0001 - s), F of the mean of both angles, the unclamped base, all of them
+from one text's shader.
+
+References
+----------
+Strauss, P. S. (1990). A realistic lighting model for computer animators. IEEE CG&A 10(6).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel
+from illumcli.models._lobes import channels, lobe, tint, weighed
+from illumcli.models._parameters import Albedo, Share
+
+Offset = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1.001, le=10)]
+
+
+def strauss_fresnel(x: Any, kf: Any) -> Any:
+    """F(x), 0 at normal incidence and 1 at grazing."""
+    return x * (2 * kf - x) * np.square((kf - 1) / (kf - x)) / (2 * kf - 1)
+
+
+def strauss_geometry(rise: Any, kg: Any) -> Any:
+    """G(x), 1 at normal incidence and 0 at grazing, from rise = 1 - x."""
+    pole = (kg - 1) + rise
+    return rise * (2 * (kg - 1) + rise) * np.square(kg / pole) / (2 * kg - 1)
+
+
+class Strauss(IlluminationModel):
+    model: Literal["strauss"] = "strauss"
+    color: Albedo = (0.8, 0.8, 0.8)
+    """c, colour of the surface."""
+    smoothness: Share = 0.5
+    """s: 0 perfectly diffuse, 1 a perfect mirror."""
+    metalness: Share = 0.0
+    """m: 0 highlights of the light's colour, 1 of the surface's."""
+    transparency: Share = 0.0
+    """t: 0 opaque, 1 nothing reflected but the highlight at grazing."""
+    kj: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)] = 0.1
+    """k_j, how much rough surfaces shine off the mirror direction."""
+    kf: Offset = 1.12
+    """k_f, pole of F; the nearer to 1, the later F rises."""
+    kg: Offset = 1.01
+    """k_g, pole of G; the nearer to 1, the later G falls."""
+
+    scales: ClassVar[dict[str, tuple[str, ...]]] = {"diffuse_lobe": ("color",)}
+
+    def diffuse_color(self) -> Any:
+        """r_d * c, which reflects ambient light."""
+        if any(
+            not isinstance(each, float | int | np.ndarray) for each in (self.smoothness, self.transparency)
+        ):
+            return self.color
+        s, t = np.asarray(self.smoothness), np.asarray(self.transparency)
+        return weighed(self.color, _diffuse_share(s, t))
+
+    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+        """(N, 3) n_l * r_d * d * c."""
+        s, m, t = like(n_l, self.smoothness, self.metalness, self.transparency)
+        return tint(self.color, n_l * (_diffuse_share(s, t) * (1 - m * s)))
+
+    def specular_lobe(self, n_l: Lanes, n_v: Lanes, sin_l: Lanes, sin_v: Lanes, gap_rv: Lanes) -> Vectors:
+        """(N, 3) r_s * c_s."""
+        s, m, t = like(n_l, self.smoothness, self.metalness, self.transparency)
+        F, _, _, _, r_s = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, self.kj, self.kf, self.kg)
+        metal = m * (1 - F)
+        return ((1 + metal * (channels(n_l, self.color) - 1)) * r_s).T
+
+
+def strauss_specular(
+    n_l: Any, n_v: Any, sin_l: Any, sin_v: Any, gap_rv: Any, s: Any, t: Any, kj: Any, kf: Any, kg: Any
+) -> tuple[Any, Any, Any, Any, Any]:
+    """F(x_i), G(x_i), G(x_r), r_j and r_s on (N,) lanes.
+
+    Near s = 1 the exponent stops where |r - v|^2 is at rounding level: a mirror.
+    """
+    rise_l = np.arctan2(n_l, sin_l) * (2 / np.pi)
+    rise_v = np.arctan2(n_v, sin_v) * (2 / np.pi)
+    F, G_l, G_v = strauss_fresnel(1 - rise_l, kf), strauss_geometry(rise_l, kg), strauss_geometry(rise_v, kg)
+    r_n = (1 - t) * s * s * s
+    r_j = np.minimum(r_n + (r_n + kj) * (F * G_l * G_v), 1)
+    exponent = 3 / np.maximum(1 - s, np.finfo(gap_rv.dtype).eps)
+    return F, G_l, G_v, r_j, lobe(gap_rv, exponent) * r_j
+
+
+def _diffuse_share(s: Any, t: Any) -> Any:
+    """r_d = (1 - s^3) (1 - t)."""
+    return (1 - s) * (1 + s + s * s) * (1 - t)

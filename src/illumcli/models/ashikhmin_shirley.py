@@ -1,0 +1,69 @@
+"""Ashikhmin-Shirley: an anisotropic Phong-like highlight with Fresnel, to which the diffuse part gives way.
+
+response = n_l * (specular + diffuse)
+specular = sqrt((nu + 1) (nv + 1)) / (8 pi) * (n.h)^p / (c max(n_l, n_v)) * (Rs + (1 - Rs) (1 - c)^5)
+p = (nu (h.t)^2 + nv (h.b)^2) / (1 - (n.h)^2),  c = l.h
+diffuse = 28 Rd / (23 pi) (1 - Rs) (1 - (1 - n_l / 2)^5) (1 - (1 - n_v / 2)^5)
+
+t is the direction of the grain, b = n x t. A BRDF times the cosine, reciprocal. Not to be confused with the
+microfacet generator of Ashikhmin, Premoze and Shirley, published the same year.
+
+References
+----------
+Ashikhmin, M., Shirley, P. (2000). An anisotropic Phong BRDF model. Journal of Graphics Tools 5(2), eq. 4, 5.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel
+from illumcli.models._fresnel import schlick
+from illumcli.models._lobes import channels, log_cos
+from illumcli.models._parameters import Albedo, NonNegative
+
+
+class AshikhminShirley(IlluminationModel):
+    model: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
+    diffuse: Albedo = (0.6, 0.6, 0.6)
+    """Rd, the diffuse albedo."""
+    specular: Albedo = (0.05, 0.05, 0.05)
+    """Rs, the specular reflectance at normal incidence."""
+    exponent_u: NonNegative = 100.0
+    """nu, exponent along the grain; 0 to 10^6 and beyond."""
+    exponent_v: NonNegative = 10.0
+    """nv, exponent across the grain; equal to nu, the surface is isotropic."""
+
+    scales: ClassVar[dict[str, tuple[str, ...]]] = {"diffuse_lobe": ("diffuse",)}
+    reciprocal: ClassVar[bool] = True
+    conserving: ClassVar[bool] = True
+    isotropic: ClassVar[bool] = False
+    physical: ClassVar[bool] = True
+
+    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes) -> Vectors:
+        """(N, 3) n_l * diffuse."""
+        Rd, Rs = channels(n_l, self.diffuse), channels(n_l, self.specular)
+        seen = n_l * _rise(n_l) * _rise(n_v) * (28 / (23 * np.pi))
+        return (Rd * (1 - Rs) * seen).T
+
+    def specular_lobe(
+        self, n_l: Lanes, n_v: Lanes, s_s: Lanes, v_h: Lanes, n_h: Lanes, t_s: Lanes, b_s: Lanes
+    ) -> Vectors:
+        """(N, 3) n_l * specular."""
+        nu, nv = like(n_l, self.exponent_u, self.exponent_v)
+        along, across = np.square(t_s), np.square(b_s)
+        tiny = np.finfo(s_s.dtype).tiny
+        sin2 = (along + across) / np.maximum(s_s, tiny)
+        p = (nu * along + nv * across) / np.maximum(along + across, tiny)
+        shape = np.exp(p * log_cos(n_h, sin2)) * n_l / (np.maximum(v_h, 1e-9) * np.maximum(n_l, n_v))
+        shape *= np.sqrt(nu + 1) * np.sqrt(nv + 1) / (8 * np.pi)
+        return (schlick(v_h, channels(n_l, self.specular)) * shape).T
+
+
+def _rise(cosine: Lanes) -> Lanes:
+    """1 - (1 - cosine / 2)^5, 0 at the horizon with all its digits."""
+    x = cosine / 2
+    return x * (5 - x * (10 - x * (10 - x * (5 - x))))

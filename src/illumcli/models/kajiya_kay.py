@@ -1,0 +1,48 @@
+"""Kajiya-Kay: hair and grooves as thin cylinders along the tangent.
+
+response = kd * |t x l| + ks * max(0, |t x l| |t x v| - (t.l) (t.v))^e
+
+The light falls on a strand at the sine of its angle to the tangent t, and the highlight lies on the cone that
+mirrors the light about the strand: with l and v both leaving it, where t.v = -t.l. Some texts print
+cos(theta_l - theta_v) with v arriving. An intensity model: cosine (here: sine) included, no 1/pi.
+
+Where the strand lies on a surface, that surface still hides the light behind its horizon.
+
+References
+----------
+Kajiya, J. T., Kay, T. L. (1989). Rendering fur with three dimensional textures. SIGGRAPH '89.
+Banks, D. C. (1994). Illumination in diverse codimensions. SIGGRAPH '94.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel
+from illumcli.models._lobes import lobe, tint
+from illumcli.models._parameters import Color, NonNegative
+
+
+class KajiyaKay(IlluminationModel):
+    model: Literal["kajiya_kay"] = "kajiya_kay"
+    diffuse: Color = (0.6, 0.6, 0.6)
+    """kd, the diffuse share."""
+    specular: Color = (0.3, 0.3, 0.3)
+    """ks, the share of the highlight."""
+    exponent: NonNegative = 32.0
+    """e, 0 to 10^6 and beyond: the larger, the narrower the highlight across the strand."""
+
+    isotropic: ClassVar[bool] = False
+
+    def diffuse_lobe(self, sin_tl: Lanes) -> Vectors:
+        """(N, 3) kd * |t x l|."""
+        return tint(self.diffuse, sin_tl)
+
+    def specular_lobe(self, sin_tl: Lanes, sin_tv: Lanes, t_l: Lanes, t_v: Lanes) -> Vectors:
+        """(N, 3) ks * cos(angle to the cone)^e, the gap as half a squared distance in the strand's plane."""
+        (e,) = like(t_l, self.exponent)
+        gap = (np.square(sin_tl - sin_tv) + np.square(t_l + t_v)) / 2
+        return tint(self.specular, lobe(gap, e))

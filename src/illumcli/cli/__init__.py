@@ -1,1 +1,102 @@
+"""The ``illum`` command: options and printing; each command imports its job when it is invoked."""
 
+from __future__ import annotations
+
+import signal
+import sys
+from importlib import import_module
+from types import FrameType
+from typing import Any
+
+import click
+
+from illumcli import __version__
+from illumcli.errors import IllumError
+
+COMMANDS = {
+    "render": "Render scenes; print the path of every image.",
+    "plan": "What will run for a scene, what is skipped and why.",
+    "check": "Validate scenes; every problem at once.",
+    "compare": "Measure the difference between two images.",
+    "verify": "Check the models against reference vectors.",
+    "models": "Models, their parameters, ranges, formulas, sources.",
+    "schema": "Print the JSON schema of scenes.",
+}
+
+
+class Commands(click.Group):
+    """Commands found by module name, so that `illum --help` imports none of them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        return getattr(import_module(f"illumcli.cli.{name}"), name)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            import difflib
+
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            error.message = f"no command '{args[0]}'; " + (
+                f"did you mean '{near[0]}'?" if near else "see illum --help"
+            )
+            raise
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, message="illum %(version)s")
+def illum() -> None:
+    """Render scene files in batches: local illumination models, shadows, obscurance.
+
+    \b
+    Examples:
+      illum render scenes/teapot.yaml
+      illum render scene.yaml -D materials.clay.roughness=0.3 -o out/{scene}.exr
+      illum render bunny.obj
+    """
+
+
+def main() -> None:
+    """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        status = illum.main(standalone_mode=False)
+    except IllumError as error:
+        click.echo(f"{error}", err=True)
+        sys.exit(error.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt, _Terminated) as stop:
+        _die_by(signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
+    except BrokenPipeError:
+        _die_by(signal.SIGPIPE)
+    except MemoryError:
+        click.echo("out of memory; make the film, the meshes or the samples smaller", err=True)
+        sys.exit(4)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+class _Terminated(BaseException):
+    """SIGTERM arrived."""
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
+
+
+def _die_by(number: signal.Signals) -> None:
+    """End by the signal itself, so that the caller sees what happened."""
+    import os
+
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)

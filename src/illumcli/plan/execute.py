@@ -89,6 +89,7 @@ def bands(
     ]
     ahead = threads + 1
     last_use = plan.last_use()
+    covered = any(step.makes == "alpha" for step in plan.tile)
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
             pending: list[tuple[Tile, Future[dict[str, NDArray[np.float32]]]]] = []
@@ -109,7 +110,7 @@ def bands(
                     layer.name: np.empty((height, view.width, len(layer.channels)), F)
                     for layer in plan.layers
                 }
-                if "alpha" in {step.makes for step in plan.tile}:
+                if covered:
                     whole.setdefault("alpha", np.empty((height, view.width, 1), F))
                 for _ in row:
                     tile, future = pending.pop(0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from illumcli.demand import Recipe, order
@@ -57,7 +56,7 @@ class Plan:
         }
 
 
-def plan(scene: Scene, folder: Path, only: Sequence[str] = ()) -> Plan:
+def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
     """The plan for a scene's outputs, or for `only` some layers. Reads no mesh, traces nothing.
 
     Raises
@@ -65,10 +64,10 @@ def plan(scene: Scene, folder: Path, only: Sequence[str] = ()) -> Plan:
     LimitError
         A film larger or more rays than this program takes on.
     """
-    book = recipes(scene, folder)
+    book = recipes(scene, loaded)
     wanted = layers(scene, only or scene.outputs.layers)
-    alpha = [] if scene.film.background else ["alpha"]
-    outputs = [*dict.fromkeys(layer.buffer for layer in wanted), *alpha, "hits", "samples"]
+    coverage = ["alpha"] if any(layer.buffer == "beauty" for layer in wanted) else []
+    outputs = [*dict.fromkeys(layer.buffer for layer in wanted), *coverage, "hits", "samples"]
     steps = order(book, outputs, GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from illumcli.demand import Recipe
@@ -138,7 +137,7 @@ def active_lights(scene: Scene) -> dict[str, Light]:
     return {name: light for name, light in scene.named_lights().items() if any(light.color())}
 
 
-def recipes(scene: Scene, folder: Path) -> dict[str, Recipe]:
+def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
     """Every buffer this scene could make, by name; `view` and `tile` are given."""
     rate = rates(scene)
     wanted = reached_words(scene)
@@ -146,7 +145,7 @@ def recipes(scene: Scene, folder: Path) -> dict[str, Recipe]:
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
     at_samples = not {"constant", "gouraud"} & set(rate)
     book = [
-        Recipe.of(partial(stages.meshes, scene, folder), "meshes"),
+        Recipe.of(partial(stages.meshes, scene, loaded), "meshes"),
         Recipe.of(partial(stages.world, scene), "world"),
         Recipe.of(stages.tracer_over, "tracer"),
         Recipe.of(partial(stages.materials_of, scene), "materials"),

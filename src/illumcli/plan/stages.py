@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,7 @@ class Sources:
     sources: tuple[Any, ...]
 
 
-def meshes(scene: Scene, folder: Path) -> Sources:
+def meshes(scene: Scene, loaded: Any) -> Sources:
     """Every object's mesh; a source that several objects name is read once."""
     from illumcli.geometry.readers import read_mesh
     from illumcli.scene.load import resolve
@@ -57,7 +56,7 @@ def meshes(scene: Scene, folder: Path) -> Sources:
         key = source.file if isinstance(source, MeshFile) else repr(source)
         if key not in known:
             known[key] = (
-                read_mesh(resolve(folder, source.file)) if isinstance(source, MeshFile) else source.mesh()
+                read_mesh(resolve(loaded, source.file)) if isinstance(source, MeshFile) else source.mesh()
             )
         found.append(known[key])
         sources.append(source)

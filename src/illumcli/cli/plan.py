@@ -1,0 +1,27 @@
+"""``illum plan``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from illumcli.cli._options import overrides_option, scene_argument
+
+
+@click.command()
+@scene_argument
+@overrides_option
+@click.option("--only", "only", multiple=True, metavar="LAYER", help="Plan these layers alone.")
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json: bool) -> None:
+    """Print what will run for SCENE, what is skipped and why; read no mesh, trace nothing.
+
+    \b
+    Examples:
+      illum plan scenes/teapot.yaml
+      illum plan scenes/teapot.yaml --only depth --json
+    """
+    from illumcli.jobs.plan import run
+
+    click.echo(run(scene, overrides, only, as_json))

@@ -1,0 +1,308 @@
+"""Render a scene: load, plan, execute, write one image set per camera."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli import __version__
+from illumcli.errors import InputError, OutputError
+from illumcli.files.names import check_unique, expand
+from illumcli.film.encode import picture
+from illumcli.film.film import Layer
+from illumcli.film.preview import viewable
+from illumcli.plan.execute import Band, Tally, bands, run_once
+from illumcli.plan.plan import Plan, plan
+from illumcli.plan.recipes import View
+from illumcli.scene.load import Loaded, load, resolve
+from illumcli.scene.spec import MeshFile
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is going on, how much is done and how much there is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One file of an image set and the layers it holds."""
+
+    path: Path
+    view: View
+    layers: tuple[Layer, ...]
+    content: str
+    """Hash of all that its pixels depend on."""
+
+
+@dataclass(slots=True)
+class Report:
+    """What happened."""
+
+    scene: str
+    scene_hash: str
+    seed: int
+    threads: int
+    written: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+    skipped: dict[str, str] = field(default_factory=dict)
+    repairs: dict[str, int] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    rays: dict[str, int] = field(default_factory=dict)
+    clamped: int = 0
+    total_seconds: float = 0.0
+
+    def as_data(self) -> dict[str, Any]:
+        """The report as JSON has it, with versions and the peak of memory."""
+        data = {name: getattr(self, name) for name in self.__slots__}
+        return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
+
+
+def run(
+    path: Path,
+    overrides: Sequence[str] = (),
+    pattern: str | None = None,
+    only: Sequence[str] = (),
+    seed: int | None = None,
+    threads: int | None = None,
+    force: bool = False,
+    progress: Progress = lambda what, done, of: None,
+) -> tuple[list[Path], Report]:
+    """Render a scene; the paths of every image, written or kept, and the report.
+
+    Raises
+    ------
+    InputError, LimitError, OutputError
+        Before anything is rendered, where it can be known then.
+    """
+    start = time.perf_counter()
+    loaded = load(path, overrides)
+    scene = loaded.scene if seed is None else loaded.scene.model_copy(update={"seed": seed})
+    steps = plan(scene, loaded, only)
+    threads = threads or len(os.sched_getaffinity(0))
+    identity = scene_identity(loaded, scene)
+    report = Report(str(path), identity, scene.seed, threads, skipped=dict(steps.skipped))
+    targets = image_set(loaded, scene, steps, (pattern,) if pattern else scene.outputs.files, identity)
+    due = [target for target in targets if not is_kept(target, force)]
+    report.kept = [str(target.path) for target in targets if target not in due]
+    if due:
+        tally = Tally()
+        shared = run_once(steps, tally)
+        report.repairs = dict(shared["world"].repairs)
+        for view in steps.views:
+            mine = [target for target in due if target.view is view]
+            if mine:
+                report.clamped += _render_view(scene, steps, shared, view, mine, threads, tally, progress)
+        report.seconds, report.rays = dict(tally.seconds), dict(tally.rays)
+    report.written = [str(target.path) for target in due]
+    report.total_seconds = time.perf_counter() - start
+    return [target.path for target in targets], report
+
+
+def image_set(
+    loaded: Loaded, scene: Any, steps: Plan, patterns: Sequence[str], identity: str
+) -> list[Target]:
+    """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer."""
+    targets = []
+    for view in steps.views:
+        for pattern in patterns:
+            suffix = Path(pattern).suffix.lower()
+            if suffix not in (".exr", ".png"):
+                raise InputError(f"output pattern '{pattern}': no image format '{suffix}'; use .exr or .png")
+            sets = [steps.layers] if suffix == ".exr" else [(layer,) for layer in steps.layers]
+            for layers in sets:
+                name = "all" if suffix == ".exr" else layers[0].name
+                values = {
+                    **loaded.overrides, "scene": loaded.name, "camera": view.name, "layer": name, "frame": 0
+                }  # fmt: skip
+                parts = json.dumps([identity, view.name, [layer.name for layer in layers], suffix])
+                content = hashlib.blake2b(parts.encode(), digest_size=16).hexdigest()
+                targets.append(Target(Path(expand(pattern, values)), view, tuple(layers), content))
+    check_unique([str(target.path) for target in targets])
+    return targets
+
+
+def is_kept(target: Target, force: bool) -> bool:
+    """True where the file is there already with the same content.
+
+    Raises
+    ------
+    OutputError
+        A different file stands there and `force` is not given.
+    """
+    if force or not target.path.exists():
+        return False
+    from illumcli.files.images import read_metadata
+
+    try:
+        same = read_metadata(target.path).get("illum:content") == target.content
+    except InputError:
+        same = False
+    if not same:
+        raise OutputError(
+            f"{target.path}: a different file is there; use --force to replace it, or another -o"
+        )
+    return True
+
+
+def scene_identity(loaded: Loaded, scene: Any) -> str:
+    """Hash of everything a scene's pixels depend on: its values, its files' contents, this version."""
+    digest = hashlib.blake2b(digest_size=16)
+    said = scene.model_dump(exclude={"outputs": {"files"}})
+    digest.update(json.dumps([__version__, said], sort_keys=True, default=str).encode())
+    for thing in scene.objects:
+        source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
+        name = source if isinstance(source, str) else source.file if isinstance(source, MeshFile) else None
+        if name is not None:
+            digest.update(file_digest(resolve(loaded, name)))
+    return digest.hexdigest()
+
+
+def file_digest(path: Path) -> bytes:
+    """BLAKE2b-128 of a file's content."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).digest()
+    except OSError as error:
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}; check the path") from error
+
+
+def _render_view(
+    scene: Any,
+    steps: Plan,
+    shared: Mapping[str, Any],
+    view: View,
+    targets: Sequence[Target],
+    threads: int,
+    tally: Tally,
+    progress: Progress,
+) -> int:
+    """Write one view's files band by band; how many values were beyond half's range."""
+    from illumcli.files.images import ImageWriter
+
+    done, pixels = 0, view.width * view.height
+
+    def advance(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(view.name, done, pixels)
+
+    with ExitStack() as files:
+        writers = [
+            files.enter_context(
+                ImageWriter(
+                    target.path, view.width, view.height, channels(scene, target), metadata(scene, target)
+                )
+            )
+            for target in targets
+        ]
+        for band in bands(steps, shared, view, threads, tally, advance):
+            start = time.perf_counter()
+            for target, writer in zip(targets, writers, strict=True):
+                writer.write_band(band.y, pixels_of(scene, target, band, shared["world"].frame))
+            tally.add({"write": time.perf_counter() - start}, {})
+        start = time.perf_counter()
+        clamped = sum(writer.close().clamped for writer in writers)
+        tally.add({"write": time.perf_counter() - start}, {})
+    return clamped
+
+
+def channels(scene: Any, target: Target) -> dict[str, Any]:
+    """Channel name -> type of a file; the beauty's R G B A come first."""
+    from illumcli.files.images import channel_types
+
+    if target.path.suffix.lower() == ".png":
+        layer = target.layers[0]
+        names = ("Y",) if len(layer.channels) == 1 and not layer.name.endswith("_id") else tuple("RGB")
+        has_alpha = layer.buffer == "beauty" and scene.film.background is None
+        return dict.fromkeys((*names, "A") if has_alpha else names, "uint8")
+    names = tuple(name for layer in _beauty_first(target.layers) for name in _channels(scene, layer))
+    return dict(channel_types(tuple(dict.fromkeys(names)), scene.outputs.colour))
+
+
+def _beauty_first(layers: Sequence[Layer]) -> list[Layer]:
+    return sorted(layers, key=lambda layer: layer.buffer != "beauty")
+
+
+def _channels(scene: Any, layer: Layer) -> tuple[str, ...]:
+    return (
+        (*layer.channels, "A")
+        if layer.buffer == "beauty" and scene.film.background is None
+        else layer.channels
+    )
+
+
+def pixels_of(scene: Any, target: Target, band: Band, frame: Any) -> NDArray[Any]:
+    """(rows, width, channels) of one file, as its writer takes them."""
+    parts = {layer.name: composed(scene, layer, band) for layer in target.layers}
+    if target.path.suffix.lower() == ".png":
+        layer = target.layers[0]
+        camera = target.view.camera
+        distance = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
+        scale = frame.radius if layer.name == "position" else distance
+        shown = viewable(layer.name, parts[layer.name], scale, frame.centre)
+        return picture(shown, 0.0 if layer.data else scene.film.exposure, 8, str(target.path), band.y)
+    seen: dict[str, NDArray[np.float32]] = {}
+    for layer in _beauty_first(target.layers):
+        for k, name in enumerate(_channels(scene, layer)):
+            seen.setdefault(name, parts[layer.name][..., k])
+    return np.stack(list(seen.values()), axis=-1)
+
+
+def composed(scene: Any, layer: Layer, band: Band) -> NDArray[np.float32]:
+    """The layer's rows; the beauty over its background, or with its alpha where there is none."""
+    values = band.layers[layer.name]
+    if layer.buffer != "beauty":
+        return values
+    alpha = band.layers["alpha"]
+    if scene.film.background is None:
+        return np.concatenate([values, alpha], axis=-1)
+    return values + (1 - alpha) * np.asarray(scene.film.background, np.float32)
+
+
+def metadata(scene: Any, target: Target) -> dict[str, Any]:
+    """What a file says of itself."""
+    view = target.view
+    return {
+        "Software": f"illum {__version__}",
+        "illum:version": __version__,
+        "illum:content": target.content,
+        "illum:camera": view.name,
+        "illum:layers": ",".join(layer.name for layer in target.layers),
+        "illum:samples": view.samples,
+        "illum:seed": str(scene.seed),
+        "illum:exposure": scene.film.exposure,
+        "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
+        "illum:depth": "distance from the eye's plane in scene units, 0 where nothing is seen",
+    }
+
+
+def peak_memory() -> int:
+    """Largest resident size of this process so far [bytes]."""
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a picture depends on."""
+    from importlib.metadata import version
+
+    names = ("numpy", "embreex", "OpenImageIO", "pydantic")
+    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+
+
+def write_report(path: Path, reports: Iterator[Report] | Sequence[Report]) -> None:
+    """Write one report, or a list of several, as JSON."""
+    from illumcli.files.atomic import write_text
+
+    data = [report.as_data() for report in reports]
+    write_text(path, json.dumps(data[0] if len(data) == 1 else data, indent=1) + "\n")

@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from illumcli.description import Color, Description, Number, Positive, Vector, nonzero
+from illumcli.description import Color, Description, Number, Positive, Vector, nonzero, spread
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
@@ -78,11 +78,7 @@ class Transform(Description):
     fit: Positive | None = None
     """Scale and move the mesh so that its bounding sphere has this radius and it stands on y = 0,
     centred on the y axis [scene units]."""
-    scale: Annotated[Vector, BeforeValidator(lambda v: (v,) * 3 if isinstance(v, int | float) else v)] = (
-        1.0,
-        1.0,
-        1.0,
-    )
+    scale: Annotated[Vector, BeforeValidator(spread)] = (1.0, 1.0, 1.0)
     """One factor, or one per axis; negative ones mirror."""
     rotate: Vector = (0.0, 0.0, 0.0)
     """About x, then y, then z [degrees]."""
@@ -220,6 +216,9 @@ class Ambient(Description):
     I_d the direct light before the material; it counts direct light twice."""
 
 
+AmbientText: TypeAlias = Ambient | Color | Literal["separate", "coupled"]  # how a scene may write it
+
+
 class Obscurance(Description):
     """w(p) by Monte Carlo: how open each point is to the ambient light."""
 
@@ -277,7 +276,8 @@ class Scene(Description):
     film: Film = DEFAULTS
     shading: Rate = "phong"
     """How often the model is evaluated."""
-    ambient: Annotated[Ambient, BeforeValidator(_ambient)] = DEFAULTS
+    ambient: Annotated[Ambient, BeforeValidator(_ambient, json_schema_input_type=AmbientText)] = DEFAULTS
+    """Colour, form or both of the light from everywhere."""
     obscurance: Obscurance | None = None
     """By default w = 1 and no ray is cast for it."""
     meshes: dict[Name, MeshSource] = Field(default_factory=dict)

@@ -1,0 +1,18 @@
+"""``illum schema``."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON schema of scene files.
+
+    \b
+    An editor that knows YAML schemas completes and checks a scene that begins with
+      # yaml-language-server: $schema=scene.schema.json
+    """
+    from illumcli.jobs.schema import run
+
+    click.echo(run(), nl=False)

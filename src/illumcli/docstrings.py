@@ -1,0 +1,52 @@
+"""Descriptions of classes and of their fields, read from the sources only when they are asked for.
+
+A field is described by the string below it, which Python does not keep.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from functools import cache
+
+
+def field_docs(cls: type) -> dict[str, str]:
+    """What each field of a class means, inherited ones included; fields without a text are left out."""
+    docs: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        docs |= _written(base.__module__).get(base.__qualname__, {})
+    return docs
+
+
+def summary(cls: type) -> str:
+    """The first paragraph of a class's own docstring, or of its module's where it has none."""
+    text = vars(cls).get("__doc__") or sys.modules[cls.__module__].__doc__ or ""
+    return _one_line(inspect.cleandoc(text).partition("\n\n")[0])
+
+
+@cache
+def _written(module: str) -> dict[str, dict[str, str]]:
+    """By class, by field: the texts of a module; none for what is not ours."""
+    if not module.startswith("illumcli."):
+        return {}
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {each.name: _in_class(each) for each in tree.body if isinstance(each, ast.ClassDef)}
+
+
+def _in_class(cls: ast.ClassDef) -> dict[str, str]:
+    docs: dict[str, str] = {}
+    for field, text in zip(cls.body, cls.body[1:], strict=False):
+        if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+            continue
+        if (
+            isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+            and isinstance(text.value.value, str)
+        ):
+            docs[field.target.id] = _one_line(text.value.value)
+    return docs
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

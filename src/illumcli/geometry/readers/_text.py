@@ -1,0 +1,198 @@
+"""Text files of numbers, cut into lines and read in bulk: a few passes over all bytes, none over lines."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.geometry.readers._polygons import Ints
+
+PIECE = 1 << 22  # bytes cut into words at a time: Python's words need ten times the memory of their text
+PADDING = 8  # bytes that may be read behind the start of the last line
+NEWLINE = b"\n"
+
+_COMMENT = re.compile(rb"#[^\n]*")
+_BLANKS = re.compile(rb"[ \t\r\v\f]*")
+
+
+@dataclass(frozen=True)
+class Text:
+    """The lines of a file that hold something: comments are left out, continued lines are joined.
+
+    What is taken out is replaced by as many blanks, so an offset here is an offset in the file.
+    """
+
+    path: Path
+    raw: bytes  # as in the file, lines ended by \n
+    data: bytes
+
+    @classmethod
+    def of(cls, path: Path, raw: bytes, *, comments: bool = False, continued: bool = False) -> Text:
+        """The text `raw`; comments begin with #, a backslash at its end continues a line."""
+        if b"\r" in raw and b"\n" not in raw:
+            raw = raw.replace(b"\r", b"\n")
+        data = raw + b"\n" * PADDING
+        if comments and b"#" in data:
+            data = _COMMENT.sub(_blank_comment, data)
+        if continued and b"\\" in data:
+            data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
+        return cls(path, raw, data)
+
+    @cached_property
+    def bytes(self) -> NDArray[np.uint8]:
+        return np.frombuffer(self.data, np.uint8)
+
+    @cached_property
+    def starts(self) -> Ints:
+        """(L,) offset of the first letter of each line that has one, ascending."""
+        ends = np.flatnonzero(self.bytes[:-PADDING] == 10)
+        starts = np.concatenate(([0], ends + 1))
+        first = self.bytes[starts]
+        for i in np.flatnonzero((first <= 32) & (first != 10)):
+            found = _BLANKS.match(self.data, starts[i])
+            starts[i] = found.end() if found else starts[i]
+        return starts[self.bytes[starts] != 10]
+
+    def keywords(self, width: int) -> NDArray[np.uint64]:
+        """(L,) the first word of each line, or its first `width` letters, as `keyword` codes it."""
+        code = np.zeros(len(self.starts), np.uint64)
+        inside = np.ones(len(self.starts), bool)
+        for i in range(width):
+            letter = self.bytes[self.starts + i]
+            inside &= letter > 32
+            code |= np.where(inside, letter, 0).astype(np.uint64) << np.uint64(8 * i)
+        return code
+
+    def line(self, index: int) -> str:
+        """The content of a line, without blanks around it."""
+        start = self.starts[index]
+        return self.data[start : self.data.index(b"\n", start)].decode("utf-8", "replace").strip()
+
+    def place(self, index: int) -> str:
+        """``path:line`` of a line."""
+        return f"{self.path}:{1 + self.raw.count(NEWLINE, 0, self.starts[index])}"
+
+    def block(self, lines: NDArray[np.intp], keyword: int = 0) -> Block:
+        """The lines of these ascending indices, the `keyword` letters at the start of each blanked."""
+        if not len(lines):
+            return Block(self, lines, np.empty(0, np.uint8), np.empty(0, np.int64))
+        ends = np.append(self.starts[1:], len(self.data))
+        breaks = np.flatnonzero(np.diff(lines) != 1) + 1
+        first, last = lines[np.append(0, breaks)], lines[np.append(breaks - 1, len(lines) - 1)]
+        pieces = zip(self.starts[first].tolist(), ends[last].tolist(), strict=True)
+        data = np.frombuffer(bytearray().join([self.data[start:end] for start, end in pieces]), np.uint8)
+        lengths = ends[lines] - self.starts[lines]
+        starts = np.cumsum(lengths) - lengths
+        for i in range(keyword):
+            data[starts + i] = 32
+        return Block(self, lines, data, starts)
+
+
+def keyword(word: bytes) -> int:
+    """The code that `Text.keywords` has for a word of at most eight letters."""
+    return int.from_bytes(word, "little")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some lines of a text, one after the other."""
+
+    text: Text
+    lines: NDArray[np.intp]  # (B,) their index in `text`
+    data: NDArray[np.uint8]
+    starts: Ints  # (B,) where each begins in `data`
+
+    @cached_property
+    def heads(self) -> NDArray[np.bool_]:
+        """(len(data),) True at the first letter of each word."""
+        letters = self.data > 32
+        letters[1:] &= ~letters[:-1]
+        return letters
+
+    @cached_property
+    def counts(self) -> Ints:
+        """(B,) words of each line."""
+        if not len(self.starts):
+            return np.empty(0, np.int64)
+        return np.add.reduceat(self.heads, self.starts, dtype=np.int32).astype(np.int64)
+
+    def floats(self) -> NDArray[np.float64]:
+        """Every word as a number in full precision, line after line."""
+        total = int(self.counts.sum())
+        words = chain.from_iterable(map(bytes.split, self._pieces()))
+        try:
+            if np.any(self.data == ord("_")):  # `float` would skip it
+                raise ValueError
+            values = np.fromiter(map(float, words), np.float64)
+        except ValueError:
+            raise self._bad_number(float) from None
+        if len(values) != total:
+            raise self._bad_number(float)
+        return values
+
+    def integers(self) -> Ints:
+        """Every word as an integer, line after line; one too large for int64 becomes its largest."""
+        total = int(self.counts.sum())
+        if not total:
+            return np.empty(0, np.int64)
+        try:
+            values = np.fromstring(self.data.tobytes(), np.int64, sep=" ")
+        except (ValueError, DeprecationWarning):
+            raise self._bad_number(int) from None
+        if len(values) != total:
+            raise self._bad_number(int)
+        return values
+
+    def place(self, index: int) -> str:
+        """``path:line`` of one of the lines."""
+        return self.text.place(int(self.lines[index]))
+
+    def _pieces(self) -> Iterator[bytes]:
+        """The data, cut between lines every `PIECE` bytes."""
+        cuts = np.unique(np.searchsorted(self.starts, np.arange(0, len(self.data), PIECE)))
+        edges = [*self.starts[cuts[cuts < len(self.starts)]].tolist(), len(self.data)]
+        for start, end in pairwise(edges):
+            yield self.data[start:end].tobytes()
+
+    def _bad_number(self, kind: type[int] | type[float]) -> InputError:
+        """The error that names the first word that is no number."""
+        edges = [*self.starts.tolist(), len(self.data)]
+        for i, (start, end) in enumerate(pairwise(edges)):
+            for word in self.data[start:end].tobytes().split():
+                if not _is_number(word, kind):
+                    text = word.decode("utf-8", "replace")
+                    return InputError(f"{self.place(i)}: '{text:.40}' is no {_name(kind)}; {_way(word)}")
+        return InputError(f"{self.text.path}: holds words that are no {_name(kind)}; export the mesh again")
+
+
+def _blank_comment(found: re.Match[bytes]) -> bytes:
+    """Line ends in place of a comment; a # inside a word begins none."""
+    before = found.string[found.start() - 1 : found.start()]
+    comment = not before or before.isspace()
+    return b"\n" * len(found[0]) if comment else found[0]
+
+
+def _is_number(word: bytes, kind: type[int] | type[float]) -> bool:
+    try:
+        kind(word)
+    except ValueError:
+        return False
+    return b"_" not in word
+
+
+def _name(kind: type[int] | type[float]) -> str:
+    return "whole number" if kind is int else "number"
+
+
+def _way(word: bytes) -> str:
+    if b"," in word:
+        return "write a decimal point, not a comma"
+    return "export the mesh again"

@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from illumcli.errors import InputError
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.readers import _text, read_mesh
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+def mesh_of(tmp_path: Path, text: str | bytes) -> Mesh:
+    path = tmp_path / "a.obj"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return read_mesh(path)
+
+
+def faces(mesh: Mesh) -> list[list[int]]:
+    return [mesh.corners[a:b].tolist() for a, b in zip(mesh.starts[:-1], mesh.starts[1:], strict=True)]
+
+
+def test_polygons_keep_their_corners(tmp_path: Path) -> None:
+    mesh = mesh_of(tmp_path, SQUARE + "f 1 2 3 4\nf 1 2 3\n")
+    assert faces(mesh) == [[0, 1, 2, 3], [0, 1, 2]]
+    assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert mesh.normals is None
+    assert mesh.uvs is None
+
+
+def test_numbers_keep_all_their_digits(tmp_path: Path) -> None:
+    rng = np.random.default_rng(7)
+    values = rng.normal(size=(300, 3)) * 10.0 ** rng.integers(-17, 17, (300, 3))
+    text = "".join("v " + " ".join(map(repr, row)) + "\n" for row in values.tolist())
+    assert np.array_equal(mesh_of(tmp_path, text + "f 1 2 3\n").vertices, values)
+
+
+@pytest.mark.parametrize("piece", [1, 64, 1 << 22])
+def test_the_size_of_pieces_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, piece: int
+) -> None:
+    monkeypatch.setattr(_text, "PIECE", piece)
+    values = np.arange(600.0).reshape(-1, 3)
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in values.tolist())
+    assert np.array_equal(mesh_of(tmp_path, text + "f 1 2 3\n").vertices, values)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_layout_of_the_text_does_not_matter(tmp_path: Path, end: str) -> None:
+    text = (
+        "# a comment with a backslash \\\nv 0 0 0 # the first\n\n  v\t1 0 0  \n \t \nvn 0 0 1\n"
+        "v 0 1 \\\n0\nf 1 \\\n  2 \\\n  3"
+    )
+    mesh = mesh_of(tmp_path, text.replace("\n", end))
+    assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert faces(mesh) == [[0, 1, 2]]
+
+
+def test_corners_of_every_form_may_be_mixed(tmp_path: Path) -> None:
+    text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nvn 0 0 -1\nf 1/1/2 2//1 3/3\nf 1 2/2/ 3// 4/1\n"
+    mesh = mesh_of(tmp_path, text)
+    assert faces(mesh) == [[0, 1, 2], [0, 1, 2, 3]]
+    assert mesh.corner_uvs is not None
+    assert mesh.corner_normals is not None
+    assert mesh.corner_uvs.tolist() == [0, -1, 2, -1, 1, -1, 0]
+    assert mesh.corner_normals.tolist() == [1, 0, -1, -1, -1, -1, -1]
+
+
+def test_negative_indices_count_back_from_the_face(tmp_path: Path) -> None:
+    text = (
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 1 0 0\nvn 0 0 1\nf -3//-1 -2//-2 -1//1\n"
+        "v 5 5 5\nvn 0 1 0\nf -3//-1 -2//-1 -1//-1\n"
+    )
+    mesh = mesh_of(tmp_path, text)
+    assert faces(mesh) == [[0, 1, 2], [1, 2, 3]]
+    assert mesh.corner_normals is not None
+    assert mesh.corner_normals.tolist() == [1, 0, 0, 2, 2, 2]
+
+
+def test_a_face_may_stand_before_its_vertices(tmp_path: Path) -> None:
+    assert faces(mesh_of(tmp_path, "f 1 2 3\n" + SQUARE)) == [[0, 1, 2]]
+
+
+def test_texture_coordinates_may_have_one_to_three_numbers(tmp_path: Path) -> None:
+    mesh = mesh_of(tmp_path, SQUARE + "vt 0.5\nvt 0.25 0.75\nvt 1 2 3\nf 1/1 2/2 3/3\n")
+    assert mesh.uvs is not None
+    assert mesh.uvs.tolist() == [[0.5, 0], [0.25, 0.75], [1, 2]]
+
+
+@pytest.mark.parametrize("full", [1, 255])
+def test_vertex_colours_become_linear(tmp_path: Path, full: int) -> None:
+    text = f"v 0 0 0 {full} 0 0\nv 1 0 0 0 {0.5 * full} 0\nv 0 1 0\nf 1 2 3\n"
+    mesh = mesh_of(tmp_path, text)
+    color = mesh.attributes["color"]
+    assert color.dtype == np.float32
+    np.testing.assert_allclose(color, [[1, 0, 0], [0, 0.21404114, 0], [1, 1, 1]], rtol=1e-6)
+    assert mesh.repairs == {"vertices without a colour, made white": 1}
+
+
+def test_groups_and_materials_hold_until_the_next(tmp_path: Path) -> None:
+    triangle = "f 1 2 3\n"
+    text = (
+        SQUARE
+        + triangle
+        + "o left part\nusemtl red#1\n"
+        + triangle
+        + "g right\n"
+        + triangle
+        + "usemtl blue\n"
+    ) + (triangle + "s off\nusemtl red#1\nf 1 2 3 4\n")
+    mesh = mesh_of(tmp_path, text)
+    assert mesh.group_names == ("left part", "right")
+    assert mesh.material_names == ("red#1", "blue")
+    assert mesh.polygon_groups is not None
+    assert mesh.polygon_materials is not None
+    assert mesh.polygon_groups.tolist() == [-1, 0, 1, 1, 1]
+    assert mesh.polygon_materials.tolist() == [-1, 0, 0, 1, 0]
+
+
+def test_short_faces_are_dropped_and_counted_with_what_belongs_to_them(tmp_path: Path) -> None:
+    text = SQUARE + "vt 0 0\nvt 1 1\nusemtl a\nf 1/1 2/1\nusemtl b\nf 1/2 2/2 3/2\nf\nf 1\n"
+    mesh = mesh_of(tmp_path, text)
+    assert faces(mesh) == [[0, 1, 2]]
+    assert mesh.repairs == {"faces with fewer than three corners": 3}
+    assert mesh.corner_uvs is not None
+    assert mesh.polygon_materials is not None
+    assert mesh.corner_uvs.tolist() == [1, 1, 1]
+    assert mesh.polygon_materials.tolist() == [1]
+
+
+def test_unusable_normals_and_uv_are_taken_from_the_corners(tmp_path: Path) -> None:
+    text = SQUARE + "vn nan 0 0\nvn 0 0 0\nvn 0 0 1\nvt inf 0\nf 1/1/1 2/1/2 3/1/3\n"
+    mesh = mesh_of(tmp_path, text)
+    assert mesh.corner_normals is not None
+    assert mesh.corner_uvs is not None
+    assert mesh.corner_normals.tolist() == [-1, -1, 2]
+    assert mesh.corner_uvs.tolist() == [-1, -1, -1]
+    assert mesh.repairs == {"normals not finite or of no length": 2, "uv not finite": 1}
+
+
+def test_shapes_that_are_no_polygons_are_counted(tmp_path: Path) -> None:
+    mesh = mesh_of(tmp_path, SQUARE + "l 1 2\np 1\np 2\ncurv 0 1 1 2\nf 1 2 3\n")
+    assert mesh.repairs == {"lines left out": 1, "points left out": 2, "curves left out": 1}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "a.obj: has no faces"),
+        ("# only\n# comments\n", "a.obj: has no faces"),
+        (SQUARE + "l 1 2\n", "a.obj: has no faces"),
+        (SQUARE + "f 1 2\n", "a.obj: has no faces"),
+        ("f 1 2 3\n", "a.obj:1: index 1 is out of range, there are 0 vertices"),
+        (SQUARE + "f 1 2 3\nf 1 2 5\n", "a.obj:6: index 5 is out of range, there are 4 vertices"),
+        (SQUARE + "f 1 2 -5\n", "a.obj:5: index -5 is out of range"),
+        (SQUARE + "\n# note\nf 0 1 2\n", "a.obj:7: index 0"),
+        (SQUARE + "f 1/0 2/1 3/1\n", "a.obj:5: index 0"),
+        (SQUARE + "f 1//0 2//1 3//1\n", "a.obj:5: index 0"),
+        (SQUARE + "vt 0 0\nf 1/1 2/1 3/2\n", "a.obj:6: index 2 is out of range, there are 1 texture coord"),
+        (SQUARE + "f 1//1 2//1 3//1\n", "a.obj:5: index 1 is out of range, there are 0 normals"),
+        (SQUARE + "f 1 2 99999999999999999999999\n", "a.obj:5: index .* is out of range"),
+        (SQUARE + "f 1 2 -99999999999999999999999\n", "a.obj:5: index .* is out of range"),
+        (SQUARE + "f 1 2 3.0\n", "a.obj:5: '3.0' is no whole number"),
+        (SQUARE + "f 1/1/1/1 2 3\n", "a.obj:5: '1/1/1/1' is no corner"),
+        (SQUARE + "f 1///1 2 3\n", "a.obj:5: '1///1' is no corner"),
+        (SQUARE + "f 1//2/1 2 3\n", "a.obj:5: '1//2/1' is no corner"),
+        (SQUARE + "f 1 2 3\nf 1 /2 3\n", "a.obj:6: '/2' is no corner"),
+        (SQUARE + "f 1 2 / 3\n", "a.obj:5: '/' is no corner"),
+        (SQUARE + "f 1 2 a\n", "a.obj:5: 'a' is no whole number"),
+        ("v 0 0 0\nv 1,5 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2: '1,5' is no number; write a decimal point"),
+        ("v 0 0 0\nv 1_0 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2: '1_0' is no number"),
+        ("v 0 0 0\nv 1 0\nv 0 1 0 5\nf 1 2 3\n", "a.obj:2: has 2 numbers; write v x y z"),
+        ("v 0 0 0\nv 1 0 0 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2: has 5 numbers"),
+        ("v 0 0 0\nv\nv 0 1 0\nf 1 2 3\n", "a.obj:2: has 0 numbers"),
+        ("v 0 0 0 0 0 -1\nf 1 1 1\n", "a.obj:1: a vertex colour must be"),
+        ("v 0 0 0 0 0 nan\nf 1 1 1\n", "a.obj:1: a vertex colour must be"),
+        (SQUARE + "vn 0 1\nf 1 2 3\n", "a.obj:5: has 2 numbers; write vn x y z"),
+        (SQUARE + "v nan 0 0\nv 0 0 inf\nf 1 2 3\n", "a.obj: 2 of 6 vertices .* the first is number 5"),
+        (SQUARE + "v 0 0 2e18\nf 1 2 3\n", "a.obj: 1 of 5 vertices .* beyond 1e"),
+        (SQUARE + "v 0 0 1e999\nf 1 2 3\n", "a.obj: 1 of 5 vertices"),
+        (SQUARE + "w 1 2 3\nf 1 2 3\n", "a.obj:5: 'w' is no statement"),
+        ("v 0 0 \\\n0\nv 1 0 0\nv 0 x 0\nf 1 2 3\n", "a.obj:4: 'x' is no number"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message.replace("a.obj", r"a\.obj")) as caught:
+        mesh_of(tmp_path, text)
+    assert "; " in str(caught.value)  # the way out

@@ -90,6 +90,12 @@ def test_a_constant_fills_the_shape_of_the_variables():
     assert slope.tolist() == [0.0] * 4
 
 
+def test_variables_of_different_shapes_are_a_grid():
+    f = parse("x + 10*y", ("x", "y"))
+    assert f.value(np.arange(3)[:, None], np.arange(2)).tolist() == [[0, 10], [1, 11], [2, 12]]
+    assert [slope.shape for slope in f.gradient(np.arange(3)[:, None], np.arange(2))[1]] == [(3, 2)] * 2
+
+
 def test_the_derivative_of_a_square_at_zero_is_zero():
     value, (slope,) = parse("x**2 + x**0", ("x",)).gradient(np.zeros(1))
     assert (value[0], slope[0]) == (1.0, 0.0)

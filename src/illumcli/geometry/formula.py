@@ -91,20 +91,20 @@ class Formula:
 
         Outside its domain (log(-1), 1/0) it is NaN or infinite, without a warning.
         """
-        arrays = np.broadcast_arrays(*(np.asarray(value, np.float64) for value in values))
+        arrays = [np.asarray(value, np.float64) for value in values]
         scope = {name: Dual(array, {}) for name, array in zip(self.variables, arrays, strict=True)}
         with np.errstate(all="ignore"):
-            return _full(_evaluate(self.tree, scope).value, arrays[0].shape)
+            return _full(_evaluate(self.tree, scope).value, np.broadcast_shapes(*(a.shape for a in arrays)))
 
     def gradient(self, *values: ArrayLike) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
         """The value, and the derivative by each variable in order; float64 in the values' common shape."""
-        arrays = np.broadcast_arrays(*(np.asarray(value, np.float64) for value in values))
+        arrays = [np.asarray(value, np.float64) for value in values]
         one = np.ones(())
         scope = {name: Dual(a, {name: one}) for name, a in zip(self.variables, arrays, strict=True)}
         with np.errstate(all="ignore"):
             result = _evaluate(self.tree, scope)
             slopes = [result.slopes.get(name, np.zeros(())) for name in self.variables]
-        shape = arrays[0].shape
+        shape = np.broadcast_shapes(*(a.shape for a in arrays))
         return _full(result.value, shape), [_full(slope, shape) for slope in slopes]
 
 
@@ -140,6 +140,12 @@ def parse(text: str, variables: tuple[str, ...]) -> Formula:
         raise ValueError("formula is nested too deeply") from None
     _check(tree, variables, indent, 1)
     return Formula(text, variables, tree)
+
+
+def checked(text: str, variables: tuple[str, ...]) -> str:
+    """The text itself once `parse` takes it; for fields of a scene."""
+    parse(text, variables)
+    return text
 
 
 def implicit_normal(f: Formula, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -35,8 +35,8 @@ def triangulate(mesh: Mesh) -> Triangulation:
     """The polygons as triangles that cover the same area; no vertex is added.
 
     Triangles stay as they are. A quad is cut along its shorter diagonal, a concave one along the
-    inner one. Larger convex polygons become fans from their first corner, concave ones go through ear clipping on
-    their Newell plane. A polygon without area still gives triangles, so that nothing is lost unseen.
+    inner one. Larger convex polygons become fans from their first corner, concave ones go through ear
+    clipping on their Newell plane. A polygon without area still gives triangles: nothing is lost unseen.
     """
     size = np.diff(mesh.starts)
     if (size == 3).all():

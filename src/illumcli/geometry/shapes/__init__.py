@@ -1,4 +1,7 @@
-"""Built-in shapes, one file each: the file's name is the tag of ``shape:`` in a scene."""
+"""Built-in shapes, one file each: the file's name is the tag of ``shape:`` in a scene.
+
+All stand y up around the origin and, unless asked otherwise, fill the cube from -1 to 1.
+"""
 
 from __future__ import annotations
 

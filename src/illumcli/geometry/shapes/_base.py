@@ -1,14 +1,26 @@
-"""What every built-in shape is: a description that makes a Mesh with exact normals."""
+"""What every shape is: frozen parameters that make a mesh."""
 
 from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
 
 from illumcli.description import Description
 from illumcli.geometry.mesh import Mesh
 
+MAX_TRIANGLES = 20_000_000
+"""No shape makes more; the ranges below keep to it."""
+
+Segments: TypeAlias = Annotated[int, Field(ge=3, le=4096)]
+Rings: TypeAlias = Annotated[int, Field(ge=1, le=2048)]
+Cells: TypeAlias = Annotated[int, Field(ge=1, le=3000)]
+CellsByCells: TypeAlias = Annotated[tuple[Cells, Cells], Field(strict=False)]
+
 
 class Shape(Description):
-    """A surface given by a formula; y points up, sizes are in scene units."""
+    """A surface described by a few parameters."""
 
     def mesh(self) -> Mesh:
-        """The shape as polygons with exact normals."""
+        """The surface as polygons, counter-clockwise seen from outside, with exact normals per corner."""
         raise NotImplementedError

@@ -1,0 +1,142 @@
+"""A surface given by formulas of two parameters; normals from the exact derivatives.
+
+(x, y, z)(u, v),    normal = d/du x d/dv
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, field_validator
+
+from illumcli.arrays import Vectors, length, unit
+from illumcli.description import Number
+from illumcli.errors import InputError
+from illumcli.geometry.formula import MAX_LENGTH, checked, parametric_normal, parse
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.shapes._base import CellsByCells, Shape
+from illumcli.geometry.shapes._lattice import Lattice, around, turned, vertex_numbers, woven
+
+UV = ("u", "v")
+WELD = 1e-9  # of the surface's extent: nodes on a seam or at a pole that are as near are one vertex
+FAINT = 1e-12  # of the longest normal: no direction left
+INWARDS = 1e-7  # of a parameter's range: where the limit of the normal at a pole is read
+
+FormulaText: TypeAlias = Annotated[
+    str, AfterValidator(partial(checked, variables=UV)), Field(max_length=MAX_LENGTH)
+]
+Range: TypeAlias = Annotated[tuple[Number, Number], Field(strict=False)]
+
+
+class Parametric(Shape):
+    shape: Literal["parametric"] = "parametric"
+    x: FormulaText
+    """Formula of u and v: + - * / **, pi, e, sin cos tan sinh cosh tanh exp log sqrt abs atan2 min max."""
+    y: FormulaText
+    z: FormulaText
+    u: Range = (0.0, 1.0)
+    v: Range = (0.0, 1.0)
+    resolution: CellsByCells = (64, 64)
+    """Quads along u and v."""
+    flip: bool = False
+    """Outside is the other side, -(d/du x d/dv)."""
+
+    @field_validator("u", "v")
+    @classmethod
+    def _grows(cls, span: tuple[float, float]) -> tuple[float, float]:
+        if not span[0] < span[1]:
+            raise ValueError(f"must run from low to high, is {list(span)}; `flip` turns the surface round")
+        return span
+
+    def mesh(self) -> Mesh:
+        """Quads; where the surface closes on itself or shrinks to a point, vertices are shared.
+
+        Raises
+        ------
+        InputError
+            A formula is not finite somewhere on the surface, or all of it is one line.
+        """
+        x, y, z = (parse(text, UV) for text in (self.x, self.y, self.z))
+        columns, rows = self.resolution
+        s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+        points = np.stack([f.value(self._u(s), self._v(t)) for f in (x, y, z)], axis=-1)
+        self._refuse_holes(points, s, t)
+        column_is_point, row_is_point, vertex = _welded(points)
+        at_s, at_t = _beside_poles(s, t, column_is_point, row_is_point)
+        normals = parametric_normal(x, y, z, self._u(at_s).ravel(), self._v(at_t).ravel())
+        uvs = np.stack([s + (at_s - s) * row_is_point[:, None], t + (at_t - t) * column_is_point], axis=-1)
+        lattice = Lattice(points, _directions(normals).reshape(points.shape), uvs, vertex)
+        mesh = woven(turned(lattice) if self.flip else lattice)
+        if not mesh.polygon_count:
+            raise InputError("parametric: the surface shrinks to a line or a point; check x, y and z")
+        return mesh
+
+    def _u(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """u at shares of its range; both ends exactly."""
+        return (1 - s) * self.u[0] + s * self.u[1]
+
+    def _v(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (1 - t) * self.v[0] + t * self.v[1]
+
+    def _refuse_holes(
+        self, points: NDArray[np.float64], s: NDArray[np.float64], t: NDArray[np.float64]
+    ) -> None:
+        bad = ~np.isfinite(points).all(axis=-1)
+        if bad.any():
+            u, v = float(self._u(s[bad][0])), float(self._v(t[bad][0]))
+            name = "xyz"[int(np.argmin(np.isfinite(points[bad][0])))]
+            raise InputError(f"parametric: {name} is not finite at u = {u:g}, v = {v:g}; narrow the ranges")
+
+
+def _welded(
+    points: NDArray[np.float64],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+    """Which columns and rows are single points, and the (R, C) vertex numbers with seams welded."""
+    rows, columns = (count - 1 for count in points.shape[:2])
+    reach = WELD * np.ptp(points.reshape(-1, 3), axis=0).max()
+
+    def same(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(a - b).max(axis=-1) <= reach)
+
+    column_is_point = np.all(same(points, points[:1]), axis=0)
+    row_is_point = np.all(same(points, points[:, :1]), axis=1)
+    across = (
+        around(columns) if columns > 2 and same(points[:, 0], points[:, -1]).all() else np.arange(columns + 1)
+    )
+    up = around(rows) if rows > 2 and same(points[0], points[-1]).all() else np.arange(rows + 1)
+    return column_is_point, row_is_point, vertex_numbers(up, across, row_is_point, column_is_point)
+
+
+def _beside_poles(
+    s: NDArray[np.float64],
+    t: NDArray[np.float64],
+    column_is_point: NDArray[np.bool_],
+    row_is_point: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where normals are read: at the nodes; at a border that is a point, just inside, amid its triangle.
+
+    The triangle keeps the node on its right at the bottom and on the left, the other one at the top and on
+    the right (`woven`).
+    """
+    s, t = s.copy(), t.copy()
+    rows, columns = (count - 1 for count in s.shape)
+    for row, half, inwards in ((0, -0.5, INWARDS), (-1, 0.5, -INWARDS)):
+        if row_is_point[row]:
+            s[row] += half / columns
+            t[row] += inwards
+    for column, half, inwards in ((0, 0.5, INWARDS), (-1, -0.5, -INWARDS)):
+        if column_is_point[column]:
+            t[:, column] += half / rows
+            s[:, column] += inwards
+    return np.clip(s, 0, 1), np.clip(t, 0, 1)
+
+
+def _directions(normals: Vectors) -> Vectors:
+    """The normals made unit; zero where the derivatives give none."""
+    size = length(normals)
+    finite = np.isfinite(size)
+    some = finite & (size > FAINT * size.max(where=finite, initial=0.0))
+    return unit(np.where(some[:, None], normals, 0.0))

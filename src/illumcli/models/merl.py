@@ -1,0 +1,162 @@
+"""MERL: a measured isotropic BRDF, looked up in the table of a `.binary` file.
+
+response = n_l * f_r(theta_h, theta_d, phi_d)
+
+The angles are Rusinkiewicz's: theta_h between normal and half vector, theta_d and phi_d those of the light
+seen from the half vector. Swapping light and eye turns phi_d by pi, and the table keeps only half a turn:
+reciprocal. It has 90 x 90 x 180 cells, finer in theta_h near the highlight, in three planes R, G, B of 64-bit
+numbers to be scaled by 1, 1.15 and 1.66 over 1500. A negative number means no measurement; there is no light
+there. As measured, a BRDF times the cosine; whether it conserves energy is up to the measurement.
+
+The file is opened on first evaluation, mapped and not read whole, and shared by all threads.
+
+References
+----------
+Matusik, W., Pfister, H., Brand, M., McMillan, L. (2003). A data-driven reflectance model. ACM ToG 22(3).
+Rusinkiewicz, S. (1998). A new change of variables for efficient BRDF representation. EGWR '98.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Lanes, Vectors, dot
+from illumcli.errors import InputError
+from illumcli.models._base import IlluminationModel, Lobe
+
+SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
+CELLS = 90 * 90 * 180
+SCALE = (1 / 1500, 1.15 / 1500, 1.66 / 1500)
+
+
+def rusinkiewicz(
+    nxs: Vectors, n_s: Lanes, n: Vectors, l: Vectors, v: Vectors, s_s: Lanes
+) -> tuple[Lanes, Lanes, Lanes]:
+    """theta_h, theta_d and phi_d in radians, phi_d within -pi..pi and 0 where it is undefined.
+
+    With d = l - v and the frame whose X and Y point from the half vector away from the normal and across,
+    l.Y = (n x s).d / (2 |n x s|) and l.X = -(n.d) |s| / (2 |n x s|): no azimuth of h is formed.
+    """
+    d, size = l - v, np.sqrt(s_s)
+    theta_h = np.arctan2(np.sqrt(dot(nxs, nxs)), n_s)
+    theta_d = np.arctan2(np.sqrt(dot(d, d)), size)
+    return theta_h, theta_d, np.arctan2(dot(nxs, d), -dot(n, d) * size)
+
+
+def merl_coordinates(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any]:
+    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d."""
+    half_turn = phi_d + np.pi * (phi_d < 0)
+    return (
+        np.sqrt(theta_h * (2 / np.pi)) * 90,
+        theta_d * (2 / np.pi) * 90,
+        half_turn * (180 / np.pi) % 180,
+    )
+
+
+def merl_index(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any, Any]:
+    """Cell numbers along theta_h, theta_d, phi_d, and in the flat table."""
+    cells: list[Any] = [
+        np.clip(np.asarray(x, np.int64), 0, count - 1)
+        for x, count in zip(merl_coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
+    ]
+    return *cells, (cells[0] * SHAPE[1] + cells[1]) * SHAPE[2] + cells[2]
+
+
+class Merl(IlluminationModel):
+    model: Literal["merl"] = "merl"
+    file: str
+    """Path of the measurement, from the scene's folder."""
+    lookup: Literal["nearest", "linear"] = "nearest"
+    """The cell itself, or the eight around weighed by distance, without those that hold no measurement."""
+
+    scales: ClassVar[dict[str, tuple[str, ...]]] = {}
+    reciprocal: ClassVar[bool] = True
+    physical: ClassVar[bool] = True
+
+    def specular_lobe(
+        self,
+        n_l: Lanes,
+        n_s: Lanes,
+        s_s: Lanes,
+        nxs: Vectors,
+        n: Vectors,
+        l: Vectors,
+        v: Vectors,
+    ) -> Vectors:
+        """(N, 3) n_l times the measurement."""
+        angles = rusinkiewicz(nxs, n_s, n, l, v, s_s)
+        table = measurement(self.file)
+        look = _linear if self.lookup == "linear" else _nearest
+        values = look(table, *angles)
+        return (values * n_l).T
+
+    def lobes(self) -> dict[str, Lobe]:
+        """The whole measurement is one lobe, `specular`."""
+        return {"specular": self.specular_lobe}
+
+
+def measurement(path: str) -> NDArray[np.float64]:
+    """(3, 1458000) the planes of a MERL file, mapped read-only.
+
+    Raises
+    ------
+    InputError
+        The file cannot be opened, or is not a MERL measurement.
+    """
+    try:
+        facts = os.stat(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot read the measurement: {error.strerror}") from None
+    return _mapped(path, facts.st_mtime_ns, facts.st_size)
+
+
+@lru_cache(maxsize=64)
+def _mapped(path: str, modified: int, size: int) -> NDArray[np.float64]:
+    expected = 12 + 3 * CELLS * 8
+    with open(path, "rb") as file:
+        shape = tuple(np.frombuffer(file.read(12).ljust(12, b"\0"), "<i4").tolist())
+    if shape != SHAPE:
+        raise InputError(
+            f"{path}: must begin with the sizes 90, 90, 180, has {', '.join(map(str, shape))}; "
+            "name a .binary file of the MERL database"
+        )
+    if size != expected:
+        raise InputError(f"{path}: must have {expected} bytes, has {size}; fetch it again, it is not whole")
+    return np.memmap(path, "<f8", "r", offset=12, shape=(3, CELLS))
+
+
+def _nearest(table: NDArray[np.float64], *angles: Lanes) -> NDArray[Any]:
+    """(3, N) the cells that the angles fall in; 0 without measurement."""
+    flat = merl_index(*angles)[3]
+    return _scaled(np.maximum(table.take(flat, axis=1), 0), angles[0].dtype)
+
+
+def _linear(table: NDArray[np.float64], *angles: Lanes) -> NDArray[Any]:
+    """(3, N) between the centres of cells, phi_d going round; 0 without any measurement nearby."""
+    low, part = [], []
+    for x in merl_coordinates(*angles):
+        below = np.floor(x - 0.5)
+        low.append(below.astype(np.int64))
+        part.append(x - 0.5 - below)
+    total = np.zeros((3, len(low[0])))
+    weights = np.zeros_like(total)
+    for corner in np.ndindex(2, 2, 2):
+        i, j, k = (each + step for each, step in zip(low, corner, strict=True))
+        flat = (np.clip(i, 0, 89) * 90 + np.clip(j, 0, 89)) * 180 + k % 180
+        weight = np.ones(len(flat))
+        for fraction, step in zip(part, corner, strict=True):
+            weight = weight * (fraction if step else 1 - fraction)
+        values = table.take(flat, axis=1)
+        known = weight * (values >= 0)
+        total += known * values
+        weights += known
+    return _scaled(total / np.maximum(weights, np.finfo(np.float64).tiny), angles[0].dtype)
+
+
+def _scaled(values: NDArray[np.float64], dtype: Any) -> NDArray[Any]:
+    return (values * np.array(SCALE)[:, None]).astype(dtype)

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+import lzma
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ import pytest
 from illumcli.geometry.formula import FUNCTIONS, MAX_LENGTH, implicit_normal, parametric_normal, parse
 
 XYZ = ("x", "y", "z")
-VECTORS = Path(__file__).parents[3] / "shared/reference/vectors.json"
 
 IMPLICIT = {
     "plane": "{a}*x + {b}*y + {c}*z",
@@ -27,9 +27,8 @@ PARAMETRIC = {
 
 
 def cases(model):
-    if not VECTORS.exists():
-        return [pytest.param(None, marks=pytest.mark.skip(reason="the reference vectors are not here"))]
-    return [pytest.param(c, id=c["id"]) for c in json.loads(VECTORS.read_text()) if c["model"] == model]
+    text = lzma.decompress((files("illumcli") / "data/vectors.json.xz").read_bytes())
+    return [pytest.param(c, id=c["id"]) for c in json.loads(text) if c["model"] == model]
 
 
 def passes(value, case):

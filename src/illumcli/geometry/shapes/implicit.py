@@ -127,7 +127,7 @@ def _net(f: Formula, axes: list[NDArray[np.float64]]) -> tuple[Vectors, NDArray[
         around[a] = i[:, None]
         around[b] = j[:, None] + np.array([0, 1, 1, 0])
         around[c] = k[:, None] + np.array([0, 0, 1, 1])
-        cell = np.ravel_multi_index(tuple(around), shape)
+        cell = np.asarray(np.ravel_multi_index(tuple(around), shape))
         cells.append(np.where(grows, cell, cell[:, ::-1]))
     return np.concatenate(crossings), np.concatenate(cells)
 

@@ -100,8 +100,11 @@ class Merl(IlluminationModel):
         return {"specular": self.specular_lobe}
 
 
-def measurement(path: str) -> NDArray[np.float64]:
-    """(3, 1458000) the planes of a MERL file, mapped read-only.
+def measurement(path: str) -> NDArray[np.uint32]:
+    """(3, 1458000, 2) the planes of a MERL file, mapped read-only, each number as its two halves.
+
+    The numbers stand 12 bytes into the file, where a 64-bit number is not aligned: numpy would copy all of
+    them for every look-up.
 
     Raises
     ------
@@ -116,7 +119,7 @@ def measurement(path: str) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=64)
-def _mapped(path: str, modified: int, size: int) -> NDArray[np.float64]:
+def _mapped(path: str, modified: int, size: int) -> NDArray[np.uint32]:
     expected = 12 + 3 * CELLS * 8
     with open(path, "rb") as file:
         shape = tuple(np.frombuffer(file.read(12).ljust(12, b"\0"), "<i4").tolist())
@@ -127,16 +130,22 @@ def _mapped(path: str, modified: int, size: int) -> NDArray[np.float64]:
         )
     if size != expected:
         raise InputError(f"{path}: must have {expected} bytes, has {size}; fetch it again, it is not whole")
-    return np.memmap(path, "<f8", "r", offset=12, shape=(3, CELLS))
+    return np.memmap(path, "<u4", "r", offset=12, shape=(3, CELLS, 2))
 
 
-def _nearest(table: NDArray[np.float64], *angles: Lanes) -> NDArray[Any]:
+def _cells(table: NDArray[np.uint32], flat: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(3, N) the numbers of these cells."""
+    halves = np.asarray(table).take(flat, axis=1)
+    return halves.view("<f8")[..., 0].astype(np.float64, copy=False)
+
+
+def _nearest(table: NDArray[np.uint32], *angles: Lanes) -> NDArray[Any]:
     """(3, N) the cells that the angles fall in; 0 without measurement."""
     flat = merl_index(*angles)[3]
-    return _scaled(np.maximum(table.take(flat, axis=1), 0), angles[0].dtype)
+    return _scaled(np.maximum(_cells(table, flat), 0), angles[0].dtype)
 
 
-def _linear(table: NDArray[np.float64], *angles: Lanes) -> NDArray[Any]:
+def _linear(table: NDArray[np.uint32], *angles: Lanes) -> NDArray[Any]:
     """(3, N) between the centres of cells, phi_d going round; 0 without any measurement nearby."""
     low, part = [], []
     for x in merl_coordinates(*angles):
@@ -151,7 +160,7 @@ def _linear(table: NDArray[np.float64], *angles: Lanes) -> NDArray[Any]:
         weight = np.ones(len(flat))
         for fraction, step in zip(part, corner, strict=True):
             weight = weight * (fraction if step else 1 - fraction)
-        values = table.take(flat, axis=1)
+        values = _cells(table, flat)
         known = weight * (values >= 0)
         total += known * values
         weights += known

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeAlias
 
@@ -215,23 +215,14 @@ class _Composer:
             self.anchors[event.anchor] = None
         if event.tag is not None and event.tag != "!":
             self.problem(mark, path, f"the tag {short(event.tag)} is not read; write the plain value")
-        value: Scalar | list[Node] | dict[str, Node]
-        parts: list[Node]
         if isinstance(event, yaml.ScalarEvent):
-            value, parts = self.scalar(event, mark, path), []
+            node = Node(self.scalar(event, mark, path), self.place(event.start_mark))
         elif isinstance(event, yaml.SequenceStartEvent):
-            value = parts = self.sequence(events, path, depth)
+            parts = self.sequence(events, path, depth)
+            node = _branch(parts, parts, self.place(event.start_mark))
         else:
-            value = self.mapping(events, path, depth)
-            parts = list(value.values())
-        size = 1 + sum(part.size for part in parts)
-        node = Node(
-            value,
-            self.place(event.start_mark),
-            None,
-            size,
-            1 + max((part.depth for part in parts), default=0),
-        )
+            entries = self.mapping(events, path, depth)
+            node = _branch(entries, entries.values(), self.place(event.start_mark))
         if event.anchor is not None:
             self.anchors[event.anchor] = node
         return node
@@ -308,9 +299,7 @@ class _Composer:
         if not whole and not _FLOAT.fullmatch(text):
             return text
         if len(text) > MAX_DIGITS:
-            self.problem(
-                event.start_mark, path, f"a number of {len(text)} digits; at most {MAX_DIGITS} count"
-            )
+            self.problem(mark, path, f"a number of {len(text)} digits; at most {MAX_DIGITS} count")
             return text
         if whole:
             base = {"0o": 8, "0x": 16}.get(text[:2], 10)
@@ -320,6 +309,14 @@ class _Composer:
             self.problem(mark, path, f"must be a finite number, is {text}")
             return text
         return number
+
+
+def _branch(value: list[Node] | dict[str, Node], parts: Iterable[Node], place: Place) -> Node:
+    size, depth = 1, 0
+    for part in parts:
+        size += part.size
+        depth = max(depth, part.depth)
+    return Node(value, place, None, size, depth + 1)
 
 
 def _syntax(error: yaml.MarkedYAMLError) -> str:

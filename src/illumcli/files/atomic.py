@@ -1,0 +1,149 @@
+"""Files that appear whole or not at all: written beside their place, forced to disk, renamed.
+
+A rename is atomic; the two fsyncs keep a crash of the machine from leaving an empty file behind the new name
+(Pillai et al. 2014, All file systems are not created equal, OSDI '14).
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from illumcli.errors import OutputError
+
+_WAYS_OUT = {
+    errno.ENOSPC: "free some space or choose another folder",
+    errno.EDQUOT: "free some of your quota or choose another folder",
+    errno.EFBIG: "raise the limit on file sizes (ulimit -f)",
+    errno.EACCES: "choose a folder you may write to",
+    errno.EPERM: "choose a folder you may write to",
+    errno.EROFS: "choose a folder you may write to",
+    errno.ENOTDIR: "part of the path is a file; choose another folder",
+    errno.EEXIST: "part of the path is a file; choose another folder",
+    errno.ENAMETOOLONG: "shorten the name",
+}
+
+
+class Part:
+    """A file in the making: write to `path`, then `commit`; `discard` leaves no trace.
+
+    As a context manager it commits at the end of the block and discards on any exception, interrupts
+    included. Missing parent folders are made. Parts that killed processes of this machine left behind for the
+    same target are removed first.
+
+    Raises
+    ------
+    OutputError
+        What the operating system refuses, here, in `commit`, or in the block while it writes to `path`.
+    """
+
+    path: Path  # to write to; exists and is empty
+    target: Path  # what `path` will be called
+
+    def __init__(self, target: str | os.PathLike[str]) -> None:
+        self._named = os.fspath(target)
+        self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
+        folder, name = self.target.parent, self.target.name
+        self.path = folder / f".{name}.{_host()}.{os.getpid()}.{secrets.token_hex(4)}.part"
+        with _refusals(self._named):
+            if self.target.exists() and not self.target.is_file():
+                raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
+            folder.mkdir(parents=True, exist_ok=True)
+            _remove_left_over(folder, name)
+            os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+
+    def commit(self) -> None:
+        """Force the part to disk and give it its name; the name's old file is replaced."""
+        try:
+            with _refusals(self._named):
+                _force(self.path)
+                os.replace(self.path, self.target)
+        except BaseException:
+            self.discard()
+            raise
+        with suppress(OSError):  # some file systems cannot; the file is whole by now
+            _force(self.target.parent)
+
+    def discard(self) -> None:
+        """Remove what was written so far; nothing happens after `commit`."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.commit()
+            return
+        self.discard()
+        if isinstance(error, OSError) and error.filename in (None, os.fspath(self.path)):
+            raise refused(self._named, error) from error
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write `data` to `path`, whole or not at all."""
+    with Part(path) as part:
+        part.path.write_bytes(data)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text` as UTF-8 to `path`, line ends as they are, whole or not at all."""
+    write_bytes(path, text.encode())
+
+
+def refused(place: str, error: OSError) -> OutputError:
+    """The operating system's refusal to write `place`: fact and way out."""
+    way = _WAYS_OUT.get(error.errno or 0, "choose another place for the output")
+    return OutputError(f"{place}: cannot be written: {error.strerror or error}; {way}")
+
+
+@contextmanager
+def _refusals(place: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise refused(place, error) from error
+
+
+def _force(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _host() -> str:
+    """The machine's name as part of a file name: a process number means nothing on another machine."""
+    return re.sub(r"\W", "", socket.gethostname()) or "host"
+
+
+def _remove_left_over(folder: Path, name: str) -> None:
+    """Remove parts of `name` whose process on this machine is gone."""
+    ours = re.compile(rf"\.{re.escape(name)}\.{_host()}\.(\d+)\.[0-9a-f]{{8}}\.part")
+    for entry in os.scandir(folder):
+        match = ours.fullmatch(entry.name)
+        if match and not _alive(int(match[1])):
+            with suppress(FileNotFoundError):  # another process was faster
+                os.unlink(entry.path)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # somebody else's
+        pass
+    return True

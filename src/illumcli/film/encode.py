@@ -1,0 +1,86 @@
+"""Linear light to the integers of a picture file: exposure, sRGB transfer curve, rounding."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.pixels import from_srgb, refuse_nonfinite, to_srgb
+
+NAMES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+
+
+def picture(
+    band: NDArray[np.float32], exposure: float = 0.0, bits: int = 8, place: str = "picture", y0: int = 0
+) -> NDArray[np.unsignedinteger[Any]]:
+    """(h, W, C) uint8, or uint16 for 16 bits: `band` as a PNG stores it.
+
+    Light is exposed, clipped to 0..1, taken through the sRGB curve and rounded to the nearest step. Alpha is
+    rounded alone, and colour divided by it: a PNG keeps colour and coverage apart.
+
+    Parameters
+    ----------
+    band : (h, W, C) float32
+        Linear; C is 1 (Y), 2 (Y A), 3 (R G B) or 4 (R G B A), premultiplied where there is an alpha.
+    exposure : float
+        Light is multiplied by 2**exposure [stops].
+    place, y0
+        Name of the picture and number of the band's first row, for the error.
+
+    Raises
+    ------
+    IllumError
+        NaN or Inf in `band`.
+    """
+    names = NAMES[band.shape[-1]]
+    refuse_nonfinite(band, names, place, y0)
+    encode = srgb8 if bits == 8 else srgb16
+    if names[-1] != "A":
+        return encode(exposed(band, exposure))
+    alpha = np.clip(band[..., -1:], 0, 1)
+    color = encode(exposed(unpremultiplied(band[..., :-1], alpha), exposure))
+    top = np.iinfo(color.dtype).max
+    return np.concatenate([color, np.rint(alpha * top).astype(color.dtype)], axis=-1)
+
+
+def exposed(linear: NDArray[np.float32], stops: float) -> NDArray[np.float32]:
+    """`linear` times 2**stops; exact for whole stops, infinite beyond float32."""
+    with np.errstate(over="ignore"):
+        return linear if stops == 0 else linear * np.float32(2.0**stops)
+
+
+def unpremultiplied(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.float32]:
+    """`color` / `alpha`, the colour a covered part shows; as it is where nothing is covered."""
+    with np.errstate(over="ignore"):
+        return np.divide(color, alpha, out=color.copy(), where=alpha > 0)
+
+
+def srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """round(255 sRGB(linear)), exactly, clipped to 0..255; the same on every machine.
+
+    The upper half of a float32 holds its sign, exponent and 7 bits of its fraction: a table of 65536 entries
+    gives the step at the lower end of that interval. No interval holds more than one border between steps,
+    so one comparison with the next border decides.
+    """
+    steps, borders = _tables()
+    step = steps[np.ascontiguousarray(linear, np.float32).view(np.uint32) >> 16]
+    return step + (linear >= borders[step])
+
+
+def srgb16(linear: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """round(65535 sRGB(linear)), clipped to 0..65535."""
+    return np.rint(to_srgb(np.clip(linear, 0, 1).astype(np.float64)) * 65535).astype(np.uint16)
+
+
+@cache
+def _tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """(65536,) step at the lower end of each interval; (256,) the smallest float32 of each next step."""
+    exact = from_srgb((np.arange(1, 256) - 0.5) / 255)
+    near = exact.astype(np.float32)
+    borders = np.where(near < exact, np.nextafter(near, np.float32(np.inf)), near)
+    ends = (np.arange(65536, dtype=np.uint32) << 16).view(np.float32)
+    steps = np.searchsorted(borders, np.fmax(ends, 0), side="right").astype(np.uint8)
+    return steps, np.append(borders, np.float32(np.nan))  # after 255 comes nothing

@@ -1,0 +1,447 @@
+"""Images on disk, through OpenImageIO: written by bands and read back, layers, metadata, textures, FLIP.
+
+OpenImageIO says True for files that a full disk cut short, so an image counts as written only when every
+pixel, read back from the part file, hashes to what was handed over. Only EXR and PNG are written: the JPEG
+and TIFF libraries may end the process on a full disk. A process must not fork once this module has written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self, TypeAlias
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError, OutputError
+from illumcli.files.atomic import Part
+from illumcli.pixels import from_srgb, refuse_nonfinite
+
+LARGEST_HALF = 65504.0
+READ_ROWS = 64  # rows held at once while reading back
+ChannelType: TypeAlias = Literal["half", "float", "uint8", "uint16"]
+Metadata: TypeAlias = Mapping[str, Any]
+
+_DTYPES = {"half": np.float16, "float": np.float32, "uint8": np.uint8, "uint16": np.uint16}
+_KINDS = {".exr": ("openexr", {"half", "float"}), ".png": ("png", {"uint8", "uint16"})}
+_HINTS: dict[str, Metadata] = {
+    # measured on a render of 12 layers: zip at level 1 is as small as at 4 and as fast as none
+    ".exr": {"compression": "zip:1", "oiio:ColorSpace": "lin_rec709_scene", "DateTime": ""},
+    ".png": {
+        "png:compressionLevel": 1,
+        "png:filter": 16,  # differences to the left pixel
+        "oiio:ColorSpace": "srgb_rec709_scene",
+        "oiio:UnassociatedAlpha": 1,  # values go to the file as they are
+        "DateTime": "",  # no time of day: equal renders are equal files
+    },
+}
+_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+
+
+def channel_types(names: Sequence[str], colour: Literal["half", "float"] = "half") -> dict[str, ChannelType]:
+    """Channel name -> its type in an EXR: `colour` for R G B A of any layer, float for all other data."""
+    return {name: colour if name.rpartition(".")[2] in tuple("RGBA") else "float" for name in names}
+
+
+def layers(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Layer -> its channels. `P.X` is of layer `P`; R G B A Y without a layer are `beauty`; `Z` is `Z`."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name in names:
+        layer = name.rpartition(".")[0] or ("beauty" if name in tuple("RGBAY") else name)
+        found[layer] = (*found.get(layer, ()), name)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """An image that is on disk under its name."""
+
+    path: Path
+    bytes: int
+    clamped: int  # values beyond the largest half, 65504, written as +-65504
+    pixels: str  # BLAKE2b-256 of every value as stored, row by row, channels in the order given
+
+
+class ImageWriter:
+    """Writes one image from top to bottom, holding no more of it than the band at hand.
+
+    Parameters
+    ----------
+    path
+        Ends in `.exr` or `.png`.
+    channels : mapping of name to type, in the order of the bands' last axis
+        EXR: half or float, any names. PNG: uint8 or uint16, one type, named Y, Y A, R G B or R G B A.
+    metadata : mapping of name to number, text or tuple of them
+        EXR keeps integers of 32 bits, floats in single precision, texts and tuples of one kind; larger
+        integers become text. PNG keeps text alone.
+
+    Raises
+    ------
+    InputError
+        Another suffix.
+    OutputError
+        Here, in `write_band` and in `close`: the file cannot be written. No part of it stays behind.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        width: int,
+        height: int,
+        channels: Mapping[str, ChannelType],
+        metadata: Metadata | None = None,
+    ) -> None:
+        self._named = os.fspath(path)
+        suffix = Path(path).suffix.lower()
+        if suffix not in _KINDS:
+            raise InputError(f"{self._named}: images are written as .exr or .png; choose one of these")
+        self._format, allowed = _KINDS[suffix]
+        if not set(channels.values()) <= allowed or min(width, height) < 1:
+            raise ValueError(f"{self._named}: no {width} x {height} {self._format} image of {dict(channels)}")
+        self._width, self._height = width, height
+        self._channels = dict(channels)
+        self._halves = [c for c, kind in enumerate(self._channels.values()) if kind == "half"]
+        kinds = set(self._channels.values())
+        self._dtype: Any = _DTYPES[kinds.pop()] if len(kinds) == 1 else np.float32  # as written and read back
+        self._rows = 0
+        self._clamped = 0
+        self._hash = hashlib.blake2b(digest_size=32)
+        self._written: Written | None = None
+        output = oiio.ImageOutput.create(self._format)
+        if output is None:
+            raise OutputError(f"{self._named}: {oiio.geterror()}; install one that writes {suffix}")
+        self._output = output
+        self._part = Part(path)
+        try:
+            spec = self._spec({**_HINTS[suffix], **(metadata or {})})
+            self._check(self._output.open(os.fspath(self._part.path), spec))
+        except BaseException:
+            self.discard()
+            raise
+
+    def write_band(self, y0: int, band: NDArray[Any]) -> None:
+        """Write the rows `y0` to ``y0 + h``; bands come in order and without gaps.
+
+        Parameters
+        ----------
+        band : (h, W, C)
+            float32 for EXR; the channels' own integers for PNG (`film.encode.picture` makes them).
+
+        Raises
+        ------
+        IllumError
+            NaN or Inf in the band; which channel, how many, where.
+        """
+        y1 = y0 + len(band)
+        if y0 != self._rows or y1 > self._height or band.shape[1:] != (self._width, len(self._channels)):
+            raise ValueError(f"{self._named}: a band {band.shape} at row {y0}, after {self._rows} rows")
+        if band.dtype.kind == "f":
+            refuse_nonfinite(band, list(self._channels), self._named, y0)
+        band = self._stored(band)
+        self._hash.update(band.data)
+        self._check(self._output.write_scanlines(y0, y1, 0, band))
+        self._rows = y1
+
+    def close(self) -> Written:
+        """Finish the file, read it back, give it its name; what was written."""
+        if self._written is not None:
+            return self._written
+        try:
+            if self._rows != self._height:
+                raise ValueError(f"{self._named}: closed after {self._rows} of {self._height} rows")
+            self._check(self._output.close())
+            self._compare()
+            size = self._part.path.stat().st_size
+            self._part.commit()
+        except BaseException:
+            self.discard()
+            raise
+        self._written = Written(Path(self._named), size, self._clamped, self._hash.hexdigest())
+        return self._written
+
+    def discard(self) -> None:
+        """Remove what was written so far."""
+        self._output.close()
+        self._part.discard()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.discard()
+
+    def _spec(self, metadata: Metadata) -> oiio.ImageSpec:
+        kinds = [oiio.TypeDesc(kind) for kind in self._channels.values()]
+        widest = max(kinds, key=lambda kind: kind.size())
+        spec = oiio.ImageSpec(self._width, self._height, len(kinds), widest)
+        spec.channelnames = tuple(self._channels)
+        if len(set(self._channels.values())) > 1:
+            spec.channelformats = tuple(kinds)
+        for name, value in metadata.items():
+            _set(spec, name, value, text_only=self._format == "png")
+        return spec
+
+    def _stored(self, band: NDArray[Any]) -> NDArray[Any]:
+        """The band with the values the file will hold, rows contiguous."""
+        if not self._halves:
+            if band.dtype != self._dtype:
+                raise ValueError(f"{self._named}: a band of {band.dtype}, not {self._dtype.__name__}")
+            return np.ascontiguousarray(band)
+        colour = band[..., self._halves]
+        beyond = np.abs(colour) > LARGEST_HALF
+        if beyond.any():
+            self._clamped += int(np.count_nonzero(beyond))
+            colour = np.clip(colour, -LARGEST_HALF, LARGEST_HALF)
+        if self._dtype is np.float16:
+            return np.ascontiguousarray(colour, np.float16)
+        stored = np.array(band, np.float32, order="C")
+        stored[..., self._halves] = colour.astype(np.float16)
+        return stored
+
+    def _check(self, success: bool) -> None:
+        """Neither the answer nor the message alone can be trusted to tell of a failure."""
+        message = self._output.geterror()
+        if not success or message:
+            self.discard()
+            raise self._failure(message or "no reason given")
+
+    def _failure(self, fact: str) -> OutputError:
+        fact = " ".join(fact.split())
+        return OutputError(f"{self._named}: cannot be written: {fact}; free space or change the folder")
+
+    def _compare(self) -> None:
+        """Read the part file in bands and compare its hash with that of what was handed over."""
+        found = hashlib.blake2b(digest_size=32)
+        try:
+            with _Source(self._part.path) as source:
+                order = source.order(tuple(self._channels))
+                for band in source.bands(self._dtype):
+                    found.update(np.ascontiguousarray(band if order is None else band[..., order]).data)
+        except InputError as error:
+            raise self._failure(f"what was written cannot be read back ({error})") from error
+        if found.digest() != self._hash.digest():
+            raise self._failure("what was read back differs from what was written")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """An image as its file has it."""
+
+    width: int
+    height: int
+    channels: dict[str, NDArray[np.float32]]  # by name (`R`, `Z`, `P.X`), (H, W); integers as 0..1
+    encoded: bool  # integers, which stand for display values; else linear
+    metadata: dict[str, Any]
+
+
+def read_image(path: str | os.PathLike[str]) -> Image:
+    """The image in a file of any format OpenImageIO reads.
+
+    Raises
+    ------
+    InputError
+        No such file, no image, damaged, cut short, or of several parts.
+    """
+    with _Source(Path(path)) as source:
+        height, width = source.height, source.width
+        planes = np.empty((len(source.names), height, width), np.float32)
+        y = 0
+        for band in source.bands(np.float32):
+            planes[:, y : y + len(band)] = np.moveaxis(band, -1, 0)
+            y += len(band)
+        channels = dict(zip(source.names, planes, strict=True))
+        return Image(width, height, channels, source.encoded, source.metadata())
+
+
+def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes in the header of an image, by name; no pixel is read.
+
+    Raises
+    ------
+    InputError
+        No such file, or no image.
+    """
+    with _Source(Path(path)) as source:
+        return source.metadata()
+
+
+def read_texture(path: str | os.PathLike[str], space: Literal["srgb", "linear"]) -> NDArray[np.float32]:
+    """(H, W, C) float32, linear; the first row is the top of the image.
+
+    Parameters
+    ----------
+    space
+        `srgb`: decoded by the sRGB curve, alpha excepted. `linear`: values as stored, integers as 0..1.
+
+    Raises
+    ------
+    InputError
+        As `read_image`; NaN or Inf.
+    """
+    with _Source(Path(path)) as source:
+        colours = [c for c, name in enumerate(source.names) if name.rpartition(".")[2] != "A"]
+        small = source.dtype == np.uint8
+        texels = np.concatenate(list(source.bands(np.uint8 if small else np.float32)))
+    steps = np.arange(256) / 255
+    if small:
+        straight, curved = steps.astype(np.float32), from_srgb(steps).astype(np.float32)
+        linear = straight[texels]
+        if space == "srgb":
+            linear[..., colours] = curved[texels[..., colours]]
+        return linear
+    if not np.isfinite(texels).all():
+        count = int(np.count_nonzero(~np.isfinite(texels).all(axis=-1)))
+        raise InputError(f"{os.fspath(path)}: {count} texels are NaN or infinite; mend the texture")
+    if space == "srgb":
+        texels[..., colours] = from_srgb(texels[..., colours])
+    return texels
+
+
+def flip(
+    reference: NDArray[np.float32], test: NDArray[np.float32], encoded: bool = False
+) -> tuple[float, NDArray[np.float32]]:
+    """Mean FLIP error and its (H, W) map: 0 where an observer sees no difference, up to 1.
+
+    Andersson et al. (2020), FLIP: A difference evaluator for alternating images; for linear light the
+    largest over exposures as in Andersson et al. (2021), Visualizing errors in rendered high dynamic range
+    images. The exposures are those of a median of 0.18 and a maximum of 2, whatever the image, so that
+    figures of different images compare. The observer sits 0.7 m from a 0.7 m wide screen of 3840 pixels.
+
+    Parameters
+    ----------
+    reference, test : (H, W, 3) float32, finite
+        Linear light, or display values (sRGB, 0..1) when `encoded`.
+    """
+    a, b = (_buffer(from_srgb(np.clip(each, 0, 1)) if encoded else each) for each in (reference, test))
+    found = oiio.ImageBufAlgo.FLIP_diff(a, b, hdr=0 if encoded else 1)
+    if found.has_error:
+        raise RuntimeError(found.geterror())
+    errors = np.asarray(found.get_pixels(oiio.FLOAT))[..., 0]
+    return float(errors.mean(dtype=np.float64)), errors
+
+
+def _buffer(pixels: NDArray[Any]) -> oiio.ImageBuf:
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, oiio.FLOAT)
+    spec.attribute("oiio:ColorSpace", "lin_rec709_scene")
+    buffer = oiio.ImageBuf(spec)
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels, np.float32))
+    return buffer
+
+
+class _Source:
+    """An open image file; every refusal is an InputError that names it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        if not path.is_file():
+            raise InputError(f"{path}: no such file" if not path.exists() else f"{path}: not a file")
+        raw = oiio.ImageSpec()
+        raw.attribute("oiio:UnassociatedAlpha", 1)  # values as the file has them
+        opened = oiio.ImageInput.open(os.fspath(path), raw)
+        if opened is None:
+            raise self._refusal(oiio.geterror())
+        self._input, self._spec = opened, opened.spec()
+        self._format = opened.format_name()
+        if self._format == "openexr" and self._spec.get_int_attribute("oiio:subimages", 1) > 1:
+            raise InputError(f"{path}: an EXR of several parts; join them (oiiotool IN --siappendall -o OUT)")
+        if self._format == "png" and not _ends_with(path, _PNG_END):
+            raise self._refusal("its end is missing")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._input.close()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._spec.channelnames)
+
+    @property
+    def width(self) -> int:
+        return int(self._spec.width)
+
+    @property
+    def height(self) -> int:
+        return int(self._spec.height)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The file's own type, the widest of its channels."""
+        name = str(self._spec.format)
+        return np.dtype({"half": "float16", "float": "float32"}.get(name, name))
+
+    @property
+    def encoded(self) -> bool:
+        return self.dtype.kind == "u" and self._format != "openexr"
+
+    def order(self, names: tuple[str, ...]) -> list[int] | None:
+        """Where each of `names` is among the file's channels; None where the file has that very order."""
+        if sorted(names) != sorted(self.names):
+            raise self._refusal(f"it holds the channels {self.names}")
+        return None if names == self.names else [self.names.index(name) for name in names]
+
+    def bands(self, dtype: Any) -> Iterator[NDArray[Any]]:
+        """(h, W, C) `dtype`, the whole image from the top."""
+        spec = self._spec
+        kind = {np.float16: oiio.HALF, np.uint8: oiio.UINT8, np.uint16: oiio.UINT16}.get(dtype, oiio.FLOAT)
+        top, bottom, channels = spec.y, spec.y + spec.height, (0, spec.nchannels)
+        rows = spec.tile_height or READ_ROWS
+        for y0 in range(top, bottom, rows):
+            y1 = min(y0 + rows, bottom)
+            if spec.tile_height:
+                columns = (spec.x, spec.x + spec.width)
+                band = self._input.read_tiles(0, 0, *columns, y0, y1, 0, 1, *channels, kind)
+            else:
+                band = self._input.read_scanlines(0, 0, y0, y1, 0, *channels, kind)
+            message = self._input.geterror()  # for JPEG the message alone tells
+            if band is None or message:
+                raise self._refusal(message)
+            yield band.reshape(y1 - y0, spec.width, spec.nchannels)
+
+    def metadata(self) -> dict[str, Any]:
+        return {entry.name: _plain(entry.value) for entry in self._spec.extra_attribs}
+
+    def _refusal(self, message: str) -> InputError:
+        fact = " ".join(message.split()) or "no reason given"
+        return InputError(f"{self._path}: cannot be read as an image: {fact}; make or fetch the file again")
+
+
+def _ends_with(path: Path, tail: bytes) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - len(tail)))
+        return file.read() == tail
+
+
+def _set(spec: oiio.ImageSpec, name: str, value: Any, text_only: bool) -> None:
+    """Give `spec` an attribute in a type its file format keeps."""
+    if isinstance(value, str):
+        spec.attribute(name, value)
+    elif text_only and not name.startswith(("oiio:", "png:")):
+        spec.attribute(name, " ".join(map(str, value)) if isinstance(value, tuple) else str(value))
+    elif isinstance(value, tuple):
+        kind = "string" if isinstance(value[0], str) else "int" if isinstance(value[0], int) else "float"
+        spec.attribute(name, oiio.TypeDesc(f"{kind}[{len(value)}]"), value)
+    elif isinstance(value, int):
+        spec.attribute(name, int(value) if -(2**31) <= value < 2**31 else str(value))
+    else:
+        spec.attribute(name, float(value))
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as Python has it; floats as the shortest decimal that names the same single."""
+    if isinstance(value, float):
+        return float(str(np.float32(value)))
+    return tuple(map(_plain, value)) if isinstance(value, tuple) else value

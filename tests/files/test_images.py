@@ -122,7 +122,7 @@ def test_what_was_written_is_reported(tmp_path):
 def test_colour_beyond_half_is_clamped_and_counted(tmp_path):
     pixels = np.zeros((4, 4, 2), np.float32)
     pixels[0, 0, 0], pixels[1, 2, 0], pixels[:, :, 1] = 1e6, -7e4, 1e6
-    written = write(tmp_path / "a.exr", pixels, {"R": "half", "Z": "float"})
+    written = write(tmp_path / "a.exr", pixels, {"R": "half", "Z": "float"}, rows=1)
     channels = read_image(tmp_path / "a.exr").channels
     assert written.clamped == 2
     assert channels["R"][0, 0] == 65504
@@ -276,6 +276,20 @@ def test_read_back_catches_other_pixels_in_a_sound_file(tmp_path, monkeypatch):
     create = oiio.ImageOutput.create
     monkeypatch.setattr(images.oiio.ImageOutput, "create", lambda kind: Forgetful(create(kind)))
     with pytest.raises(OutputError, match="differs from what was written"):
+        write(tmp_path / "a.exr", noise(8, 8, 3), channel_types("RGB"))
+    assert os.listdir(tmp_path) == []
+
+
+def test_complaint_of_the_library_is_a_failure_whatever_it_returns(tmp_path, monkeypatch):
+    create = oiio.ImageOutput.create
+
+    class Complaining:
+        def __init__(self, output):
+            self.open, self.close, self.write_scanlines = output.open, output.close, output.write_scanlines
+            self.geterror = lambda: "short write\n"
+
+    monkeypatch.setattr(images.oiio.ImageOutput, "create", lambda kind: Complaining(create(kind)))
+    with pytest.raises(OutputError, match=r"a\.exr: cannot be written: short write; free space"):
         write(tmp_path / "a.exr", noise(8, 8, 3), channel_types("RGB"))
     assert os.listdir(tmp_path) == []
 

@@ -45,8 +45,7 @@ def test_every_float_rounds_as_in_double_precision():
 def test_both_sides_of_every_border_round_as_in_double_precision():
     step = (np.arange(1, 256) - 0.5) / 255
     border = np.where(step <= 0.04045, step / 12.92, ((step + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    for towards in (0, 1):
-        linear = np.nextafter(border, np.float32(towards))
+    for linear in (np.nextafter(border, np.float32(0)), border, np.nextafter(border, np.float32(1))):
         exact = np.rint(255 * to_srgb(linear.astype(np.float64)))
         np.testing.assert_array_equal(srgb8(linear), exact)
 
@@ -99,6 +98,12 @@ def test_pictures_have_the_shape_of_the_band(channels, bits, dtype):
 )
 def test_any_finite_pixel_makes_a_picture(pixel, stops):
     assert picture(single(*pixel).reshape(1, 1, 4), stops).shape == (1, 1, 4)
+
+
+def test_light_beyond_single_precision_is_white():
+    band = single(1e38, 1e38, -1e38, 1e-38).reshape(1, 1, 4)
+    assert picture(band, exposure=64)[0, 0].tolist() == [255, 255, 0, 0]
+    assert picture(band[..., :3], exposure=64)[0, 0].tolist() == [255, 255, 0]
 
 
 def test_band_is_left_as_it_was():

@@ -47,18 +47,15 @@ class World:
 
 
 def transform_matrix(transform: Any, mesh: Mesh) -> NDArray[np.float64]:
-    """(4, 4) float64: fit, scale, rotate about x, y, z, translate, then the scene's own matrix."""
-    matrix = np.eye(4)
-    if transform.fit is not None and len(mesh.corners):
-        low, high = bounds(mesh.vertices[np.unique(mesh.corners)])
-        radius = np.linalg.norm((high - low) / 2) or 1.0
-        size = transform.fit / radius
-        middle = (low + high) / 2
-        matrix[:3, :3] *= size
-        matrix[:3, 3] = -size * np.array([middle[0], low[1], middle[2]])
-    matrix = np.diag([*transform.scale, 1.0]) @ matrix
+    """(4, 4) float64: scale, rotate about x, y, z, fit, translate, then the scene's own matrix."""
+    matrix = np.diag([*transform.scale, 1.0])
     for axis, degrees in enumerate(transform.rotate):
         matrix = rotation(axis, degrees) @ matrix
+    if transform.fit is not None and len(mesh.corners):
+        low, high = bounds(mesh.vertices[np.unique(mesh.corners)] @ matrix[:3, :3].T)
+        size = transform.fit / (np.linalg.norm((high - low) / 2) or 1.0)
+        matrix[:3, :3] *= size
+        matrix[:3, 3] = -size * np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     matrix[:3, 3] += transform.translate
     return matrix if transform.matrix is None else np.asarray(transform.matrix, np.float64) @ matrix
 

@@ -12,7 +12,7 @@ SHARE = 4 * 2.0**-24
 
 
 def lifted(position: NDArray[np.float64], ng: Vectors, edge: Lanes) -> Vectors:
-    """(N, 3) float32 origins above the facet: position + 4 2^-24 (|ng|.|position| + edge) ng, one ulp further.
+    """(N, 3) float32 origins above the facet: position + 4 2^-24 (|ng|.|position| + edge) ng, and one ulp.
 
     Parameters
     ----------

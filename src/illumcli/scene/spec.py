@@ -73,15 +73,15 @@ MeshSource: TypeAlias = Annotated[
 
 
 class Transform(Description):
-    """Where an object stands: fitted, scaled, rotated, translated, in this order, then the matrix."""
+    """Where an object stands: scaled, rotated, fitted, translated, in this order, then the matrix."""
 
-    fit: Positive | None = None
-    """Scale and move the mesh so that its bounding sphere has this radius and it stands on y = 0,
-    centred on the y axis [scene units]."""
     scale: Annotated[Vector, BeforeValidator(spread)] = (1.0, 1.0, 1.0)
     """One factor, or one per axis; negative ones mirror."""
     rotate: Vector = (0.0, 0.0, 0.0)
     """About x, then y, then z [degrees]."""
+    fit: Positive | None = None
+    """Scale and move what is rotated so that half its box's diagonal is this long and it stands on y = 0,
+    centred on the y axis [scene units]."""
     translate: Vector = (0.0, 0.0, 0.0)
     """[scene units]"""
     matrix: Annotated[tuple[Row, Row, Row, Row], Field(strict=False)] | None = None

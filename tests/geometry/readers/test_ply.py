@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import plyfile
+import pytest
+
+from illumcli.errors import InputError
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.readers import read_mesh
+
+FORMATS = [(True, "="), (False, "<"), (False, ">")]
+XYZ = [("x", "f4"), ("y", "f4"), ("z", "f4")]
+SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+
+ROWS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+
+
+def written(
+    path: Path, vertices: np.ndarray, lists: dict[str, tuple[str, list, str]], text: bool, order: str
+) -> Path:
+    """A PLY of `vertices` and elements of one list each: name -> (property, rows, type)."""
+    elements = [plyfile.PlyElement.describe(vertices, "vertex")]
+    for name, (label, rows, kind) in lists.items():
+        table = np.empty(len(rows), [(label, "O")])
+        table[label] = [np.array(row, kind) for row in rows]
+        elements.append(
+            plyfile.PlyElement.describe(table, name, len_types={label: "i4"}, val_types={label: kind})
+        )
+    plyfile.PlyData(elements, text=text, byte_order=order).write(str(path))
+    return path
+
+
+def head(vertices: int = 4, faces: str = "1", kind: str = "ascii", more: str = "", index: str = "int") -> str:
+    return (
+        f"ply\nformat {kind} 1.0\ncomment a note\nelement vertex {vertices}\n"
+        f"property float x\nproperty float y\nproperty float z\n{more}"
+        f"element face {faces}\nproperty list uchar {index} vertex_indices\nend_header\n"
+    )
+
+
+def mesh_of(tmp_path: Path, content: str | bytes) -> Mesh:
+    path = tmp_path / "a.ply"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return read_mesh(path)
+
+
+@pytest.mark.parametrize(("text", "order"), FORMATS)
+@pytest.mark.parametrize("rows", [[[0, 1, 2], [0, 2, 3]], [[0, 1, 2, 3], [0, 1, 2]], [[0, 1, 2, 3]]])
+def test_polygons_are_kept_in_every_format(tmp_path: Path, text: bool, order: str, rows: list) -> None:
+    path = written(
+        tmp_path / "a.ply", np.array(SQUARE, XYZ), {"face": ("vertex_index", rows, "u4")}, text, order
+    )
+    mesh = read_mesh(path)
+    assert mesh.vertices.tolist() == [list(row) for row in SQUARE]
+    assert [mesh.corners[a:b].tolist() for a, b in zip(mesh.starts, mesh.starts[1:], strict=False)] == rows
+
+
+@pytest.mark.parametrize(("text", "order"), FORMATS)
+def test_strips_alternate_and_restart(tmp_path: Path, text: bool, order: str) -> None:
+    strips = [[0, 1, 2, 3, 4, -1, 2, 1, 5, -1, 0], [4, 3, 5, 5, 1]]
+    vertices = np.zeros(6, XYZ)
+    path = written(tmp_path / "a.ply", vertices, {"tristrips": ("vertex_indices", strips, "i4")}, text, order)
+    mesh = read_mesh(path)
+    assert mesh.corners.reshape(-1, 3).tolist() == [[0, 1, 2], [2, 1, 3], [2, 3, 4], [2, 1, 5], [4, 3, 5]]
+    assert mesh.repairs == {"triangles that only join strips": 2}
+
+
+@pytest.mark.parametrize(("text", "order"), FORMATS)
+def test_every_vertex_property_is_kept(tmp_path: Path, text: bool, order: str) -> None:
+    kinds = [*XYZ, ("nx", "f4"), ("ny", "f4"), ("nz", "f4"), ("s", "f4"), ("t", "f4")]
+    kinds += [
+        ("red", "u1"),
+        ("green", "u1"),
+        ("blue", "u1"),
+        ("alpha", "u1"),
+        ("quality", "f8"),
+        ("label", "i2"),
+    ]
+    vertices = np.zeros(3, kinds)
+    vertices["nz"] = 2
+    vertices["s"], vertices["t"] = [0, 0.5, 1], [0.25, 0.5, 0.75]
+    vertices["red"], vertices["green"], vertices["alpha"] = [255, 188, 0], 128, [1, 2, 3]
+    vertices["quality"], vertices["label"] = [0.1, np.nan, 1e-300], [-5, 0, 30_000]
+    path = written(tmp_path / "a.ply", vertices, {"face": ("vertex_indices", [[0, 1, 2]], "i4")}, text, order)
+    mesh = read_mesh(path)
+    assert mesh.normals is not None
+    assert mesh.uvs is not None
+    assert mesh.corner_normals is not None
+    assert mesh.corner_uvs is not None
+    assert mesh.normals.tolist() == [[0, 0, 2]] * 3
+    assert mesh.uvs.tolist() == [[0, 0.25], [0.5, 0.5], [1, 0.75]]
+    assert mesh.corner_normals.tolist() == mesh.corner_uvs.tolist() == [0, 1, 2]
+    assert set(mesh.attributes) == {"color", "alpha", "quality", "label"}
+    assert mesh.attributes["color"].dtype == np.float32
+    np.testing.assert_allclose(mesh.attributes["color"][:, 0], [1, 0.5028865, 0], rtol=1e-6)
+    assert mesh.attributes["alpha"].tolist() == [1, 2, 3]
+    assert mesh.attributes["label"].tolist() == [-5, 0, 30_000]
+    assert mesh.attributes["label"].dtype.isnative
+    assert mesh.attributes["quality"].tolist() == [0.1, 0, 1e-300]
+    assert mesh.repairs == {"values of 'quality' not finite, made 0": 1}
+
+
+def test_uv_per_corner_go_before_uv_per_vertex(tmp_path: Path) -> None:
+    text = (
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "property float u\nproperty float v\nelement face 2\nproperty uchar flag\n"
+        "property list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n"
+        "0 0 0 9 9\n1 0 0 9 9\n0 1 0 9 9\n7 3 0 1 2 6 0 0 .5 0 0 .5\n8 2 0 1 4 0 0 1 1\n"
+    )
+    mesh = mesh_of(tmp_path, text)
+    assert mesh.uvs is not None
+    assert mesh.corner_uvs is not None
+    assert mesh.uvs[mesh.corner_uvs].tolist() == [[0, 0], [0.5, 0], [0, 0.5]]
+    assert mesh.repairs == {"faces with fewer than three corners": 1}
+
+
+def test_text_keeps_all_digits_of_a_position(tmp_path: Path) -> None:
+    mesh = mesh_of(tmp_path, head() + "0.1 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n")
+    assert mesh.vertices[0, 0] == 0.1
+
+
+@pytest.mark.parametrize("end", [b"\r\n", b"\r"])
+def test_line_ends_of_other_systems(tmp_path: Path, end: bytes) -> None:
+    text = (head() + ROWS + "4 0 1 2 3\n").encode().replace(b"\n", end)
+    assert mesh_of(tmp_path, text).polygon_count == 1
+    body = np.array(SQUARE, "<f4").tobytes() + b"\x03" + np.array([0, 1, 2], "<i4").tobytes()
+    binary = head(kind="binary_little_endian").encode().replace(b"\n", end) + body
+    assert mesh_of(tmp_path, binary).vertices.tolist() == [list(row) for row in SQUARE]
+
+
+def test_other_elements_are_passed_over(tmp_path: Path) -> None:
+    more = "element edge 2\nproperty int vertex1\nproperty list uchar short marks\n"
+    assert mesh_of(tmp_path, head(more=more) + ROWS + "1 2 5 6\n7 0\n4 0 1 2 3\n").polygon_count == 1
+    body = np.array(SQUARE, ">f4").tobytes() + b"\0\0\0\1\2\0\5\0\6" + b"\0\0\0\7\0" + b"\3\0\1\2"
+    binary = head(kind="binary_big_endian", more=more, index="uchar").encode() + body
+    assert mesh_of(tmp_path, binary).corners.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("solid\n", "no PLY header"),
+        ("ply\nformat ascii 1.0\nelement vertex 3\n", "no PLY header"),
+        ("ply\nelement vertex 0\nend_header\n", "no format line"),
+        ("ply\nformat ascii 2.0\nend_header\n", "a.ply:2: 'format ascii 2.0' is no line"),
+        (head(vertices=-1) + ROWS, "a.ply:4: 'element vertex -1'"),
+        (head(more="property quad w\n"), "a.ply:8: 'property quad w'"),
+        (head(more="property float x\n"), "a.ply:8: property 'x' is there twice"),
+        (head(more="element vertex 3\n"), "a.ply:8: element 'vertex' is announced twice"),
+        (head(more="element stuff 3\n"), "element 'stuff' has no properties"),
+        (head(faces="0") + ROWS, "a.ply: has no faces"),
+        (head().replace("face", "edge") + ROWS + "4 0 1 2 3\n", "a.ply: has no faces"),
+        (head().replace("float z", "float w") + ROWS + "4 0 1 2 3\n", "no vertices with x, y and z"),
+        (
+            head().replace("indices", "stuff") + ROWS + "4 0 1 2 3\n",
+            "no list of whole numbers 'vertex_indices'",
+        ),
+        (head(index="float") + ROWS + "4 0 1 2 3\n", "no list of whole numbers 'vertex_indices'"),
+        (
+            head(more="property list uchar int nx\nproperty int ny\nproperty int nz\n") + ROWS,
+            "announces 5 rows",
+        ),
+        (
+            head(more="property list uchar int s\n") + ROWS.replace("\n", " 0\n") + "3 0 1 2\n",
+            "'s' is a list",
+        ),
+        (head() + ROWS, "announces 5 rows and has 4"),
+        (head(faces="4000000000") + ROWS + "4 0 1 2 3\n", "announces 4000000004 rows and has 5"),
+        (head() + ROWS + "4 0 1 2 3\n4 0 1 2 3\n", "announces 5 rows and has 6"),
+        (head() + ROWS + "4 0 1 2 4\n", "a.ply: face 0 has the index 4, there are 4 vertices"),
+        (head(faces="2") + ROWS + "3 0 1 2\n3 0 -5 1\n", "a.ply: face 1 has the index -5"),
+        (head() + ROWS + "4 0 1 2\n", "a.ply:15: face 0 has fewer values in 'vertex_indices'"),
+        (head() + ROWS + "3 0 1 2 3\n", "a.ply:15: face 0 has more values"),
+        (head() + ROWS + "-1 0 1 2 3\n", "a.ply:15: face 0 has fewer values"),
+        (head() + ROWS + "nan 0 1 2 3\n", "a.ply:15: face 0 has fewer values"),
+        (head() + ROWS + "3 0 1 2.5\n", "a.ply:15: face 0 has 2.5 for 'vertex_indices', a int32"),
+        (
+            head(index="uchar") + ROWS + "3 0 1 256\n",
+            "a.ply:15: face 0 has 256 for 'vertex_indices', a uint8",
+        ),
+        (head() + ROWS.replace("1 1 0", "1 1") + "3 0 1 2\n", "a.ply:13: vertex 2 has no value for 'z'"),
+        (head() + ROWS.replace("1 1 0", "1 1 0 0") + "3 0 1 2\n", "a.ply:13: vertex 2 has more values"),
+        (
+            head() + ROWS.replace("1 1 0", "1,5 1 0") + "3 0 1 2\n",
+            "a.ply:13: '1,5' is no number; write a decimal",
+        ),
+        (head() + ROWS.replace("1 1 0", "nan 1 0") + "3 0 1 2\n", "1 of 4 vertices .* the first is number 3"),
+        (head() + ROWS.replace("1 1 0", "1e19 1 0") + "3 0 1 2\n", "1 of 4 vertices"),
+    ],
+)
+def test_what_is_wrong_in_text_is_named(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        mesh_of(tmp_path, text)
+    assert "; " in str(caught.value)
+
+
+def binary(body: bytes, faces: str = "1") -> bytes:
+    return head(kind="binary_little_endian", faces=faces).encode() + np.array(SQUARE, "<f4").tobytes() + body
+
+
+def row(*indices: int) -> bytes:
+    return bytes([len(indices)]) + np.array(indices, "<i4").tobytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (binary(row(0, 1, 2), faces="4000000000"), "announces 4000000000 of element 'face' and ends before"),
+        (head(vertices=4_000_000_000, kind="binary_big_endian").encode() + b"\0" * 99, "of element 'vertex'"),
+        (binary(row(0, 1, 2)[:-1]), "announces 1 of element 'face' and ends before number 1"),
+        (binary(row(0, 1, 2) + row(0, 1, 2, 3)[:-1], faces="2"), "ends before number 2"),
+        (binary(row(0, 1, 2) + row(0, 1, 2, 3), faces="3"), "ends before number 3"),
+        (binary(row(0, 1, 2) + row(0, 1, 2)), "has 13 bytes more than announced"),
+        (binary(row(0, 1, 77)), "face 0 has the index 77, there are 4 vertices"),
+        (binary(row(0, 1, 2) + row(0, 1, -1, 2), faces="2"), "face 1 has the index -1"),
+        (binary(b"\xff" + row(0, 1, 2)[1:]).replace(b"uchar", b"char"), "announces a list of -1"),
+    ],
+)
+def test_what_is_wrong_in_binary_is_named(tmp_path: Path, content: bytes, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        mesh_of(tmp_path, content)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e19])
+def test_binary_vertices_that_are_not_finite_are_refused(tmp_path: Path, value: float) -> None:
+    vertices = np.array([(0, 0, 0), (1, 0, value), (0, 1, 0)], XYZ)
+    path = written(tmp_path / "a.ply", vertices, {"face": ("vertex_index", [[0, 1, 2]], "i4")}, False, "<")
+    with pytest.raises(InputError, match=r"1 of 3 vertices .* the first is number 2"):
+        read_mesh(path)
+
+
+def test_strips_with_an_index_out_of_range_are_refused(tmp_path: Path) -> None:
+    for index in (3, -2):
+        lists = {"tristrips": ("vertex_indices", [[0, 1, 2], [0, 1, index]], "i4")}
+        path = written(tmp_path / "a.ply", np.zeros(3, XYZ), lists, False, "<")
+        with pytest.raises(InputError, match=f"tristrips 1 has the index {index}, there are 3"):
+            read_mesh(path)

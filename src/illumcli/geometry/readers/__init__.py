@@ -6,6 +6,8 @@ import pkgutil
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 
@@ -29,7 +31,8 @@ def read_mesh(path: Path) -> Mesh:
             f"{path}: no reader for '{path.suffix}' files; use one of {', '.join(sorted(readers))}"
         )
     try:
-        mesh: Mesh = import_module(f"{__name__}.{reader}").read(path)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused at the end
+            mesh: Mesh = import_module(f"{__name__}.{reader}").read(path)
     except MemoryError:
         raise LimitError(f"{path}: does not fit into memory; use a smaller mesh") from None
     return mesh

@@ -1,8 +1,8 @@
 """Wavefront OBJ: polygons with normals, uv, groups, materials and vertex colours.
 
 A reader of our own because no library keeps polygons at speed: `trimesh` cuts quadrangles in triangles and
-reads nothing but numbers (index 0 becomes the last vertex), `meshio` is slower still, and `tinyobjloader` has
-no wheel and does not build from its source package. Best of five, one core, seconds (Python 3.11, numpy 2.4)::
+checks no index (0 becomes the last vertex), `meshio` is slower still, `tinyobjloader` has no wheel and does
+not build from its source package. Best of five, one core, seconds (Python 3.11, numpy 2.4)::
 
                                         here    trimesh 5.2    meshio 5.3
     Stanford bunny, 69,451 faces        0.046   0.15           0.30

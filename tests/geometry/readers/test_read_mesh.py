@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from illumcli.errors import InputError, LimitError
+from illumcli.geometry.readers import _files, read_mesh
+
+SUFFIXES = [".obj", ".ply", ".stl", ".gltf", ".glb"]
+
+
+def test_an_unknown_suffix_lists_the_known_ones(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.fbx.*\.glb, \.gltf, \.obj, \.ply, \.stl"):
+        read_mesh(tmp_path / "a.fbx")
+
+
+def test_the_suffix_may_be_in_capitals(tmp_path: Path) -> None:
+    (tmp_path / "A.OBJ").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert read_mesh(tmp_path / "A.OBJ").polygon_count == 1
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_what_is_no_file_with_content_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    with pytest.raises(InputError, match="no such file"):
+        read_mesh(path)
+    path.touch()
+    with pytest.raises(InputError, match="is empty"):
+        read_mesh(path)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(InputError, match="is a folder"):
+        read_mesh(path)
+    path.rmdir()
+    os.mkfifo(path)
+    with pytest.raises(InputError, match="no regular file"):
+        read_mesh(path)
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(InputError, match="no regular file"):
+        read_mesh(path)
+    path.unlink()
+    path.symlink_to(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_file_over_the_limit_is_refused_before_it_is_read(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    with path.open("wb") as file:
+        file.truncate(_files.LARGEST_FILE + 1)
+    with pytest.raises(LimitError, match="the limit is 4 GiB"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("content", [b"\x8f\x00\xff\x13" * 50, b"hello\nworld\n", b"\n" * 200, b"\0" * 200])
+def test_foreign_content_is_refused(tmp_path: Path, suffix: str, content: bytes) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"^{path}"):
+        read_mesh(path)
+
+
+def test_arrays_are_read_only(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(ValueError, match="read-only"):
+        read_mesh(path).vertices[0] = 1
+
+
+def test_a_reader_is_imported_only_for_its_files(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    code = (
+        "import sys; from pathlib import Path; from illumcli.geometry.readers import read_mesh;"
+        "read_mesh(Path(sys.argv[1]));"
+        "loaded = {name.rpartition('.')[2] for name in sys.modules if '.geometry.readers.' in name};"
+        "print(loaded & {'obj', 'ply', 'stl', 'gltf'})"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "{'obj'}"
+
+
+@pytest.mark.parametrize(
+    ("name", "vertices", "faces"),
+    [
+        ("stanford-bunny.obj", 35_947, 69_451),
+        ("igea.ply", 134_345, 268_686),
+        ("suzanne.obj", 507, 500),
+        ("spot.obj", 2_930, 5_856),
+        ("teapot.obj", 3_644, 6_320),
+    ],
+)
+def test_real_meshes_keep_their_counts(
+    real_mesh: Callable[[str], Path], name: str, vertices: int, faces: int
+) -> None:
+    mesh = read_mesh(real_mesh(name))
+    assert (len(mesh.vertices), mesh.polygon_count) == (vertices, faces)
+    assert not mesh.repairs
+    if name == "suzanne.obj":
+        sizes = mesh.starts[1:] - mesh.starts[:-1]
+        assert set(sizes.tolist()) == {3, 4}
+        assert mesh.normals is not None
+        assert mesh.corner_normals is not None
+        assert mesh.corner_normals.min() >= 0
+    if name == "spot.obj":
+        assert mesh.uvs is not None
+        assert mesh.uvs.shape == (3_225, 2)
+    if name == "igea.ply":  # closed: every edge once in each direction, so all strips wind alike
+        corners = mesh.corners.reshape(-1, 3).astype("int64")
+        edges = [corners[:, i] * vertices + corners[:, (i + 1) % 3] for i in range(3)]
+        there = {edge for column in edges for edge in column.tolist()}
+        assert len(there) == 3 * faces
+        assert there == {edge % vertices * vertices + edge // vertices for edge in there}

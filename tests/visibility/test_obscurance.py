@@ -1,0 +1,125 @@
+"""w against closed forms, on real geometry, judged by its own spread over scrambles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.rays.offsets import lifted
+from illumcli.rays.tracer import Tracer
+from illumcli.variants import members
+from illumcli.visibility.falloffs.exponential import Exponential
+from illumcli.visibility.falloffs.step import Step
+from illumcli.visibility.obscurance import obscurance, turned_frame
+
+F = np.float32
+FLOOR = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def scene(*quads):
+    vertices = np.concatenate(quads)
+    faces = [[4 * k + a, 4 * k + b, 4 * k + c] for k in range(len(quads)) for a, b, c in ((0, 1, 2), (0, 2, 3))]
+    return Tracer(vertices.astype(F), np.array(faces, np.int32))
+
+
+def sphere(rings=96, sectors=192):
+    """A fine sphere of radius 1 as a grid of latitude and longitude, facing inwards."""
+    theta = np.linspace(0, np.pi, rings + 1)
+    phi = np.linspace(0, 2 * np.pi, sectors + 1)
+    t, f = np.meshgrid(theta, phi, indexing="ij")
+    v = np.stack([np.sin(t) * np.cos(f), np.sin(t) * np.sin(f), np.cos(t)], axis=-1).reshape(-1, 3)
+    i, j = (g.ravel() for g in np.meshgrid(np.arange(rings), np.arange(sectors), indexing="ij"))
+    a, b = i * (sectors + 1) + j, (i + 1) * (sectors + 1) + j
+    return v, np.concatenate([np.stack([a, b, a + 1], 1), np.stack([b, b + 1, a + 1], 1)]).astype(np.int32)
+
+
+def estimates(tracer, point, normal, falloff, samples=64, scrambles=400, radius=1.0):
+    rng = np.random.default_rng(11)
+    p = np.tile(np.asarray(point, float), (scrambles, 1))
+    n = np.tile(np.asarray(normal, F), (scrambles, 1))
+    origins = lifted(p, n, np.full(scrambles, F(3)))
+    return obscurance(tracer, origins, n, rng.random((2, scrambles)), samples, falloff, radius)
+
+
+def agrees(w, exact):
+    error = w.std(ddof=1) / len(w) ** 0.5
+    assert abs(w.mean() - exact) < 4.5 * max(error, 1e-6), (w.mean(), exact, error)
+
+
+def test_a_lone_plane_is_open_exactly():
+    w = estimates(scene(FLOOR), [0.2, 0.1, 0], UP, Step())
+    assert (w == 1).all()
+
+
+@pytest.mark.parametrize(("away", "height"), [(0.1, 0.2), (0.02, 0.5), (0.3, 0.05)])
+def test_floor_beside_a_long_wall(away, height):
+    wall = np.array([[away, -500, 0], [away, 500, 0], [away, 500, height], [away, -500, height]])
+    w = estimates(scene(FLOOR * 500, wall), [0, 0, 0], UP, Step())
+    agrees(w.astype(float), (1 + away / np.hypot(away, height)) / 2)
+
+
+def test_a_plate_out_of_reach_does_not_count_and_one_within_does():
+    plate = FLOOR * 400 + [0, 0, 0.1]
+    tracer = scene(FLOOR, plate)
+    assert (estimates(tracer, [0, 0, 0], UP, Step(max_distance=0.09)) == 1).all()
+    w = estimates(tracer, [0, 0, 0], UP, Step(max_distance=0.2)).astype(float)
+    agrees(w, (0.1 / 0.2) ** 2)
+    relative = estimates(tracer, [0, 0, 0], UP, Step(max_distance="0.2r"), radius=5.0).astype(float)
+    agrees(relative, (0.1 / 0.2) ** 2)
+
+
+def test_exponential_inside_a_sphere():
+    vertices, faces = sphere()
+    tau, radius = 0.7, 1.0
+    tracer = Tracer(vertices.astype(F), faces)
+    inward = -vertices[faces[7000]].mean(axis=0)
+    point, normal = -inward, inward / np.linalg.norm(inward)
+    w = estimates(tracer, point, normal, Exponential(falloff="exponential", tau=tau)).astype(float)
+    kappa = 2 * tau * radius
+    exact = 1 - 2 / kappa**2 * (1 - (1 + kappa) * np.exp(-kappa))
+    # the faceted ball is up to 0.05 % smaller than the sphere
+    assert abs(w.mean() - exact) < 4.5 * w.std() / 20 + 1e-3
+
+
+def test_the_error_falls_like_that_of_well_spread_points():
+    wall = np.array([[0.1, -500, 0], [0.1, 500, 0], [0.1, 500, 0.2], [0.1, -500, 0.2]])
+    tracer = scene(FLOOR * 500, wall)
+    counts = np.array([16, 64, 256, 1024])
+    spread = [estimates(tracer, [0, 0, 0], UP, Step(), n, 600).astype(float).std() for n in counts]
+    assert np.polyfit(np.log(counts), np.log(spread), 1)[0] < -0.65
+
+
+def test_points_do_not_depend_on_their_company():
+    plate = FLOOR * 0.3 + [0, 0, 0.1]
+    tracer = scene(FLOOR, plate)
+    rng = np.random.default_rng(2)
+    p = np.column_stack([rng.uniform(-0.5, 0.5, (1000, 2)), np.zeros(1000)])
+    n, draws = np.tile(UP.astype(F), (1000, 1)), rng.random((2, 1000))
+    origins = lifted(p, n, np.full(1000, F(3)))
+    whole = obscurance(tracer, origins, n, draws, 48, Step(), 1.0)
+    part = obscurance(tracer, origins[300:317], n[300:317], draws[:, 300:317], 48, Step(), 1.0)
+    assert np.array_equal(whole[300:317], part)
+
+
+def test_frames_are_orthonormal_for_every_normal():
+    rng = np.random.default_rng(4)
+    n = rng.normal(size=(1000, 3))
+    n[:6] = [[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [1e-8, 0, -1], [0, 1e-8, 1]]
+    n = (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(F)
+    frame = turned_frame(n, rng.uniform(0, 7, 1000).astype(F))
+    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (1000, 1, 1)), atol=1e-6)
+    assert np.array_equal(frame[:, 2], n)
+
+
+@pytest.mark.parametrize("Falloff", members("illumcli.visibility.falloffs"), ids=lambda c: c.__name__)
+def test_every_falloff_rises_from_0_at_contact_to_1_out_of_reach(Falloff):
+    tag = Falloff.__module__.rpartition(".")[2]
+    falloff = Falloff.model_validate({"falloff": tag, "max_distance": 2.0})
+    x = np.array([0, 1e-9, 0.1, 0.5, 1, 1.9, 2, 3, np.inf])
+    for dtype in (np.float32, np.float64):
+        mu = falloff.weight(x.astype(dtype), falloff.reach(1.0), 1.0)
+        assert mu.dtype == dtype
+        assert (np.diff(mu) >= 0).all()
+        assert mu[0] == 0
+        assert (mu[x >= 2] == 1).all()

@@ -1,0 +1,168 @@
+"""Pictures: the same for any threads, tiles and layers; the texts' worked numbers; no debris of lanes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.plan.execute import Tally, bands, run_once
+from illumcli.plan.plan import plan
+from illumcli.scene.load import load
+
+SCENE = """
+version: 1
+camera: {position: [1.5, 1.6, 3], target: [0, 0.4, 0], fov: 40}
+film: {width: 83, height: 61, samples: 3, filter: {filter: tent, width: 2}}
+ambient: [0.3, 0.4, 0.5]
+obscurance: {samples: 7, falloff: {falloff: linear, max_distance: 1}}
+meshes:
+  ball: {shape: sphere, radius: 0.5, segments: 20, rings: 10}
+materials:
+  red: {model: phong, diffuse: [0.8, 0.2, 0.1], specular: 0.4, exponent: 20, emission: 0.05}
+  grey: {model: lambert, diffuse: 0.7}
+objects:
+  - {mesh: {shape: plane, size: [6, 6]}, material: grey}
+  - {mesh: ball, material: red, transform: {translate: [0, 0.5, 0]}}
+  - {mesh: ball, material: red, shading: gouraud, transform: {translate: [1, 0.5, 0]}}
+  - {mesh: ball, material: grey, shading: constant, transform: {translate: [-1, 0.5, 0]}}
+  - {mesh: ball, material: red, shading: quadratic, transform: {translate: [0, 0.5, -1]}}
+lights:
+  - {light: point, name: key, position: [2, 3, 2], intensity: [9, 8, 7]}
+  - {light: spot, name: rim, position: [-2, 3, -1], target: [0, 0, 0], angle: 40, intensity: 20}
+  - {light: directional, name: sun, direction: [1, -2, -1], irradiance: 0.3, shadows: false}
+"""
+ALL = (
+    "beauty ambient diffuse specular emission lights shadows obscurance alpha depth position normal "
+    "geometric_normal uv object_id material_id triangle_id"
+).split()
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.yaml"
+    path.write_text(SCENE)
+
+    def render(*only, threads=1, side=None, overrides=()):
+        loaded = load(path, overrides)
+        steps = plan(loaded.scene, loaded, only)
+        tally = Tally()
+        shared = run_once(steps, tally)
+        made = list(bands(steps, shared, steps.views[0], threads, tally, side=side))
+        names = made[0].layers
+        return {name: np.concatenate([band.layers[name] for band in made]) for name in names}
+
+    return render
+
+
+@pytest.fixture(scope="module")
+def whole(picture):
+    return picture(*ALL)
+
+
+@pytest.mark.parametrize(("threads", "side"), [(1, 8), (2, 13), (2, 61), (3, 128), (8, 4)])
+def test_threads_and_tiles_change_no_bit(picture, whole, threads, side):
+    again = picture(*ALL, threads=threads, side=side)
+    for name, values in whole.items():
+        assert values.tobytes() == again[name].tobytes(), name
+
+
+@pytest.mark.parametrize("layer", ALL)
+def test_a_layer_alone_is_the_layer_among_all(picture, whole, layer):
+    for name, values in picture(layer).items():
+        assert values.tobytes() == whole[name].tobytes(), name
+
+
+def test_layers_add_up_to_the_beauty(whole):
+    lights = whole["key"] + whole["rim"] + whole["sun"]
+    np.testing.assert_allclose(whole["diffuse"] + whole["specular"], lights, atol=2e-6)
+    np.testing.assert_allclose(whole["emission"] + whole["ambient"] + lights, whole["beauty"], atol=2e-6)
+
+
+def test_every_value_is_finite_and_light_is_not_negative(whole):
+    for name, values in whole.items():
+        assert np.isfinite(values).all(), name
+        if name not in ("position", "normal", "geometric_normal"):
+            assert (values >= 0).all(), name
+
+
+def test_shares_stay_between_0_and_1_and_normals_are_unit(whole):
+    for name in ("alpha", "obscurance", "shadow.key", "shadow.rim", "shadow.sun"):
+        assert whole[name].max() <= 1
+    for name in ("normal", "geometric_normal"):
+        size = np.linalg.norm(whole[name], axis=2)
+        assert np.all((size == 0) | (np.abs(size - 1) < 1e-5))
+
+
+def test_ids_and_depth_are_never_mixed(whole):
+    assert set(np.unique(whole["object_id"])) <= {0, 1, 2, 3, 4, 5}
+    seen = whole["depth"][whole["object_id"] > 0]
+    assert seen.min() > 1
+    assert (whole["depth"][whole["object_id"] == 0] == 0).all()
+
+
+def test_another_seed_is_other_noise(picture, whole):
+    other = picture("beauty", overrides=["seed=5"])["beauty"]
+    assert not np.array_equal(other, whole["beauty"])
+    np.testing.assert_allclose(other.mean(), whole["beauty"].mean(), rtol=0.05)
+
+
+def test_what_a_layer_does_not_reach_is_not_run(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text(SCENE)
+    loaded = load(path)
+    p = plan(loaded.scene, loaded, ["depth"])
+    made = {step.makes for step in (*p.once, *p.tile)}
+    assert not made & {"corner_normals", "points", "shadow:key", "obscurance", "lit:key", "uvs"}
+    assert p.skipped["shadow:sun"] == "the light casts no shadows"
+    assert p.expected_rays == {"primary": 83 * 61 * 3}
+
+
+def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text(SCENE)
+    loaded = load(path, ["lights.key.intensity=0", "ambient=0", "obscurance=null"])
+    p = plan(loaded.scene, loaded)
+    made = {step.makes for step in p.tile}
+    assert not made & {"lit:key", "shadow:key", "obscurance", "ambient"}
+    assert p.skipped["shadow:key"] == "the light's intensity is 0"
+    assert "lit:rim" in made
+
+
+@pytest.mark.parametrize(
+    ("scene", "overrides", "value"),
+    [
+        ("textbook-halfway", [], 8.764768000724656),
+        ("textbook-halfway", ["camera.position=[-5,5,0]"], 12.045584412271571),
+        ("textbook-constant", [], 5.9),
+        ("textbook-gouraud", [], 5.151756813226966),
+        ("textbook-phong", [], 11.790820242271207),
+    ],
+)
+def test_worked_examples_of_the_texts(root, scene, overrides, value):
+    loaded = load(root / "scenes" / f"{scene}.yaml", overrides)
+    steps = plan(loaded.scene, loaded)
+    tally = Tally()
+    made = list(bands(steps, run_once(steps, tally), steps.views[0], 1, tally))
+    beauty = np.concatenate([band.layers["beauty"] for band in made])
+    centre = beauty[beauty.shape[0] // 2, beauty.shape[1] // 2]
+    np.testing.assert_allclose(centre, value, rtol=1e-6)
+
+
+def test_coupled_ambient_is_the_texts_printed_form(tmp_path):
+    path = tmp_path / "s.yaml"
+    path.write_text(
+        """
+version: 1
+camera: {projection: orthographic, position: [0, 5, 0], target: [0, 0, 0], extent: 1}
+film: {width: 4, height: 4, samples: 1}
+ambient: {form: coupled, color: 0.5}
+materials: {m: {model: blinn_phong, diffuse: 0.4, ambient: 0.3, specular: 0}}
+objects: [{mesh: {shape: plane}, material: m}]
+lights: [{light: directional, direction: [0, -1, 0], irradiance: 2}]
+"""
+    )
+    loaded = load(path)
+    steps = plan(loaded.scene, loaded)
+    tally = Tally()
+    (band,) = bands(steps, run_once(steps, tally), steps.views[0], 1, tally)
+    np.testing.assert_allclose(band.layers["beauty"], 0.3 * 0.5 + 0.4 * 2 + 2, rtol=1e-6)

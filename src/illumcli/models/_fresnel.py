@@ -157,6 +157,7 @@ class Material(Description, defer_build=True):
 
     F: Literal["material"] = "material"
     name: Literal["water", "plastic", "glass", "diamond", "copper", "aluminium"] = "plastic"
+    """Row of the table: F0 of water 0.02, plastic 0.05, glass 0.08 (dense flint), diamond 0.17, ..."""
     curve: Literal["dielectric", "schlick"] = "dielectric"
     """How the table's F0 goes on to grazing: by the index it implies with k = 0, or by Schlick's curve. For
     metals the implied index is fictitious."""

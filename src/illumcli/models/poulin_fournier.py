@@ -126,13 +126,13 @@ def highlight(
     """
     nodes, fall = NODES[n_l.dtype]
     limits = np.finfo(n_l.dtype)
-    below_one = 1 - float(limits.epsneg)
+    below_one = 1 - 8 * float(limits.eps)
     psi_h = np.arctan2(b_s, n_s)
     nearest = np.sin(np.clip(np.clip(psi_h, low, high) - psi_h, -np.pi / 2, np.pi / 2))
     shrink = -2 * fall / np.maximum(e, 2 * fall / 80)
     reach = np.arcsin(np.sqrt(np.clip(nearest * nearest * np.exp(shrink) - np.expm1(shrink), 0, below_one)))
-    first, last = np.maximum(low - psi_h, -reach), np.minimum(high - psi_h, reach)
-    half, middle = np.maximum(last - first, 0) / 2, (last + first) / 2
+    first, last = np.clip(low - psi_h, -reach, reach), np.clip(high - psi_h, -reach, reach)
+    half, middle = (last - first) / 2, (last + first) / 2
 
     cos_h, sin_h = np.cos(psi_h), np.sin(psi_h)
     l_h, v_h = n_l * cos_h + b_l * sin_h, n_v * cos_h + b_v * sin_h

@@ -90,9 +90,13 @@ def nxs(n: Vectors, s: Vectors) -> Vectors:
     return cross(n, s)
 
 
-def sin2_h(nxs: Vectors, s_s: Lanes) -> Lanes:
-    """sin^2 of the angle between n and h = |n x s|^2 / |s|^2; keeps its digits where 1 - (n.h)^2 has none."""
-    return dot(nxs, nxs) / np.maximum(s_s, np.finfo(s_s.dtype).tiny)
+def sin2_h(nxs: Vectors, n_s: Lanes, s_s: Lanes) -> Lanes:
+    """sin^2 of the angle between n and h = |n x s|^2 / |s|^2; keeps its digits where 1 - (n.h)^2 has none.
+
+    1 (a right angle) where h is undefined or below the surface.
+    """
+    sin2 = dot(nxs, nxs) / np.maximum(s_s, np.finfo(s_s.dtype).tiny)
+    return np.maximum(sin2, n_s <= 0)
 
 
 def nxl(n: Vectors, l: Vectors) -> Vectors:

@@ -1,0 +1,345 @@
+"""What every illumination model promises, for random parameters within their ranges."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial.legendre import leggauss
+
+from illumcli.arrays import columns, cross, dot, unit
+from illumcli.models._base import IlluminationModel
+from illumcli.shading.terms import evaluate, words
+from illumcli.variants import members, tags
+
+MODELS = members("illumcli.models")
+CLAIMS = ("reciprocal", "conserving", "isotropic", "physical")
+seeds = st.integers(0, 2**32 - 1)
+
+every_model = pytest.mark.parametrize("Model", MODELS, ids=lambda Model: Model.__name__)
+
+
+def claiming(claim, value=True):
+    chosen = [Model for Model in MODELS if getattr(Model, claim) is value]
+    return pytest.mark.parametrize("Model", chosen, ids=lambda Model: Model.__name__)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def measured(tmp_path_factory):
+    """A measurement to look up, of noise with gaps."""
+    path = tmp_path_factory.mktemp("merl") / "noise.binary"
+    with open(path, "wb") as file:
+        file.write(np.array((90, 90, 180), "<i4").tobytes())
+        file.write((np.random.default_rng(1).random(3 * 90 * 90 * 180) * 100 - 10).tobytes())
+    MEASURED.append(str(path))
+
+
+MEASURED: list[str] = []
+
+
+# -- random parameters, from the schema of a model
+
+
+@functools.cache
+def parameters(Model, choices=True, gentle=False):
+    """Random values of every parameter; without `choices` only of numbers, the rest at its default.
+
+    `gentle` keeps lobes wide enough for a quadrature.
+    """
+    schema = Model.model_json_schema()
+    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.model_validate)
+
+
+def _object(schema, defs, choices, gentle):
+    fields = {
+        name: st.builds(lambda: MEASURED[-1])
+        if name == "file"
+        else _field(name, field, defs, choices, gentle)
+        for name, field in schema["properties"].items()
+        if name not in ("emission", "ambient")
+    }
+    return st.fixed_dictionaries(fields)
+
+
+def _field(name, field, defs, choices, gentle):
+    value = functools.partial(_field, name, defs=defs, choices=choices, gentle=gentle)
+    if "$ref" in field:
+        return _object(defs[field["$ref"].rpartition("/")[2]], defs, choices, gentle)
+    if "const" in field:
+        return st.just(field["const"])
+    if "anyOf" in field:  # something optional
+        return st.none() | value(field["anyOf"][0]) if choices else st.just(field["default"])
+    if "discriminator" in field:
+        refs = list(field["discriminator"]["mapping"].values())
+        tag = field["discriminator"]["propertyName"]
+        kept = refs if choices else [field["discriminator"]["mapping"][field["default"][tag]]]
+        return st.one_of([value({"$ref": ref}) for ref in kept])
+    if "oneOf" in field:  # a value, a texture, a vertex attribute
+        return value(field["oneOf"][0])
+    if "enum" in field:
+        return st.sampled_from(field["enum"]) if choices else st.just(field["default"])
+    if field["type"] == "boolean":
+        return st.booleans() if choices else st.just(field["default"])
+    if field["type"] == "array":
+        return st.tuples(*(value(part) for part in field["prefixItems"]))
+    return _number(name, field, gentle)
+
+
+def _number(name, field, gentle):
+    low, high = field.get("minimum", field.get("exclusiveMinimum")), field["maximum"]
+    open_low = "exclusiveMinimum" in field
+    if gentle:
+        low = 0.15 if name in ("m", "alpha", "beta", "alpha_x", "alpha_y", "slope") else low
+        high = min(high, 50.0)
+    ends = [high] if open_low else [low, high]
+    middle = st.floats(low, min(high, 10.0 + low), exclude_min=open_low)
+    sharp = st.sampled_from([x for x in (1e-3, 0.999, 1e3, 1e6) if low < x < high] or ends)
+    return middle if gentle else st.one_of(middle, sharp, st.sampled_from(ends))
+
+
+def directions(seed, count, dtype=np.float64, least=0.0):
+    """Vectors of `count` lanes with n.l > 0: general ones, grazing, mirrored, retro-reflected, below.
+
+    With `least` > 0, light and eye are at least that cosine above the surface.
+    """
+    random = np.random.default_rng(seed)
+    n = unit(columns(random.normal(size=(count, 3))))
+    t = unit(cross(n, unit(columns(random.normal(size=(count, 3))))))
+    b = cross(n, t)
+
+    def above():
+        height = (
+            random.random(count) if least else random.choice([1e-7, 1e-4, 1.0], count) * random.random(count)
+        )
+        height = least + (1 - least) * height
+        turn = random.random(count) * 2 * np.pi
+        level = np.sqrt((1 - height) * (1 + height))
+        return columns(
+            height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
+        )
+
+    l, v = above(), above()
+    kind = random.integers(0, 6, count)
+    mirrored = 2 * dot(n, l)[:, None] * n - l
+    v[kind == 1] = mirrored[kind == 1]
+    v[kind == 2] = (
+        unit(mirrored + 1e-3 * random.normal(size=(count, 3)))[kind == 2] if not least else v[kind == 2]
+    )
+    v[kind == 3] = l[kind == 3]
+    if not least:
+        v[kind == 4] -= (1.5 * dot(n, v))[kind == 4][:, None] * n[kind == 4]
+        v[kind == 5] = n[kind == 5]
+        v = unit(v)
+    given = {"n": n, "t": t, "l": l, "v": v}
+    given = {name: columns(value.astype(dtype)) for name, value in given.items()}
+    lit = dot(given["n"], given["l"]) > 0
+    given = {name: columns(value[lit]) for name, value in given.items()}
+    return given | {"light": np.array([1, 0.5, 0.25], dtype)}
+
+
+def response(model, given):
+    """The sum of all lobes, (N, 3)."""
+    return sum(evaluate(model.lobes(), given).values(), np.zeros_like(given["l"]))
+
+
+# -- promises
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@every_model
+@settings(max_examples=60, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_lobes_are_finite_not_negative_and_keep_their_precision(Model, dtype, data, seed):
+    model = data.draw(parameters(Model))
+    given = directions(seed, 64, dtype)
+    for name, values in evaluate(model.lobes(), given).items():
+        assert values.shape == given["l"].shape, name
+        assert values.dtype == dtype, name
+        assert np.all(np.isfinite(values)), name
+        assert values.min() >= 0, name
+
+
+@every_model
+@settings(max_examples=15, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_a_batch_equals_its_rows(Model, data, seed):
+    lobes = data.draw(parameters(Model)).lobes()
+    given = directions(seed, 37, np.float32)
+    batch = evaluate(lobes, given)
+    for row in range(len(given["l"])):
+        alone = evaluate(
+            lobes, {name: x if x.ndim == 1 else columns(x[row : row + 1]) for name, x in given.items()}
+        )
+        for name in lobes:
+            np.testing.assert_array_equal(alone[name][0], batch[name][row])
+
+
+@every_model
+@settings(max_examples=10, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_one_value_per_lane_equals_one_value_for_all(Model, data, seed):
+    model = data.draw(parameters(Model))
+    given = directions(seed, 20, np.float32)
+    count = len(given["l"])
+    for path, varying in varied(model, count).items():
+        for name, values in evaluate(model.at({path: varying}).lobes(), given).items():
+            np.testing.assert_allclose(values, evaluate(model.lobes(), given)[name], rtol=1e-5, err_msg=path)
+
+
+def varied(part, count, prefix=""):
+    """Path -> the parameter once per lane, of every parameter that may vary over the surface."""
+    found = {}
+    for name, value in part:
+        annotation = str(type(part).model_fields[name].annotation)
+        if isinstance(value, float | tuple) and "VertexValues" in annotation:
+            found[prefix + name] = (
+                columns(np.tile(value, (count, 1))) if isinstance(value, tuple) else np.full(count, value)
+            )
+        elif hasattr(value, "model_fields_set"):
+            found |= varied(value, count, f"{prefix}{name}.")
+    return found
+
+
+@claiming("reciprocal")
+@settings(max_examples=40, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_swapping_light_and_eye_keeps_the_brdf(Model, data, seed):
+    model = data.draw(parameters(Model, choices=False))
+    given = directions(seed, 64, least=1e-3)
+    swapped = given | {"l": given["v"], "v": given["l"]}
+    there = response(model, given) / dot(given["n"], given["l"])[:, None]
+    back = response(model, swapped) / dot(given["n"], given["v"])[:, None]
+    np.testing.assert_allclose(there, back, rtol=1e-7, atol=1e-12 * np.abs(there).max(initial=1e-300))
+
+
+@claiming("conserving")
+@settings(max_examples=15, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("cosine", [1.0, 0.7, 0.3, 0.05])
+def test_no_more_light_leaves_than_arrives(Model, cosine, data):
+    model = data.draw(parameters(Model, choices=False, gentle=True))
+    for turn in (0.0, 0.8) if not Model.isotropic else (0.0,):
+        assert albedo(model, cosine, turn).max() <= 1 + 2e-3
+
+
+def albedo(model, cosine, turn=0.0):
+    """(3,) share reflected towards an eye at this cosine, by reciprocity the share of light from there."""
+    node, weight = leggauss(64)
+    u, phi = (1 + node) / 2, (np.arange(96) + 0.5) / 96 * 2 * np.pi
+    x, p = (grid.ravel() for grid in np.meshgrid(u, phi, indexing="ij"))
+    height = x * x  # more nodes at grazing
+    level = np.sqrt(1 - height**2)
+    count = len(x)
+    sine = np.sqrt(1 - cosine**2)
+    given = {
+        "l": columns(np.stack([level * np.cos(p), level * np.sin(p), height], 1)),
+        "v": columns(np.tile([sine * np.cos(turn), sine * np.sin(turn), cosine], (count, 1))),
+        "n": columns(np.tile([0.0, 0.0, 1.0], (count, 1))),
+        "t": columns(np.tile([1.0, 0.0, 0.0], (count, 1))),
+        "light": np.ones(3),
+    }
+    area = np.repeat(weight / 2 * 2 * u, 96) * 2 * np.pi / 96
+    return area @ response(model, given)
+
+
+def turned(given, angle):
+    """Light and eye turned about the normal."""
+    n = given["n"]
+
+    def turn(w):
+        along = dot(n, w)[:, None] * n
+        return columns(along + np.cos(angle) * (w - along) + np.sin(angle) * cross(n, w))
+
+    return given | {"l": turn(given["l"]), "v": turn(given["v"])}
+
+
+@pytest.mark.parametrize(
+    "Model",
+    [Model for Model in MODELS if Model.isotropic and "file" not in Model.model_fields],  # tables jump
+    ids=lambda Model: Model.__name__,
+)
+@settings(max_examples=40, deadline=None)
+@given(data=st.data(), seed=seeds, angle=st.floats(0, 6.3))
+def test_turning_the_surface_changes_nothing(Model, data, seed, angle):
+    model = data.draw(parameters(Model, choices=False, gentle=True))
+    given = directions(seed, 64, least=1e-3)
+    one, other = response(model, given), response(model, turned(given, angle))
+    np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9 * one.max(initial=1e-300))
+
+
+@claiming("isotropic", False)
+def test_turning_the_grain_changes_something(Model):
+    assert "t" in words(Model().lobes())
+    given = directions(5, 64, least=0.1)
+    assert not np.allclose(response(Model(), given), response(Model(), turned(given, 1.0)), rtol=1e-3)
+
+
+@every_model
+@settings(max_examples=10, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_a_skipped_lobe_is_black(Model, data, seed):
+    model = data.draw(parameters(Model))
+    given = directions(seed, 32)
+    for method, names in Model.scales.items():
+        for name in names if hasattr(Model, method) else ():
+            value = getattr(model, name)
+            zero = model.model_copy(update={name: (0.0, 0.0, 0.0) if isinstance(value, tuple) else 0.0})
+            lobe = method.removesuffix("_lobe")
+            assert lobe not in zero.lobes()
+            assert not evaluate({lobe: getattr(zero, method)}, given)[lobe].any()
+
+
+# -- form
+
+
+@every_model
+def test_the_file_is_named_after_the_tag(Model):
+    tag = Model.model_fields["model"].default
+    assert Model.__module__ == f"illumcli.models.{tag}"
+    assert tag in tags("illumcli.models")
+
+
+@every_model
+def test_the_page_has_formula_and_source(Model):
+    text = inspect.getmodule(Model).__doc__
+    assert "response = " in text
+    assert "References\n----------" in text
+
+
+@pytest.mark.parametrize("name", ["_base", "_fresnel", "_microfacet", *tags("illumcli.models")])
+def test_every_parameter_says_what_it_means(name):
+    source = Path(inspect.getfile(IlluminationModel)).with_name(f"{name}.py").read_text()
+    for cls in (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)):
+        for field, following in zip(cls.body, [*cls.body[1:], None], strict=True):
+            if isinstance(field, ast.AnnAssign) and field.target.id not in (
+                *CLAIMS,
+                "model",
+                "D",
+                "F",
+                "scales",
+            ):
+                assert isinstance(following, ast.Expr), f"{cls.name}.{field.target.id}"
+                assert isinstance(following.value.value, str), f"{cls.name}.{field.target.id}"
+
+
+@every_model
+def test_every_number_has_a_range(Model):
+    def numbers(part):
+        if isinstance(part, dict):
+            if part.get("type") == "number":
+                yield part
+            for inner in part.values():
+                yield from numbers(inner)
+        elif isinstance(part, list):
+            for inner in part:
+                yield from numbers(inner)
+
+    for number in numbers(Model.model_json_schema()):
+        assert "maximum" in number
+        assert "minimum" in number or "exclusiveMinimum" in number

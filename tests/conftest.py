@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -27,3 +30,15 @@ def real_mesh():
         return path
 
     return find
+
+
+@pytest.fixture
+def illum(tmp_path):
+    """Run the command in a fresh process and folder: ``illum("render", "x.yaml")``."""
+
+    def run(*words: object, cwd: Path = tmp_path, **environment: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "illumcli", *map(str, words)]
+        env = {**os.environ, **environment}
+        return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, check=False, timeout=120)
+
+    return run

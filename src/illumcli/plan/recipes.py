@@ -8,12 +8,14 @@ from functools import partial
 from typing import Any
 
 from illumcli.demand import Recipe
+from illumcli.errors import InputError
 from illumcli.film.film import Layer
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
 from illumcli.plan import stages
 from illumcli.scene.spec import Obscurance, Scene, default_material
 from illumcli.shading.terms import words
+from illumcli.variants import suggestion
 
 SMOOTH = ("gouraud", "phong", "quadratic")
 
@@ -45,19 +47,23 @@ def views(scene: Scene) -> list[View]:
 
 
 def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
-    """The layers of these names, those of the lights one by one."""
-    made: list[Layer] = []
-    for name in names:
-        if name == "lights":
-            made += [Layer(light, f"light:{light}", _rgb(light)) for light in scene.named_lights()]
-        elif name == "shadows":
-            made += [
-                Layer(f"shadow.{light}", f"shadow:{light}", (f"shadow.{light}.Y",))
-                for light in scene.named_lights()
-            ]
-        else:
-            made.append(_LAYERS[name])
-    return made
+    """The layers of these names: `lights` and `shadows` stand for one per light, which can be named alone.
+
+    Raises
+    ------
+    InputError
+        A name that is no layer of this scene.
+    """
+    lights = [Layer(name, f"light:{name}", _rgb(name)) for name in scene.named_lights()]
+    shadows = [
+        Layer(f"shadow.{name}", f"shadow:{name}", (f"shadow.{name}.Y",)) for name in scene.named_lights()
+    ]
+    known = {layer.name: [layer] for layer in [*lights, *shadows, *_LAYERS.values()]}
+    known |= {"lights": lights, "shadows": shadows}
+    problems = [f"no layer '{name}'; {suggestion(name, tuple(known))}" for name in names if name not in known]
+    if problems:
+        raise InputError(problems)
+    return list({layer.name: layer for name in names for layer in known[name]}.values())
 
 
 def _rgb(name: str) -> tuple[str, ...]:

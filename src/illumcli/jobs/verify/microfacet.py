@@ -45,8 +45,8 @@ def ndf(inputs: Inputs) -> Lanes:
     n, h, d = inputs.unit("n"), inputs.unit("h"), inputs.part("D")
     if not dot(n, h)[0] > 0:
         return np.zeros(1, inputs.dtype)
-    length2 = terms.s_s(h)
-    cosine, sin2 = terms.n_h(terms.n_s(n, h), length2), terms.sin2_h(terms.nxs(n, h), length2)
+    n_s, length2 = terms.n_s(n, h), terms.s_s(h)
+    cosine, sin2 = terms.n_h(n_s, length2), terms.sin2_h(terms.nxs(n, h), n_s, length2)
     if d.value("kind") == "beckmann_slope1d":
         return _microfacet.beckmann_slope1d(cosine, sin2, d.lanes("m"))
     distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)

@@ -18,6 +18,8 @@ EXTENDS = {
     "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
 }
 
+MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
+
 
 def run() -> str:
     """The schema as JSON text; ``schemas/scene.schema.json`` is this text."""
@@ -37,11 +39,11 @@ class _Schema(GenerateJsonSchema):
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made, cls = super().model_schema(schema), schema["cls"]
         made["description"] = summary(cls)
-        docs, tag = field_docs(cls), cls.__module__.rpartition(".")[2]
+        docs = field_docs(cls)
         for name, part in made["properties"].items():
             if name in docs:
                 part["description"] = docs[name]
-            if part.get("const") == tag:  # of an open family: the file's name is the tag
+            if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:
                 part.pop("default", None)
                 made["required"] = sorted({name, *made.get("required", ())})
         return made

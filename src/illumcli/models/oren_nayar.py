@@ -19,7 +19,7 @@ Not followed: 0.3 for 0.33 in C1; rho / pi for rho^2 / pi in f2, which is of two
 
 References
 ----------
-Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. SIGGRAPH '94, eq. 25-30.
+Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. SIGGRAPH '94.
 """
 
 from __future__ import annotations

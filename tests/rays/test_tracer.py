@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from illumcli.errors import IllumError
+from illumcli.rays import upload
 from illumcli.rays.tracer import Interrupted, Tracer
 
 F = np.float32
@@ -139,3 +140,28 @@ def test_no_arrays_crash_it(o_shape, d_shape, limit_shape, o_type, d_type):
     else:
         with pytest.raises(ValueError, match=r"must be|for"):
             tracer.occluded(o, d, limits)
+
+
+def test_upload_answers_as_embreex_own_mesh_does(ball, monkeypatch):
+    vertices, faces = ball
+    rng = np.random.default_rng(8)
+    o = rng.uniform(-2, 2, (5000, 3)).astype(F)
+    d = (rng.uniform(-1, 1, (5000, 3)) - o).astype(F)
+    shared = Tracer(vertices.astype(F), faces).closest(o, d)
+    monkeypatch.setattr(upload, "_library", lambda: None)
+    own = Tracer(vertices.astype(F), faces).closest(o, d)
+    for name in ("triangle", "u", "v", "distance"):
+        assert getattr(shared, name).tobytes() == getattr(own, name).tobytes()
+
+
+def test_upload_knows_its_place_in_memory():
+    from embreex.rtcore_scene import EmbreeScene
+
+    assert upload._handle(EmbreeScene(robust=True))
+    assert upload._handle(Elsewhere()) is None
+
+
+class Elsewhere:
+    """A scene of another layout."""
+
+    is_committed = 0

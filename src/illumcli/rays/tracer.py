@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors
 from illumcli.errors import IllumError
+from illumcli.rays.upload import upload
 
 AT_ONCE = 1 << 18
 """Rays per call: an interrupt waits for one call at most."""
@@ -43,7 +44,6 @@ class Tracer:
     """Two questions about a set of triangles, asked with arrays; safe to ask from many threads."""
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
-        from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
         errors = _Errors()
@@ -55,9 +55,7 @@ class Tracer:
             self.rays = 0
             self._stop: threading.Event | None = None
             if len(triangles):
-                TriangleMesh(
-                    self._scene, np.ascontiguousarray(vertices, F), np.ascontiguousarray(triangles, np.int32)
-                )
+                upload(self._scene, vertices, triangles)
             # the first ray builds the tree, which must happen before threads ask
             probe = np.zeros((1, 3), F)
             self._scene.run(probe, probe + F(1), query="OCCLUDED")

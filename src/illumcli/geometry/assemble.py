@@ -52,7 +52,7 @@ def transform_matrix(transform: Any, mesh: Mesh) -> NDArray[np.float64]:
     for axis, degrees in enumerate(transform.rotate):
         matrix = rotation(axis, degrees) @ matrix
     if transform.fit is not None and len(mesh.corners):
-        low, high = bounds(mesh.vertices[np.unique(mesh.corners)] @ matrix[:3, :3].T)
+        low, high = bounds(mesh.vertices[used(mesh)] @ matrix[:3, :3].T)
         size = transform.fit / (np.linalg.norm((high - low) / 2) or 1.0)
         matrix[:3, :3] *= size
         matrix[:3, 3] = -size * np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -80,6 +80,13 @@ def bounds(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     return points.min(axis=0), points.max(axis=0)
 
 
+def used(mesh: Mesh) -> NDArray[np.bool_]:
+    """(V,) True for the vertices that some polygon has."""
+    mask = np.zeros(len(mesh.vertices), np.bool_)
+    mask[mesh.corners] = True
+    return mask
+
+
 def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> World:
     """Mesh i under matrix i, all in one World whose box has its centre at 0 and half its diagonal 1.
 
@@ -94,9 +101,10 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
         moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
         own = cut.corners[:, ::-1] if mirrored else cut.corners
-        used = moved[mesh.corners] if len(mesh.corners) < len(moved) else moved[np.unique(mesh.corners)]
-        if len(used):
-            low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+        in_use = used(mesh)
+        if in_use.any():
+            lowest, highest = bounds(moved[in_use])
+            low, high = np.minimum(low, lowest), np.maximum(high, highest)
         placed.append(
             Placed(
                 mesh, matrix, mirrored, first["vertex"], first["corner"], first["polygon"], first["triangle"]
@@ -113,9 +121,7 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
         first["triangle"] += len(own)
         for what, count in mesh.repairs.items():
             repairs[what] = repairs.get(what, 0) + count
-        unused = len(mesh.vertices) - int(
-            np.count_nonzero(np.bincount(mesh.corners, minlength=len(mesh.vertices)))
-        )
+        unused = len(in_use) - int(np.count_nonzero(in_use))
         if unused:
             repairs["unused vertices"] = repairs.get("unused vertices", 0) + unused
     if not np.isfinite(low).all():

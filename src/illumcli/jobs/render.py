@@ -96,7 +96,7 @@ def run(
     if due:
         tally = Tally()
         shared = run_once(steps, tally)
-        report.repairs = dict(shared["world"].repairs)
+        report.repairs = repairs(shared)
         for view in steps.views:
             mine = [target for target in due if target.view is view]
             if mine:
@@ -105,6 +105,13 @@ def run(
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
     return [target.path for target in targets], report
+
+
+def repairs(shared: Mapping[str, Any]) -> dict[str, int]:
+    """What was put right in meshes and textures: class -> count."""
+    return {
+        what: count for made in shared.values() for what, count in getattr(made, "repairs", {}).items()
+    }
 
 
 def image_set(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from illumcli.demand import Recipe
@@ -15,6 +15,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.plan import stages
 from illumcli.scene.spec import Obscurance, Scene, default_material
 from illumcli.shading.terms import words
+from illumcli.shading.textures import paths
 from illumcli.variants import suggestion
 
 SMOOTH = ("gouraud", "phong", "quadratic")
@@ -138,6 +139,12 @@ def _glows(model: IlluminationModel, color: Any) -> bool:
     return not isinstance(color, tuple) or any(color)
 
 
+def may_vary(scene: Scene, purpose: str) -> bool:
+    """May a parameter that serves `purpose` (`lobes`, `ambient`, `emission`) vary over some surface?"""
+    models = candidates(scene)
+    return models is None or any(paths(model, purpose) for model in models)
+
+
 def active_lights(scene: Scene) -> dict[str, Light]:
     """The lights that send anything, by name."""
     return {name: light for name, light in scene.named_lights().items() if any(light.color())}
@@ -154,7 +161,7 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(partial(stages.meshes, scene, loaded), "meshes"),
         Recipe.of(partial(stages.world, scene), "world"),
         Recipe.of(stages.tracer_over, "tracer"),
-        Recipe.of(partial(stages.materials_of, scene), "materials"),
+        Recipe.of(partial(stages.materials_of, scene, loaded), "materials"),
         Recipe.of(partial(stages.corner_normals, scene, rate), "corner_normals"),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
@@ -170,8 +177,8 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(stages.shadow_origins, **smooth),
         Recipe.of(stages.obscurance_origins),
         Recipe.of(partial(stages.obscurance, scene.obscurance or Obscurance(), scene.seed), "obscurance"),
-        Recipe.of(stages.ambient_color),
-        Recipe.of(stages.emission),
+        Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
+        Recipe.of(stages.emission, **_varying(scene, "emission")),
         Recipe.of(stages.alpha),
         Recipe.of(stages.depth),
         Recipe.of(stages.world_position),
@@ -182,10 +189,23 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(stages.material_id),
         Recipe.of(stages.triangle_id),
     ]
-    eye = {word: word for word in ("v", "t") if word in wanted}
+    images = cache(partial(stages.image, loaded))
+    for purpose in ("lobes", "ambient", "emission"):
+        if may_vary(scene, purpose):
+            read, made = f"{purpose}_textures", f"{purpose}_parameters"
+            book += [
+                Recipe.of(partial(stages.textures, scene, images, purpose), read),
+                Recipe.of(stages.parameters, made, textures=read),
+            ]
+    eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
     for name, light in scene.named_lights().items():
         book += _light(name, light, eye, at_samples)
     return {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+
+
+def _varying(scene: Scene, purpose: str) -> dict[str, str]:
+    """The need of a stage that asks for parameters that may vary."""
+    return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
 
 
 def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) -> list[Recipe]:

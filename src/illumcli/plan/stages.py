@@ -24,8 +24,10 @@ from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
 from illumcli.shading.ambient import ambient_light
 from illumcli.shading.ambient import coupled as coupled_light
-from illumcli.shading.materials import Materials, colors_at, materials
+from illumcli.shading.materials import Materials, materials
 from illumcli.shading.rates import Points
+from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
+from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
 from illumcli.visibility.arriving import Lit
 from illumcli.visibility.arriving import lit as lit_lanes
@@ -121,15 +123,38 @@ def polygon_normals(scene: Scene, meshes: Sources, world: World) -> NDArray[np.f
     return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 
 
-def materials_of(scene: Scene, meshes: Sources, world: World) -> Materials:
-    """The materials of all triangles."""
-    own = [scene.material_of(thing) for thing in scene.objects]
+def materials_of(scene: Scene, loaded: Any, meshes: Sources, world: World) -> Materials:
+    """The materials of all triangles, their measurements found on disk."""
+    own = [_found(loaded, scene.material_of(thing)) for thing in scene.objects]
+    named = {name: _found(loaded, model) for name, model in scene.materials.items()}
     names = [
         thing.material if isinstance(thing.material, str) and not thing.override else name
         for thing, name in zip(scene.objects, scene.object_names(), strict=True)
     ]
     imported = [isinstance(source, MeshFile) and source.materials for source in meshes.sources]
-    return materials(world, scene.materials, own, names, imported, default_material())
+    return materials(world, named, own, names, imported, default_material())
+
+
+def _found(loaded: Any, model: Any) -> Any:
+    """The model with the path of its measurement, where it has one, as the scene means it."""
+    if not hasattr(model, "file"):
+        return model
+    from illumcli.scene.load import resolve
+
+    return model.at({"file": str(resolve(loaded, model.file))})
+
+
+def image(loaded: Any, path: str, space: Any) -> NDArray[np.float32]:
+    """(H, W, C) linear image of a texture."""
+    from illumcli.files.images import read_texture
+    from illumcli.scene.load import resolve
+
+    return read_texture(resolve(loaded, path), space)
+
+
+def textures(scene: Scene, read: Any, purpose: str, world: World, materials: Materials) -> Varying:
+    """What the parameters of materials that serve `purpose` vary by."""
+    return varying(world, materials, scene.object_names(), purpose, read)
 
 
 # --- per tile: samples and what they see --------------------------------------------------------------
@@ -218,6 +243,13 @@ def material(world: World, materials: Materials, points: Points) -> Ids:
     return materials.number(world, points.triangle)
 
 
+def parameters(
+    world: World, textures: Varying, material: Ids, points: Points, uvs: CornerVectors
+) -> Parameters:
+    """The parameters that vary over the surface, at every point."""
+    return parameters_at(world, textures, material, points.triangle, points.u, points.v, uvs)
+
+
 def view_vectors(view: Any, world: World, points: Points) -> Vectors:
     """(E, 3) float32 unit vectors to the eye."""
     if view.camera.projection == "orthographic":
@@ -293,10 +325,13 @@ def direct(
     lit: Lit,
     v: Vectors | None = None,
     t: Vectors | None = None,
+    parameters: Parameters | None = None,
 ) -> dict[str, Vectors]:
     """One light's response per lobe at the samples, its shadow not applied."""
     given = {"n": points.n} | ({"v": v} if v is not None else {}) | ({"t": t} if t is not None else {})
-    at_points = shading.response(materials.models, materials.lobes, material, lit, light.color(), given)
+    at_points = shading.response(
+        materials.models, materials.lobes, material, lit, light.color(), given, parameters
+    )
     return {name: points.spread(value) for name, value in at_points.items()}
 
 
@@ -359,9 +394,13 @@ def obscurance(
     )
 
 
-def ambient_color(materials: Materials, material: Ids, points: Points) -> Vectors:
+def ambient_color(
+    materials: Materials, material: Ids, points: Points, parameters: Parameters | None = None
+) -> Vectors:
     """(M, 3) k_a."""
-    return points.spread(colors_at([model.ambient_color() for model in materials.models], material))
+    return points.spread(
+        surface_colors(materials.models, lambda model: model.ambient_color(), material, parameters)
+    )
 
 
 def ambient(color: Any, ambient_color: Vectors, obscurance: Lanes | None = None) -> Vectors:
@@ -377,9 +416,11 @@ def coupled(
     return coupled_light(ambient_color, color, direct, unlit, w)
 
 
-def emission(materials: Materials, material: Ids, points: Points) -> Vectors:
+def emission(
+    materials: Materials, material: Ids, points: Points, parameters: Parameters | None = None
+) -> Vectors:
     """(M, 3) L_e."""
-    return points.spread(colors_at([model.emission for model in materials.models], material))
+    return points.spread(surface_colors(materials.models, lambda model: model.emission, material, parameters))
 
 
 # --- per tile: data layers ----------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from illumcli.arrays import F, Lanes, Vectors
 
@@ -18,7 +17,7 @@ def ambient_light(
 
 def coupled(
     ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, unlit: Vectors, w: Lanes
-) -> NDArray[np.float32]:
+) -> Vectors:
     """(M, 3) (k_a I_a + direct) w + I_d, as one text prints it (Theoharis et al. 2008, eq. 12.75).
 
     `direct` is the material's response to all lights, `unlit` (I_d) the light that arrives, its cosine

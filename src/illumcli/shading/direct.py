@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
+from illumcli.shading.textures import Parameters
 from illumcli.visibility.arriving import Lit
 
 
@@ -36,6 +37,7 @@ def response(
     lit: Lit,
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
+    parameters: Parameters | None = None,
 ) -> dict[str, Vectors]:
     """Light leaving towards the eye at every point, per lobe, shadows not yet applied.
 
@@ -51,6 +53,8 @@ def response(
         Intensity or irradiance of the light.
     given : mapping
         (E, 3) words of the models at all points: `n`, and `v`, `t` where some model wants them.
+    parameters : Parameters, optional
+        What varies over the surface, at all points.
 
     Returns
     -------
@@ -64,12 +68,15 @@ def response(
         if not lobes[number]:
             continue
         at = pick(lit.lane, lanes)
-        wanted = words(lobes[number])
+        own = dict(lobes[number])
+        if parameters is not None and parameters.of_material[number]:
+            own = parameters.model(models[number], number, at).lobes()
+        wanted = words(own)
         here = {word: rows(given[word], at) for word in wanted if word in given}
         here["l"] = pick(lit.l, lanes)
         if "light" in wanted:
             here["light"] = power / max(power.max(), np.finfo(F).tiny)
-        values = evaluate(dict(lobes[number]), here)
+        values = evaluate(own, here)
         arriving = pick(lit.strength, lanes)[:, None] * power
         for name, value in values.items():
             out[name][at] = value * arriving

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -100,12 +101,22 @@ def materials(
 
 
 def imported_model(description: Mapping[str, Any]) -> IlluminationModel:
-    """A model from the keys that a mesh file's own library gives."""
+    """A model from the keys that a mesh file's own library gives.
+
+    Its textures lie where the library says, not in the scene's folder: their paths are made absolute.
+    """
     from illumcli.variants import member
 
-    return member("illumcli.models", description["model"]).model_validate(dict(description))
+    keys = {
+        name: {**value, "texture": str(Path(value["texture"]).absolute())}
+        if isinstance(value, Mapping) and "texture" in value
+        else value
+        for name, value in description.items()
+    }
+    return member("illumcli.models", str(keys["model"])).model_validate(keys)
 
 
 def colors_at(table: Sequence[Any], material: Ids) -> Vectors:
-    """(N, 3) float32 the colour of each lane's material."""
-    return rows(np.asfortranarray(np.asarray(table, F).reshape(-1, 3)), material)
+    """(N, 3) float32 the colour of each lane's material; black where it is something that varies."""
+    known = [color if isinstance(color, tuple) else (0.0, 0.0, 0.0) for color in table]
+    return rows(np.asfortranarray(np.asarray(known, F).reshape(-1, 3)), material)

@@ -102,15 +102,15 @@ def _quadratic(
 def _constant(
     world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
 ) -> Points:
-    """One point per polygon and side seen: its centre, its normal."""
+    """One point per polygon and side seen: its centre, its normal; its uv are those of the middle of its
+    first triangle, whichever of its triangles the tile sees."""
     polygon = world.polygons.take(hits.triangle)
     key, first, back = np.unique(polygon * 2 + facet.behind, return_index=True, return_inverse=True)
     own = key // 2
     third = np.full(len(key), 1 / 3, F)
     n = facing(rows(polygon_normals, own), facet.behind.take(first))
-    return Points(
-        hits.triangle.take(first), third, third, rows(centres, own), n, lambda values: rows(values, back)
-    )
+    triangle = np.searchsorted(world.polygons, own).astype(np.int32)
+    return Points(triangle, third, third, rows(centres, own), n, lambda values: rows(values, back))
 
 
 def _gouraud(
@@ -120,7 +120,7 @@ def _gouraud(
     corner = np.concatenate([world.corners[:, k].take(hits.triangle) for k in range(3)])
     behind = np.tile(facet.behind, 3)
     # corners that share vertex, normal and side share their value; uv may differ between them
-    key, first, back = np.unique(corner.astype(np.int64) * 2 + behind, return_index=True, return_inverse=True)
+    _, first, back = np.unique(corner.astype(np.int64) * 2 + behind, return_index=True, return_inverse=True)
     which, sample = np.divmod(first, len(hits.triangle))
     triangle = hits.triangle.take(sample)
     vertex = world.triangles[triangle, which]

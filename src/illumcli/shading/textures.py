@@ -1,0 +1,346 @@
+"""Parameters that vary over the surface: images looked up by uv, values at vertices interpolated.
+
+(0, 0) in uv is the lower left corner of an image and (1, 1) its upper right one; the centres of its texels
+lie half a texel inside. There are no smaller copies of an image for surfaces far away: the samples of a
+pixel average what the pixel covers, so a picture of fine textures wants more of them (`film.samples`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids, Vectors, columns, rows
+from illumcli.errors import InputError
+from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import Texture, VertexValues
+from illumcli.rays import surface
+from illumcli.shading.materials import Materials, colors_at
+
+Floats: TypeAlias = NDArray[np.float32]
+
+
+def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
+    """(N, C) values between the centres of the four texels around each uv.
+
+    Parameters
+    ----------
+    image : (H, W, C) float32, from the top
+    uv : (N, 2) float32, v upwards
+    wrap : {'repeat', 'clamp'}
+        What lies outside: the image again, or its border.
+    """
+    x, y = _texels(image, uv, wrap)
+    left, top = np.floor(x - F(0.5)), np.floor(y - F(0.5))
+    right_share, low_share = (x - F(0.5) - left)[:, None], (y - F(0.5) - top)[:, None]
+    x0, x1 = _inside(left, image.shape[1], wrap), _inside(left + 1, image.shape[1], wrap)
+    y0, y1 = _inside(top, image.shape[0], wrap), _inside(top + 1, image.shape[0], wrap)
+    upper = _mixed(_at(image, y0, x0), _at(image, y0, x1), right_share)
+    lower = _mixed(_at(image, y1, x0), _at(image, y1, x1), right_share)
+    return _mixed(upper, lower, low_share)
+
+
+def nearest(image: Floats, uv: Floats, wrap: str) -> Floats:
+    """(N, C) the texel that each uv lies in; parameters as those of `bilinear`."""
+    x, y = _texels(image, uv, wrap)
+    return _at(image, _inside(np.floor(y), image.shape[0], wrap), _inside(np.floor(x), image.shape[1], wrap))
+
+
+FILTERS: dict[str, Callable[[Floats, Floats, str], Floats]] = {"bilinear": bilinear, "nearest": nearest}
+
+
+def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
+    """Distance from the left and from the top of the image, in texels."""
+    inside = uv - np.floor(uv) if wrap == "repeat" else np.clip(uv, 0, 1)
+    height, width = image.shape[:2]
+    return inside[:, 0] * F(width), (1 - inside[:, 1]) * F(height)
+
+
+def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
+    """Column or row numbers within the image."""
+    whole = number.astype(np.int64)
+    return whole % count if wrap == "repeat" else np.clip(whole, 0, count - 1)
+
+
+def _at(image: Floats, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
+    return image.reshape(-1, image.shape[2]).take(y * image.shape[1] + x, axis=0)
+
+
+def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:
+    """From `a` at 0 to `b` at 1; exactly `a` where both are equal."""
+    return a + share * (b - a)
+
+
+# --- what varies, read once ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a parameter may be."""
+
+    width: int  # 3 for a colour, 1 for a number
+    low: float
+    high: float
+
+
+def parameter_range(model: IlluminationModel, path: str) -> Range:
+    """Range of the parameter at `path` (`diffuse`, `distribution.m`), from its description."""
+    *parts, name = path.split(".")
+    owner: Any = model
+    for part in parts:
+        owner = getattr(owner, part)
+    found = type(owner).model_json_schema()["properties"][name]
+    while choices := found.get("anyOf") or found.get("oneOf"):  # optional, varying: the value comes first
+        found = choices[0]
+    number = found["prefixItems"][0] if found["type"] == "array" else found
+    low = number.get("minimum", number.get("exclusiveMinimum", 0.0) + float(np.finfo(F).tiny))
+    return Range(len(found.get("prefixItems", "1")), low, number["maximum"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Map:
+    """An image that a parameter is looked up in, within the parameter's range."""
+
+    image: Floats  # (H, W, C)
+    filter: str
+    wrap: str
+    within: Range
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attribute:
+    """Values at the World's vertices that a parameter is interpolated from, within its range."""
+
+    values: Floats  # (V, C)
+    within: Range
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Varying:
+    """What the materials' parameters vary by."""
+
+    of_material: tuple[Mapping[str, Map | Attribute], ...] = ()  # by material number, by path
+    repairs: Mapping[str, int] = field(default_factory=dict)
+
+
+def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexValues]:
+    """The varying parameters that serve `purpose`: `lobes`, `ambient` or `emission`."""
+    found = model.varying()
+    own = {name: found.pop(name) for name in ("emission", "ambient") if name in found}
+    if purpose == "lobes":
+        return found if model.lobes() else {}
+    if purpose == "ambient" and model.ambient is None:
+        return found if model.diffuse_color() != (0.0, 0.0, 0.0) else {}
+    return {purpose: own[purpose]} if purpose in own else {}
+
+
+def varying(
+    world: World,
+    materials: Materials,
+    object_names: Sequence[str],
+    purpose: str,
+    read: Callable[[str, str], Floats],
+) -> Varying:
+    """Everything the materials on some surface vary by, read, checked against the meshes, and within range.
+
+    Parameters
+    ----------
+    read : callable
+        Path and space of a texture -> (H, W, C) linear image.
+
+    Raises
+    ------
+    InputError
+        Images that cannot be read, attributes or uv that a mesh does not have; all at once.
+    """
+    used_by = _objects_of(world, materials)
+    problems: list[str] = []
+    repairs: dict[str, int] = {}
+
+    def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute | None:
+        within = parameter_range(materials.models[number], path)
+        where = f"material {materials.names[number]}: {path}"
+        found = [_lacks(world, value, i, object_names[i], where, within.width) for i in used_by[number]]
+        if any(found):
+            problems.extend(filter(None, found))
+            return None
+        if isinstance(value, VertexValues):
+            table = _table(world, value.vertex, used_by[number], within.width)
+            return Attribute(_clipped(table, within, f"vertex values beyond {where}", repairs), within)
+        image = _channels(read(value.texture, value.space), value, within.width, where)
+        return Map(
+            _clipped(image, within, f"texels beyond {where}", repairs), value.filter, value.wrap, within
+        )
+
+    of_material: list[dict[str, Map | Attribute]] = []
+    for number, model in enumerate(materials.models):
+        mine: dict[str, Map | Attribute] = {}
+        for path, value in (paths(model, purpose) if used_by[number] else {}).items():
+            try:
+                made = source(number, path, value)
+            except InputError as error:
+                problems.extend(error.problems)
+            else:
+                if made is not None:
+                    mine[path] = made
+        of_material.append(mine)
+    if problems:
+        raise InputError(dict.fromkeys(problems))
+    return Varying(tuple(of_material), repairs)
+
+
+def _objects_of(world: World, materials: Materials) -> list[list[int]]:
+    """By material number, the objects that have it."""
+    material = materials.number(world, np.arange(len(world.triangles), dtype=np.int32))
+    pairs = np.unique(material.astype(np.int64) * len(world.placed) + world.objects)
+    found: list[list[int]] = [[] for _ in materials.models]
+    for number, thing in zip(*divmod(pairs, max(len(world.placed), 1)), strict=True):
+        found[number].append(int(thing))
+    return found
+
+
+def _lacks(
+    world: World, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
+) -> str | None:
+    """What object number `thing` lacks for a parameter to vary by `value`."""
+    mesh = world.placed[thing].mesh
+    if isinstance(value, Texture):
+        if mesh.uvs is not None and mesh.corner_uvs is not None:
+            return None
+        return (
+            f"object {name}: {where} is a texture and the mesh has no uv; export it with uv, or give a value"
+        )
+    if value.vertex not in mesh.attributes:
+        known = ", ".join(sorted(mesh.attributes)) or "none"
+        return f"object {name}: {where} wants the vertex attribute '{value.vertex}'; the mesh has: {known}"
+    shape = mesh.attributes[value.vertex].shape
+    if len(shape) == 1 or shape[1] == 1 or (width == 3 and shape[1] >= 3):
+        return None
+    wanted = "a colour" if width == 3 else "a number"
+    return (
+        f"object {name}: {where} is {wanted} and the vertex attribute '{value.vertex}' has {shape[1]} "
+        "numbers per vertex; name another"
+    )
+
+
+def _table(world: World, attribute: str, things: Sequence[int], width: int) -> Floats:
+    """(V, C) an attribute at the World's vertices, 0 where another object is."""
+    out = np.zeros((len(world.vertices), width), F)
+    for thing in things:
+        placed = world.placed[thing]
+        values = placed.mesh.attributes[attribute].reshape(len(placed.mesh.vertices), -1)
+        out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :3] if width == 3 else values
+    return out
+
+
+def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats:
+    """The channels of an image that a colour, or a number, is read from; grey stands for three equal ones."""
+    count = image.shape[2]
+    if width == 3:
+        return image[..., :3] if count >= 3 else np.repeat(image[..., :1], 3, axis=2)
+    number = "rgba".index(texture.channel)
+    if texture.channel == "a" and count in (2, 4):
+        number = count - 1
+    elif count <= 2 and number < 3:  # grey, with or without alpha
+        number = 0
+    elif number >= count:
+        raise InputError(f"{where}: {texture.texture} has no channel '{texture.channel}'; choose r, g or b")
+    return image[..., number : number + 1]
+
+
+def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, int]) -> Floats:
+    """`values` within the range, contiguous; how many were not is noted in `repairs`."""
+    beyond = int(np.count_nonzero((values < F(within.low)) | (values > F(within.high))))
+    if beyond:
+        repairs[f"{what} clipped to {within.low:g}..{within.high:g}"] = beyond
+        values = np.clip(values, F(within.low), F(within.high))
+    return np.ascontiguousarray(values)
+
+
+# --- at points ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parameters:
+    """Values of the varying parameters at E points, each where its material is."""
+
+    of_material: tuple[tuple[tuple[str, int], ...], ...]  # by number: path and width of what varies
+    values: Mapping[tuple[str, int], Floats]  # (E,) numbers or (E, 3) colours
+
+    def model(self, model: IlluminationModel, number: int, lanes: Ids | slice) -> IlluminationModel:
+        """The material of this number with its values at these points."""
+        names = self.of_material[number]
+        if not names:
+            return model
+        picked = {
+            path: self.values[path, width][lanes]
+            if isinstance(lanes, slice)
+            else rows(self.values[path, width], lanes)
+            for path, width in names
+        }
+        return model.at(picked)
+
+
+def parameters(
+    world: World,
+    varying: Varying,
+    material: Ids,
+    triangle: Ids,
+    u: Floats,
+    v: Floats,
+    uvs: CornerVectors | None,
+) -> Parameters:
+    """Every varying parameter at points on triangles.
+
+    Parameters
+    ----------
+    material : (E,) int32
+        Material number of each point.
+    triangle, u, v : (E,)
+        Where the points lie: triangle, weights of its corners 1 and 2.
+    """
+    names: list[tuple[tuple[str, int], ...]] = []
+    values: dict[tuple[str, int], Floats] = {}
+    for number, mine in enumerate(varying.of_material):
+        names.append(tuple((path, each.within.width) for path, each in mine.items()))
+        lanes = np.flatnonzero(material == number).astype(np.int32) if mine else np.zeros(0, np.int32)
+        if not lanes.size:
+            continue
+        at = triangle.take(lanes), u.take(lanes), v.take(lanes)
+        uv = None
+        for path, each in mine.items():
+            if isinstance(each, Attribute):
+                corners = tuple(world.triangles[:, k].take(at[0]) for k in range(3))
+                a, b, c = (each.values.take(index, axis=0) for index in corners)
+                found = (1 - at[1] - at[2])[:, None] * a + at[1][:, None] * b + at[2][:, None] * c
+            else:
+                assert uvs is not None
+                uv = surface.uv(world, uvs, *at) if uv is None else uv
+                found = FILTERS[each.filter](each.image, uv, each.wrap)
+            key = path, each.within.width
+            whole = values.setdefault(key, np.zeros((len(material), each.within.width), F, order="F"))
+            whole[lanes] = np.clip(found, F(each.within.low), F(each.within.high))  # sums round beyond
+    return Parameters(
+        tuple(names), {key: whole[:, 0] if key[1] == 1 else columns(whole) for key, whole in values.items()}
+    )
+
+
+def surface_colors(
+    models: Sequence[IlluminationModel],
+    color: Callable[[IlluminationModel], Any],
+    material: Ids,
+    parameters: Parameters | None = None,
+) -> Vectors:
+    """(E, 3) float32 a colour of each point's material, from its values at the point where it varies."""
+    out = colors_at([color(model) for model in models], material)
+    for number, model in enumerate(models if parameters is not None else ()):
+        if parameters is not None and parameters.of_material[number]:
+            lanes = np.flatnonzero(material == number).astype(np.int32)
+            if lanes.size:
+                out[lanes] = color(parameters.model(model, number, lanes))
+    return out

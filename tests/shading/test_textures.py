@@ -1,0 +1,289 @@
+"""Parameters that vary: look-ups against exact values, ranges, what a mesh lacks, what a plan reads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.errors import InputError
+from illumcli.files.images import ImageWriter
+from illumcli.jobs.check import run as check
+from illumcli.models.cook_torrance import CookTorrance
+from illumcli.models.oren_nayar import OrenNayar
+from illumcli.pixels import from_srgb
+from illumcli.plan.execute import Tally, bands, run_once
+from illumcli.plan.plan import plan
+from illumcli.scene.load import load
+from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
+
+F = np.float32
+FOUR = np.array([[[1.0], [2.0]], [[3.0], [4.0]]], F)  # the row of 3 and 4 is the bottom one
+
+
+def at(*uv):
+    return np.asarray(uv, F).reshape(-1, 2)
+
+
+def test_v_grows_upwards_from_the_bottom_row():
+    np.testing.assert_array_equal(
+        nearest(FOUR, at(0.25, 0.25, 0.75, 0.25, 0.25, 0.75, 0.75, 0.75), "repeat")[:, 0], [3, 4, 1, 2]
+    )
+
+
+def test_bilinear_at_the_centres_is_the_texels_and_halfway_their_mean():
+    np.testing.assert_array_equal(bilinear(FOUR, at(0.25, 0.25, 0.75, 0.75), "repeat")[:, 0], [3, 2])
+    np.testing.assert_array_equal(bilinear(FOUR, at(0.5, 0.5), "repeat")[:, 0], [2.5])
+
+
+@pytest.mark.parametrize("lookup", [bilinear, nearest])
+def test_a_linear_ramp_comes_back_as_it_is(lookup):
+    width, height = 64, 16
+    centre = (np.arange(width, dtype=F) + F(0.5)) / width
+    ramp = np.broadcast_to(centre[None, :, None], (height, width, 1))
+    u = np.random.default_rng(1).uniform(0.02, 0.98, 500).astype(F)
+    found = lookup(ramp, np.stack([u, u], axis=1), "clamp")[:, 0]
+    np.testing.assert_allclose(found, u, atol=1e-6 if lookup is bilinear else 0.5 / width + 1e-6)
+
+
+@pytest.mark.parametrize("lookup", [bilinear, nearest])
+def test_repeat_shows_the_image_again_and_clamp_its_border(lookup):
+    inside = at(0.1, 0.2, 0.6, 0.9, 0.99, 0.5)
+    for step in ((3, 0), (0, -2), (-1, 5)):
+        np.testing.assert_allclose(
+            lookup(FOUR, inside + F(step), "repeat"), lookup(FOUR, inside, "repeat"), atol=1e-5
+        )
+    np.testing.assert_array_equal(lookup(FOUR, at(-7, -7, 9, 9, -1e30, 1e30), "clamp")[:, 0], [3, 2, 1])
+    np.testing.assert_array_equal(bilinear(FOUR, at(0, 0.25), "repeat")[:, 0], [3.5])
+    np.testing.assert_array_equal(bilinear(FOUR, at(0, 0.25), "clamp")[:, 0], [3])
+
+
+def test_a_uv_just_below_zero_stays_inside():
+    assert np.isfinite(bilinear(FOUR, at(-1e-9, -1e-9, 1e30, -1e30), "repeat")).all()
+
+
+def test_ranges_are_those_of_the_parameters():
+    assert parameter_range(OrenNayar(), "sigma") == Range(1, 0, 1.5708)
+    assert parameter_range(OrenNayar(), "diffuse") == Range(3, 0, 1)
+    assert parameter_range(OrenNayar(), "ambient") == Range(3, 0, 1e18)
+    model = CookTorrance.model_validate({"model": "cook_torrance", "distribution": {"D": "ggx"}})
+    assert parameter_range(model, "distribution.alpha") == Range(1, 1e-4, 10)
+
+
+# --- in a scene ----------------------------------------------------------------------------------------
+
+SCENE = """
+version: 1
+camera: {{projection: orthographic, position: [0, 5, 0], target: [0, 0, 0], up: [0, 0, -1], extent: 2}}
+film: {{width: 8, height: 8, samples: 1}}
+ambient: {ambient}
+materials:
+  printed: {material}
+objects:
+  - {{name: sheet, mesh: {mesh}, material: printed}}
+lights:
+  - {{light: directional, direction: [0, -1, 0], irradiance: 3.141592653589793, shadows: false}}
+"""
+PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property float red
+property float green
+property float blue
+property float worn
+element face 1
+property list uchar int vertex_indices
+end_header
+-1 0 1  0 0 0 0
+1 0 1  1 0 0 0.5
+1 0 -1  1 1 0 3
+-1 0 -1  0 1 0 0.5
+4 0 1 2 3
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def write(material, mesh="{shape: plane}", ambient="0"):
+        path = tmp_path / "scene.yaml"
+        path.write_text(SCENE.format(material=material, mesh=mesh, ambient=ambient))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def picture():
+    def render(path, *only, side=None, overrides=()):
+        loaded = load(path, overrides)
+        steps = plan(loaded.scene, loaded, only)
+        shared = run_once(steps, Tally())
+        made = list(bands(steps, shared, steps.views[0], 1, Tally(), side=side))
+        layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
+        repairs = {}
+        for buffer in shared.values():
+            repairs |= getattr(buffer, "repairs", {})
+        return layers, repairs
+
+    return render
+
+
+def write_image(path, texels):
+    """An 8-bit PNG from (H, W, C) values, the first row on top."""
+    names = ["R", "G", "B", "A"][: texels.shape[2]] if texels.shape[2] > 1 else ["Y"]
+    with ImageWriter(path, texels.shape[1], texels.shape[0], dict.fromkeys(names, "uint8")) as out:
+        out.write_band(0, texels.astype(np.uint8))
+    return path
+
+
+@pytest.fixture
+def print_(tmp_path):
+    """Four colours: red, green above blue, white."""
+    corners = np.array([[[200, 0, 0], [0, 200, 0]], [[0, 0, 200], [200, 200, 200]]])
+    return write_image(tmp_path / "print.png", corners)
+
+
+def test_a_colour_texture_lies_on_the_plane_upright_and_linear(scene, picture, print_):
+    path = scene("{model: lambert, diffuse: {texture: print.png, filter: nearest}}")
+    beauty = picture(path)[0]["beauty"]
+    level = from_srgb(np.array(200 / 255))  # irradiance pi: the radiance is the albedo
+    np.testing.assert_allclose(beauty[1, 1], [level, 0, 0], rtol=1e-5)
+    np.testing.assert_allclose(beauty[1, 6], [0, level, 0], rtol=1e-5)
+    np.testing.assert_allclose(beauty[6, 1], [0, 0, level], rtol=1e-5)
+    np.testing.assert_allclose(beauty[6, 6], [level] * 3, rtol=1e-5)
+
+
+@pytest.mark.parametrize("rate", ["constant", "gouraud", "phong", "quadratic"])
+def test_tiles_change_nothing(scene, picture, print_, rate):
+    path = scene(
+        "{model: oren_nayar, diffuse: {texture: print.png}, sigma: {texture: print.png, channel: g}}",
+        "{shape: sphere, segments: 7, rings: 5}",
+        ambient="0.2",
+    )
+    rates = [f"shading={rate}"]
+    whole, small = (picture(path, overrides=rates, side=side)[0]["beauty"] for side in (8, 2))
+    np.testing.assert_array_equal(whole, small)
+    assert whole.std() > 0.01
+
+
+def test_a_number_reads_its_channel_as_data(scene, picture, tmp_path):
+    write_image(tmp_path / "rough.png", np.full((2, 2, 3), (0, 51, 255)))
+    textured = scene("{model: oren_nayar, sigma: {texture: rough.png, space: linear, channel: g}}")
+    varied = picture(textured)[0]["beauty"]
+    plain = picture(scene("{model: oren_nayar, sigma: 0.2}"))[0]["beauty"]
+    np.testing.assert_allclose(varied, plain, rtol=1e-6)
+
+
+def test_values_beyond_the_range_are_clipped_and_counted(scene, picture, tmp_path):
+    (tmp_path / "sheet.ply").write_text(PLY)
+    path = scene("{model: strauss, smoothness: {vertex: worn}}", "sheet.ply")
+    layers, repairs = picture(path)
+    assert repairs == {"vertex values beyond material printed: smoothness clipped to 0..1": 1}
+    assert np.isfinite(layers["beauty"]).all()
+
+
+def test_vertex_colours_are_interpolated(scene, picture, tmp_path):
+    (tmp_path / "sheet.ply").write_text(PLY)
+    beauty = picture(scene("{model: lambert, diffuse: {vertex: color}}", "sheet.ply"))[0]["beauty"]
+    across = (np.arange(8) + 0.5) / 8
+    np.testing.assert_allclose(beauty[..., 0], np.tile(across, (8, 1)), atol=1e-6)
+    np.testing.assert_allclose(beauty[..., 1], np.tile(1 - across[:, None], (1, 8)), atol=1e-6)
+
+
+def test_ambient_and_emission_vary_too(scene, picture, print_):
+    keys = "{model: strauss, color: {texture: print.png}, smoothness: 0, emission: {texture: print.png}}"
+    layers, _ = picture(scene(keys, ambient="0.5"), "ambient", "emission")
+    np.testing.assert_allclose(layers["ambient"], layers["emission"] / 2, rtol=1e-5)
+    assert layers["emission"].std() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("material", "mesh", "said"),
+    [
+        (
+            "{model: lambert, diffuse: {vertex: paint}}",
+            "sheet.ply",
+            "object sheet: material printed: diffuse wants the vertex attribute 'paint'; "
+            "the mesh has: color, worn",
+        ),
+        (
+            "{model: lambert, diffuse: {vertex: color}}",
+            "{shape: plane}",
+            "object sheet: material printed: diffuse wants the vertex attribute 'color'; the mesh has: none",
+        ),
+        (
+            "{model: oren_nayar, sigma: {vertex: color}}",
+            "sheet.ply",
+            "object sheet: material printed: sigma is a number and the vertex attribute 'color' has 3 "
+            "numbers per vertex; name another",
+        ),
+        (
+            "{model: lambert, diffuse: {texture: print.png}}",
+            "sheet.ply",
+            "object sheet: material printed: diffuse is a texture and the mesh has no uv; export it with "
+            "uv, or give a value",
+        ),
+    ],
+)
+def test_what_a_mesh_lacks_is_said_before_anything_is_rendered(scene, tmp_path, print_, material, mesh, said):
+    (tmp_path / "sheet.ply").write_text(PLY)
+    loaded = load(scene(material, mesh))
+    with pytest.raises(InputError, match="object") as caught:
+        run_once(plan(loaded.scene, loaded), Tally())
+    assert caught.value.problems == (said,)
+
+
+def test_a_missing_texture_is_named_with_its_place(scene, print_):
+    path = scene("{model: lambert, diffuse: {texture: prnt.png}}")
+    loaded = load(path)
+    with pytest.raises(InputError, match=r"scene.yaml:7:\d+: .*prnt.png; did you mean 'print.png'"):
+        run_once(plan(loaded.scene, loaded), Tally())
+    assert check([path])[1]
+
+
+@pytest.mark.parametrize(
+    ("only", "material", "read"),
+    [
+        (["depth"], "{model: lambert, diffuse: {texture: print.png}}", []),
+        (["emission"], "{model: lambert, diffuse: {texture: print.png}}", []),
+        (["ambient"], "{model: lambert, diffuse: {texture: print.png}, ambient: 0.5}", []),
+        (["beauty"], "{model: lambert, diffuse: {texture: print.png}}", ["lobes_textures"]),
+        (["beauty"], "{model: lambert, emission: {texture: print.png}}", ["emission_textures"]),
+        (["beauty"], "{model: lambert, diffuse: 0, ambient: {texture: print.png}}", []),
+    ],
+)
+def test_images_are_read_only_for_what_is_made(scene, print_, only, material, read):
+    loaded = load(scene(material))
+    steps = plan(loaded.scene, loaded, only)
+    assert [step.makes for step in steps.once if step.makes.endswith("_textures")] == read
+
+
+def test_an_image_that_several_parameters_name_is_read_once(scene, picture, print_, monkeypatch):
+    from illumcli.files import images
+
+    opened, real = [], images.read_texture
+    monkeypatch.setattr(images, "read_texture", lambda *words: opened.append(words) or real(*words))
+    keys = "{model: strauss, color: {texture: print.png}, metalness: {texture: print.png, channel: b}}"
+    picture(scene(keys, ambient="1"))
+    assert len(opened) == 1
+
+
+def test_a_mesh_library_brings_its_textures(tmp_path, picture, print_):
+    (tmp_path / "assets").mkdir()
+    print_.rename(tmp_path / "assets" / "print.png")
+    (tmp_path / "assets" / "sheet.mtl").write_text("newmtl cover\nKd 1 1 1\nmap_Kd -clamp on print.png\n")
+    (tmp_path / "assets" / "sheet.obj").write_text(
+        "mtllib sheet.mtl\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "usemtl cover\nf 1/1 2/2 3/3 4/4\n"
+    )
+    path = tmp_path / "scene.yaml"
+    text = SCENE.format(
+        material="{model: lambert}", mesh="{file: assets/sheet.obj, materials: true}", ambient=0
+    )
+    path.write_text(text.replace(", material: printed", ""))
+    beauty = picture(path)[0]["beauty"] / np.pi  # blinn_phong has no 1/pi
+    level = from_srgb(np.array(200 / 255))
+    np.testing.assert_allclose(beauty[0, 0], [level, 0, 0], rtol=1e-5)
+    np.testing.assert_allclose(beauty[7, 7], [level] * 3, rtol=1e-5)

@@ -39,6 +39,8 @@ def illum(tmp_path):
     def run(*words: object, cwd: Path = tmp_path, **environment: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "illumcli", *map(str, words)]
         env = {**os.environ, **environment}
-        return subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, check=False, timeout=120)
+        return subprocess.run(
+            command, cwd=cwd, env=env, capture_output=True, text=True, check=False, timeout=120
+        )
 
     return run

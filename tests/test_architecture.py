@@ -12,10 +12,31 @@ import pytest
 SOURCE = Path(__file__).parents[1] / "src" / "illumcli"
 MODULES = sorted(SOURCE.rglob("*.py"))
 
-LEAVES = {"errors", "arrays", "demand", "variants", "description", "frame", "pixels", "docstrings", "__init__"}
+LEAVES = {
+    "errors",
+    "arrays",
+    "demand",
+    "variants",
+    "description",
+    "frame",
+    "pixels",
+    "docstrings",
+    "__init__",
+}
 MAY = {
     "cli": {"jobs"},
-    "jobs": {"plan", "scene", "film", "files", "shading", "visibility", "rays", "geometry", "models", "lights"},
+    "jobs": {
+        "plan",
+        "scene",
+        "film",
+        "files",
+        "shading",
+        "visibility",
+        "rays",
+        "geometry",
+        "models",
+        "lights",
+    },
     "plan": {"scene", "shading", "film", "files", "visibility", "rays", "geometry", "models", "lights"},
     "scene": {"models", "lights", "geometry", "visibility"},
     "visibility": {"rays", "geometry", "lights"},
@@ -81,5 +102,7 @@ def test_help_loads_nothing_heavy():
 
 def test_plan_loads_no_ray_core(root):
     scene = next(iter(sorted((root / "scenes").glob("*.yaml"))))
-    code = f"from illumcli.cli import illum\ntry:\n    illum(['plan', {str(scene)!r}])\nexcept SystemExit: pass"
+    code = (
+        f"from illumcli.cli import illum\ntry:\n    illum(['plan', {str(scene)!r}])\nexcept SystemExit: pass"
+    )
     assert not loaded_after(code) & {"embreex", "OpenImageIO"}

@@ -23,7 +23,7 @@ class Recipe:
 
         A parameter with a default is needed only when `renamed` names its buffer.
         """
-        name = makes or getattr(function, "__name__", "")
+        name = makes or str(getattr(function, "__name__", ""))
         needs = {p: renamed.pop(p, p) for p in required(function)}
         return cls(name, function, {**needs, **renamed})
 

@@ -62,7 +62,9 @@ def test_one_exr_holds_every_layer_and_pngs_hold_one_each(illum, scene, tmp_path
 
 
 def test_every_camera_gets_its_picture(illum, tmp_path):
-    text = SCENE.replace("film:", "cameras: {near: {position: [0, 0, 3]}, far: {position: [0, 0, 9], width: 8}}\nfilm:")
+    text = SCENE.replace(
+        "film:", "cameras: {near: {position: [0, 0, 3]}, far: {position: [0, 0, 9], width: 8}}\nfilm:"
+    )
     (tmp_path / "two.yaml").write_text(text)
     done = illum("render", "two.yaml", "-o", "{camera}.png")
     assert done.stdout.split() == ["near.png", "far.png"]
@@ -71,7 +73,9 @@ def test_every_camera_gets_its_picture(illum, tmp_path):
 
 def test_overridden_values_name_files_and_change_pictures(illum, scene, tmp_path):
     for red in (0.1, 0.9):
-        done = illum("render", scene, "-D", f"materials.clay.diffuse={red}", "-o", "red-{materials.clay.diffuse}.exr")
+        done = illum(
+            "render", scene, "-D", f"materials.clay.diffuse={red}", "-o", "red-{materials.clay.diffuse}.exr"
+        )
         assert done.returncode == 0, done.stderr
     low, high = (read_image(tmp_path / f"red-{red}.exr").channels["R"] for red in (0.1, 0.9))
     assert low.max() < high.max()

@@ -8,6 +8,7 @@ import pytest
 from illumcli.plan.execute import Tally, bands, run_once
 from illumcli.plan.plan import plan
 from illumcli.scene.load import load
+from illumcli.scene.spec import LAYERS
 
 SCENE = """
 version: 1
@@ -31,10 +32,7 @@ lights:
   - {light: spot, name: rim, position: [-2, 3, -1], target: [0, 0, 0], angle: 40, intensity: 20}
   - {light: directional, name: sun, direction: [1, -2, -1], irradiance: 0.3, shadows: false}
 """
-ALL = (
-    "beauty ambient diffuse specular emission lights shadows obscurance alpha depth position normal "
-    "geometric_normal uv object_id material_id triangle_id"
-).split()
+ALL = list(LAYERS)
 
 
 @pytest.fixture(scope="module")

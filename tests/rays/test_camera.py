@@ -24,7 +24,9 @@ def test_the_centre_looks_at_the_target_and_corners_open_by_the_field_of_view():
 
 
 def test_orthographic_rays_are_parallel_and_span_the_extent():
-    camera = Orthographic(projection="orthographic", position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), extent=4.0)
+    camera = Orthographic(
+        projection="orthographic", position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), extent=4.0
+    )
     o, d, _ = camera_rays(camera, UNIT, 200, 100, np.array([[100.0, 0.0], [200.0, 50.0]]))
     np.testing.assert_allclose(d, [[0, 0, -1]] * 2, atol=1e-7)
     np.testing.assert_allclose(o[:, :2], [[0, 2], [4, 0]], atol=1e-6)
@@ -32,7 +34,9 @@ def test_orthographic_rays_are_parallel_and_span_the_extent():
 
 def test_a_camera_a_million_radii_away_aims_as_well_as_a_near_one():
     for distance in (3.0, 1e6):
-        camera = Orthographic(projection="orthographic", position=(0.3, 0.2, distance), target=(0.3, 0.2, 0.0))
+        camera = Orthographic(
+            projection="orthographic", position=(0.3, 0.2, distance), target=(0.3, 0.2, 0.0)
+        )
         o, _, skipped = camera_rays(camera, UNIT, 100, 100, np.array([[50.5, 50.5]]))
         np.testing.assert_allclose(o[0], [0.31, 0.19, 1.25], atol=1e-6)
         assert skipped[0] == pytest.approx(distance - 1.25)

@@ -67,7 +67,7 @@ def test_no_ray_of_ten_million_that_leaves_a_convex_body_hits_it(bodies):
 @pytest.mark.parametrize("height", [0.0, 0.7])
 def test_a_plate_a_millionth_above_the_floor_still_shades_it(height):
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
-    vertices = np.concatenate([square + [0, 0, height], square + [0, 0, height + 1e-6]]).astype(F)
+    vertices = np.concatenate([square + np.array([0, 0, z]) for z in (height, height + 1e-6)]).astype(F)
     faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], np.int32)
     rng = np.random.default_rng(3)
     p = np.column_stack([rng.uniform(-0.9, 0.9, (4000, 2)), np.full(4000, float(F(height)))])

@@ -19,7 +19,9 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def scene(*quads):
     vertices = np.concatenate(quads)
-    faces = [[4 * k + a, 4 * k + b, 4 * k + c] for k in range(len(quads)) for a, b, c in ((0, 1, 2), (0, 2, 3))]
+    faces = [
+        [4 * k + a, 4 * k + b, 4 * k + c] for k in range(len(quads)) for a, b, c in ((0, 1, 2), (0, 2, 3))
+    ]
     return Tracer(vertices.astype(F), np.array(faces, np.int32))
 
 

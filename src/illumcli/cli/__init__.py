@@ -38,14 +38,12 @@ class Commands(click.Group):
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         try:
             return super().resolve_command(ctx, args)
-        except click.UsageError as error:
+        except click.UsageError:
             import difflib
 
             near = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            error.message = f"no command '{args[0]}'; " + (
-                f"did you mean '{near[0]}'?" if near else "see illum --help"
-            )
-            raise
+            way = f"did you mean '{near[0]}'?" if near else "see illum --help"
+            raise click.UsageError(f"no command '{args[0]}'; {way}", ctx) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

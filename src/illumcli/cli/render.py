@@ -59,8 +59,8 @@ def render(
         reports.append(done)
         for path in paths:
             click.echo(path)
-        for path in [] if quiet else done.kept:
-            click.echo(f"{path}: kept, its content is the same", err=True)
+        for kept in [] if quiet else done.kept:
+            click.echo(f"{kept}: kept, its content is the same", err=True)
         for what, count in {} if quiet else done.repairs.items():
             click.echo(f"{scene}: {what}: {count}", err=True)
         if verbose:

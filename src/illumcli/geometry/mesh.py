@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 class Mesh:
     """Polygons over vertices in the file's own order and count; nothing is merged.
 
-    Polygon p owns the corners ``starts[p]:starts[p + 1]``, counter-clockwise seen from outside. Normals and uv
-    are indexed per corner, so seams and creases need no copies of vertices. Arrays are read-only.
+    Polygon p owns the corners ``starts[p]:starts[p + 1]``, counter-clockwise seen from outside. Normals and
+    uv are indexed per corner, so seams and creases need no copies of vertices. Arrays are read-only.
     """
 
     vertices: NDArray[np.float64]  # (V, 3) as read

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, columns, dot, unit
+from illumcli.arrays import F, Lanes, Vectors, columns, dot, unit
 from illumcli.frame import Frame
 
 
@@ -26,7 +26,7 @@ def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
 
 def camera_rays(
     camera: Any, frame: Frame, width: int, height: int, points: NDArray[np.float64]
-) -> tuple[Vectors, Vectors, NDArray[np.float64]]:
+) -> tuple[Vectors, Vectors, Lanes]:
     """Rays through film positions, in radii from the scene's centre.
 
     Parameters
@@ -60,7 +60,7 @@ def camera_rays(
     return columns(start, F), columns(d, F), skipped
 
 
-def entry(o: NDArray[np.float64], d: NDArray[np.float64]) -> NDArray[np.float64]:
+def entry(o: Vectors, d: Vectors) -> Lanes:
     """(N,) distance along `d` to a little before the sphere of radius 1; 0 for rays that start near it.
 
     A ray that misses the sphere starts where it passes nearest.

@@ -36,7 +36,7 @@ def hashed(key: int, number: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 def unit_interval(bits: NDArray[np.uint32]) -> NDArray[np.float64]:
     """[0, 1) float64 from 32 bits."""
-    return bits * 2.0**-32
+    return np.multiply(bits, 2.0**-32, dtype=np.float64)
 
 
 @lru_cache(maxsize=32)

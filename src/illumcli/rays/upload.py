@@ -42,7 +42,7 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
         if not place:
             raise MemoryError
         room = (ctypes.c_uint32 * (width * len(array))).from_address(place)
-        np.frombuffer(room, array.dtype).reshape(-1, width)[:, :3] = array
+        np.frombuffer(memoryview(room), array.dtype).reshape(-1, width)[:, :3] = array
     library.rtcCommitGeometry(geometry)
     library.rtcAttachGeometry(handle, geometry)
     library.rtcReleaseGeometry(geometry)

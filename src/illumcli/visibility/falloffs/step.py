@@ -17,4 +17,4 @@ class Step(Falloff):
 
     def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
         """(N,) 1 at and beyond reach, 0 before."""
-        return (distance >= min(reach, np.finfo(distance.dtype).max)).astype(distance.dtype)
+        return (distance >= min(reach, float(np.finfo(distance.dtype).max))).astype(distance.dtype)

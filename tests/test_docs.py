@@ -1,0 +1,72 @@
+"""Every command that the documentation shows is run, on small pictures."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from illumcli.cli import COMMANDS
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+SMALL = ["-D", "film={width: 48, height: 27, samples: 1}"]
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0.2\nf 1 2 3\n"
+
+
+def commands(page: Path) -> list[str]:
+    """The `illum` lines of a page's shell blocks."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), flags=re.M | re.S)
+    lines = "".join(blocks).replace("\\\n", " ").splitlines()
+    return [line.removeprefix("$ ") for line in lines if line.removeprefix("$ ").startswith("illum ")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder as a reader of the pages has it: the scenes, and a mesh of their own."""
+    path = tmp_path_factory.mktemp("reader")
+    shutil.copytree(ROOT / "scenes", path / "scenes")
+    (path / "bunny.obj").write_text(TRIANGLE)
+    return path
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_runs(page, folder):
+    for line in commands(page):
+        words = shlex.split(line, comments=True)[1:]
+        small = SMALL if words[0] in ("render", "sweep") else []
+        command = [sys.executable, "-m", "illumcli", *words, *small]
+        environment = {**os.environ, "ILLUM_CACHE": str(folder / "cache")}
+        done = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode in (0, 3) if words[0] == "compare" else done.returncode == 0, (
+            line,
+            done.stderr,
+        )
+
+
+def test_readme_names_every_command():
+    text = (ROOT / "README.md").read_text()
+    for name in COMMANDS:
+        assert re.search(rf"^illum {name}\b", text, flags=re.M), name
+
+
+def test_readme_names_every_scene():
+    text = (ROOT / "README.md").read_text()
+    for scene in (ROOT / "scenes").glob("*.yaml"):
+        stem = "textbook-*" if scene.stem.startswith("textbook-") else scene.stem
+        assert f"`{stem}`" in text, scene.name
+
+
+def test_ci_runs_the_readmes_test_command():
+    text = (ROOT / "README.md").read_text()
+    command = ".venv/bin/python -m pytest -n 2"
+    assert f"\n{command}\n" in text
+    assert (ROOT / ".ci" / "run").read_text().rstrip().endswith(command)

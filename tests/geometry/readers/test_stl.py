@@ -73,7 +73,13 @@ def test_text_may_be_in_capitals_and_hold_several_solids(tmp_path: Path) -> None
         (text()[:-12], "a.stl:16: 'ends' is not what follows"),
         (text()[: text().index("endsolid")], "ends within a solid"),
         (text()[: text().index("  endfacet")], "ends within a solid"),
+        (text() + text().partition("\n")[2].partition("endsolid")[0], "ends within a solid"),
         ("solid a\n" + text(), "ends within a solid"),
+        ("solid a\n" + text() + "endsolid a\n", "ends within a solid"),
+        (
+            text().replace("outer loop\n", "outer loop\nendsolid\nsolid\n", 1),
+            "a.stl:4: 'endsolid' is not what",
+        ),
         (text().replace("    endloop", "", 1), "a.stl:8: 'endfacet' is not what follows"),
         (
             text().replace("endloop", "vertex 1 2 3\nendloop", 1),

@@ -160,7 +160,7 @@ def _unless(
     if usable.all():
         return corner_rows
     found[what] = int(np.count_nonzero(~usable))
-    return np.where(np.append(usable, False)[corner_rows], corner_rows, -1)
+    return np.where(np.append(usable, True)[corner_rows], corner_rows, -1)
 
 
 def _finite(name: str, values: NDArray[Any], found: dict[str, int]) -> NDArray[Any]:

@@ -9,7 +9,6 @@ The Khronos Group (2021). glTF 2.0 specification, 2.0.1. ISO/IEC 12113:2022.
 
 from __future__ import annotations
 
-import binascii
 import json
 import math
 from base64 import b64decode
@@ -17,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,12 +193,8 @@ class _Document:
     def _inline(self, uri: str, where: str) -> bytes:
         head, _, body = uri.partition(",")
         try:
-            return (
-                b64decode(body, validate=True)
-                if head.endswith(";base64")
-                else unquote(body).encode("latin-1")
-            )
-        except (binascii.Error, UnicodeEncodeError):
+            return b64decode(body, validate=True) if head.endswith(";base64") else unquote_to_bytes(body)
+        except ValueError:
             raise self.wrong(f"{where}.uri is no readable data URI") from None
 
     def accessor(self, index: Any, widths: tuple[int, ...]) -> NDArray[Any]:

@@ -73,7 +73,7 @@ def _text(path: Path, data: bytes) -> NDArray[np.float64]:
             f"{text.place(first)}: '{text.line(first):.40}' is not what follows in a facet; "
             "export the mesh again"
         )
-    if len(lines) % len(_FACET_LINES) or len(solids) % 2 or not (solids[::2] & ~solids[1::2]).all():
+    if not bounds[-1] or len(solids) % 2 or not (solids[::2] & ~solids[1::2]).all():
         raise InputError(f"{path}: ends within a solid; the file is cut off, export it again")
     corners = text.block(lines[words[lines] == keyword(b"vertex")], keyword=len(b"vertex"))
     values = corners.floats()

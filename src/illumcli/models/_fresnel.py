@@ -29,7 +29,8 @@ def dielectric(c: Any, eta: Any) -> Any:
     """Reflectance of a clear boundary for unpolarised light, 0..1; 1 where all is reflected inside.
 
     g^2 = eta^2 + c^2 - 1; Cook and Torrance's fraction, with (g - c) / (g + c) = (eta^2 - 1) / (g + c)^2 and
-    c (g -+ c) +- 1 = c g +- (1 - c^2), so that eta near 1 and c near 0 keep their digits.
+    c (g -+ c) +- 1 = c g +- (1 - c^2), so that eta near 1 and c near 0 keep their digits. Where g^2 < 0 both
+    quotients stop at -1: total reflection.
 
     Parameters
     ----------
@@ -39,14 +40,12 @@ def dielectric(c: Any, eta: Any) -> Any:
         Index behind the boundary over the index before it.
     """
     q0 = (eta - 1) * (eta + 1)
-    g2 = q0 + c * c
-    g = np.sqrt(np.maximum(g2, 0))
+    g = np.sqrt(np.maximum(q0 + c * c, 0))
     sin2, cg = (1 - c) * (1 + c), c * g
     tiny = np.finfo(g.dtype).tiny
     rs = np.clip(q0 / np.maximum(np.square(g + c), tiny), -1, 1)
     ratio = (cg - sin2) / np.maximum(cg + sin2, tiny)
-    inside = (g2 <= 0) & (q0 < 0)
-    return np.minimum(np.maximum(rs * rs * (1 + ratio * ratio) / 2, inside), 1)
+    return rs * rs * (1 + ratio * ratio) / 2
 
 
 def conductor(c: Any, eta: Any, k: Any) -> Any:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Tag
 
 from illumcli import description
-from illumcli.description import Description
+from illumcli.description import Description, Three, Within
 
 
 class Texture(Description):
@@ -50,24 +50,17 @@ Share: TypeAlias = Varying[description.Share]
 Positive: TypeAlias = Varying[description.Positive]
 NonNegative: TypeAlias = Varying[description.NonNegative]
 
-_Refraction = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.01, le=1e3)]
-_Extinction = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e3)]
-
 # a slope; below 1e-4 single precision holds no lobe
-Roughness: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=10)]]
+Roughness: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=10)]]
 # an angle in radians, less than a quarter turn
-HalfHeight: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-4, le=1.57)]]
+HalfHeight: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=1.57)]]
 # the spread of facet slopes, an angle in radians up to a quarter turn
-Spread: TypeAlias = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1.5708)]]
+Spread: TypeAlias = Varying[Annotated[float, Within(ge=0, le=1.5708)]]
 # indices of refraction
-Index: TypeAlias = Varying[_Refraction]
+Index: TypeAlias = Varying[Annotated[float, Within(ge=0.01, le=1e3)]]
 IndexColor: TypeAlias = Varying[
-    Annotated[
-        tuple[_Refraction, _Refraction, _Refraction], Field(strict=False), BeforeValidator(description.spread)
-    ]
+    Annotated[tuple[float, float, float], Three(Within(ge=0.01, le=1e3), spread=True)]
 ]
 ExtinctionColor: TypeAlias = Varying[
-    Annotated[
-        tuple[_Extinction, _Extinction, _Extinction], Field(strict=False), BeforeValidator(description.spread)
-    ]
+    Annotated[tuple[float, float, float], Three(Within(ge=0, le=1e3), spread=True)]
 ]

@@ -49,12 +49,11 @@ def rusinkiewicz(
 
 
 def merl_coordinates(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any]:
-    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d."""
-    half_turn = phi_d + np.pi * (phi_d < 0)
+    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d modulo pi."""
     return (
         np.sqrt(theta_h * (2 / np.pi)) * 90,
         theta_d * (2 / np.pi) * 90,
-        half_turn * (180 / np.pi) % 180,
+        phi_d * (180 / np.pi) % 180,
     )
 
 

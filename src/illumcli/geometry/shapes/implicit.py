@@ -43,7 +43,7 @@ class Implicit(Shape):
     f: FormulaText
     """Formula of x, y and z: + - * / **, pi, e, sin cos tan sinh cosh tanh exp log sqrt abs atan2 min max."""
     low: Vector = (-1.0, -1.0, -1.0)
-    high: Vector = (1.0, 1.0, 1.0)
+    high: Vector = Field((1.0, 1.0, 1.0), validate_default=True)
     """Corners of the box that is searched."""
     resolution: Annotated[int, Field(ge=2, le=512)] = 64
     """Cubic cells along the longest edge of the box; parts thinner than a cell may be missed."""

@@ -17,7 +17,7 @@ class Torus(Shape):
     shape: Literal["torus"] = "torus"
     major: Positive = 0.75
     """R, from the centre to the middle of the tube."""
-    minor: Positive = 0.25
+    minor: Positive = Field(0.25, validate_default=True)
     """r, radius of the tube, below R."""
     segments: Segments = 96
     """Facets around the axis."""

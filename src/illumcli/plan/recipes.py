@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 from illumcli.demand import Recipe
 from illumcli.errors import InputError
+from illumcli.files.content import Content
 from illumcli.film.film import Layer
+from illumcli.geometry.readers import companions
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import Texture
 from illumcli.plan import stages
-from illumcli.scene.spec import Obscurance, Scene, default_material
+from illumcli.scene.load import resolve
+from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
+from illumcli.shading.materials import DEFAULT, Token
 from illumcli.shading.terms import words
 from illumcli.shading.textures import paths
 from illumcli.variants import suggestion
@@ -151,21 +156,22 @@ def active_lights(scene: Scene) -> dict[str, Light]:
 
 
 def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
-    """Every buffer this scene could make, by name; `view` and `tile` are given."""
+    """Every buffer this scene could make, by name; `view` and `tile` are given.
+
+    A recipe binds only those parts of the scene that its buffer depends on: they are what the buffer is known
+    by (`plan.keys`).
+    """
     rate = rates(scene)
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
     at_samples = not {"constant", "gouraud"} & set(rate)
+    grains = tuple(thing.grain for thing in scene.objects)
+    by_uv = {"uv_tangents": "uv_tangents"} if None in grains else {}
     book = [
-        Recipe.of(partial(stages.meshes, scene, loaded), "meshes"),
-        Recipe.of(partial(stages.world, scene), "world"),
-        Recipe.of(stages.tracer_over, "tracer"),
-        Recipe.of(partial(stages.materials_of, scene, loaded), "materials"),
-        Recipe.of(partial(stages.corner_normals, scene, rate), "corner_normals"),
+        *_geometry(scene, loaded, rate),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
-        Recipe.of(partial(stages.polygon_normals, scene), "polygon_normals"),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
         Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
         Recipe.of(stages.hits),
@@ -173,7 +179,8 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(partial(stages.points, rate), "points", **smooth, **flat),
         Recipe.of(stages.material),
         Recipe.of(stages.view_vectors, "v"),
-        Recipe.of(partial(stages.tangents, scene), "t"),
+        Recipe.of(stages.uv_tangents),
+        Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
         Recipe.of(stages.shadow_origins, **smooth),
         Recipe.of(stages.obscurance_origins),
         Recipe.of(partial(stages.obscurance, scene.obscurance or Obscurance(), scene.seed), "obscurance"),
@@ -189,18 +196,96 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(stages.material_id),
         Recipe.of(stages.triangle_id),
     ]
-    images = cache(partial(stages.image, loaded))
-    for purpose in ("lobes", "ambient", "emission"):
-        if may_vary(scene, purpose):
-            read, made = f"{purpose}_textures", f"{purpose}_parameters"
-            book += [
-                Recipe.of(partial(stages.textures, scene, images, purpose), read),
-                Recipe.of(stages.parameters, made, textures=read),
-            ]
+    book += _materials(scene, loaded)
     eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
     for name, light in scene.named_lights().items():
         book += _light(name, light, eye, at_samples)
     return {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+
+
+def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
+    """Meshes, each source once, what is made of them all, and their normals."""
+    sources = [_source(scene, thing.mesh) for thing in scene.objects]
+    found = {mesh_name(scene, thing.mesh): source for thing, source in zip(scene.objects, sources, strict=True)}
+    names = list(found)
+    which = tuple(names.index(mesh_name(scene, thing.mesh)) for thing in scene.objects)
+    normals = tuple(source.normals if isinstance(source, MeshFile) else None for source in sources)
+    how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
+    methods = tuple("newell" if said is None else said.polygon for said in normals)
+    return [
+        *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
+        Recipe("meshes", partial(stages.meshes, which), {f"mesh:{name}": f"mesh:{name}" for name in names}),
+        Recipe.of(partial(stages.world, tuple(thing.transform for thing in scene.objects)), "world"),
+        Recipe.of(stages.frame),
+        Recipe.of(stages.repairs),
+        Recipe.of(stages.tracer_over, "tracer"),
+        Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
+        Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),
+    ]
+
+
+def _source(scene: Scene, mesh: Any) -> Any:
+    """The description of an object's mesh."""
+    if isinstance(mesh, str):
+        return scene.meshes[mesh] if mesh in scene.meshes else MeshFile(file=mesh)
+    return mesh
+
+
+def mesh_name(scene: Scene, mesh: Any) -> str:
+    """What an object's mesh is called: by its file, else by its name, else by its description."""
+    source = _source(scene, mesh)
+    if isinstance(source, MeshFile):
+        return source.file
+    return mesh if isinstance(mesh, str) else repr(source)
+
+
+def _read(loaded: Any, source: Any) -> Any:
+    """What a mesh is made from: the content of its file, or the shape."""
+    if not isinstance(source, MeshFile):
+        return source
+    return Content(partial(resolve, loaded, source.file), companions)
+
+
+def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
+    """Numbers of materials, their models, and what these vary by."""
+    tokens: list[Token | None] = []
+    models: dict[Token, Any] = {DEFAULT: default_material()}
+    for thing, name in zip(scene.objects, scene.object_names(), strict=True):
+        model = scene.material_of(thing)
+        of_scene = isinstance(thing.material, str) and not thing.override
+        token: Token = ("material", str(thing.material)) if of_scene else ("object", name)
+        tokens.append(None if model is None else token)
+        if model is not None:
+            models[token] = model
+    imported = tuple(
+        mesh_name(scene, thing.mesh) if getattr(_source(scene, thing.mesh), "materials", False) else None
+        for thing in scene.objects
+    )
+    if None in tokens:  # a mesh may select any material of the scene
+        models |= {("material", name): model for name, model in scene.materials.items()}
+    files = {model.file for model in models.values() if hasattr(model, "file")}
+    measured = {file: Content(partial(resolve, loaded, file)) for file in sorted(files)}
+    numbering = partial(stages.numbering, tuple(tokens), tuple(scene.materials), imported)
+    own = {"meshes": "meshes"} if any(imported) else {}
+    book = [
+        Recipe.of(numbering, "numbering"),
+        Recipe.of(partial(stages.materials_of, models, measured, imported), "materials", **own),
+    ]
+    named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
+    images = stages.Images({path: Content(partial(resolve, loaded, path)) for path in named}, loaded)
+    for purpose in ("lobes", "ambient", "emission"):
+        if may_vary(scene, purpose):
+            read, made = f"{purpose}_textures", f"{purpose}_parameters"
+            book += [
+                Recipe.of(partial(stages.textures, scene.object_names(), images, purpose), read),
+                Recipe.of(stages.parameters, made, textures=read),
+            ]
+    return book
+
+
+def _varied(models: Iterable[IlluminationModel]) -> list[Any]:
+    """Everything that some parameter varies by."""
+    return [each for model in models for each in model.varying().values()]
 
 
 def _varying(scene: Scene, purpose: str) -> dict[str, str]:
@@ -214,21 +299,29 @@ def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) ->
     if not any(light.color()):
         dark = partial(stages.black)
         return [Recipe.of(dark, f"light:{name}"), Recipe.of(partial(stages.no_shadow), shadow)]
+    place = light.placed()
+    color = light.color()
     way = {"shadow": shadow} if light.shadows else {}
+    arriving = lit
+    opened = []
+    if at_samples and light.shadows:  # what lies in shadow is not evaluated at all
+        arriving, way = f"free:{name}", {}
+        opened = [Recipe.of(stages.free, arriving, lit=lit, shadow=shadow)]
     return [
-        Recipe.of(partial(stages.lit, light), lit),
+        *opened,
+        Recipe.of(partial(stages.lit, place), lit),
         # where every model is evaluated at the samples, its lit points are those that want shadow rays
-        Recipe.of(partial(stages.reach, light), reach)
+        Recipe.of(partial(stages.reach, place), reach)
         if not at_samples
         else Recipe.of(stages.same, reach, lit=lit),
         Recipe.of(stages.shadow, shadow, reach=reach)
         if light.shadows
         else Recipe.of(stages.no_shadow, shadow),
-        Recipe.of(partial(stages.direct, light), f"direct:{name}", lit=lit, **eye),
+        Recipe.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),
         Recipe.of(stages.lobe_sum, f"light:{name}", direct=f"direct:{name}", **way),
         Recipe.of(partial(stages.one_lobe, "diffuse"), f"diffuse:{name}", direct=f"direct:{name}", **way),
         Recipe.of(partial(stages.one_lobe, "specular"), f"specular:{name}", direct=f"direct:{name}", **way),
-        Recipe.of(partial(stages.arriving_light, light), f"unlit:{name}", lit=lit, **way),
+        Recipe.of(partial(stages.arriving_light, color), f"unlit:{name}", lit=arriving, **way),
     ]
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, rows
+from illumcli.errors import InputError
+from illumcli.files.content import Content
+from illumcli.frame import Frame
 from illumcli.geometry import assemble
 from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.mesh import Mesh
@@ -19,59 +23,71 @@ from illumcli.rays.camera import camera_rays, film_points
 from illumcli.rays.offsets import lifted
 from illumcli.rays.surface import Facets, Hits
 from illumcli.rays.tracer import Tracer
-from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
+from illumcli.scene.spec import Obscurance
 from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
 from illumcli.shading.ambient import ambient_light
 from illumcli.shading.ambient import coupled as coupled_light
-from illumcli.shading.materials import Materials, materials
+from illumcli.shading.materials import Materials, Numbering, Token, materials
+from illumcli.shading.materials import numbering as number_materials
 from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
 from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
-from illumcli.visibility.arriving import Lit
+from illumcli.visibility.arriving import Lit, among
 from illumcli.visibility.arriving import lit as lit_lanes
 from illumcli.visibility.obscurance import obscurance as open_share
 
 # --- once: geometry ---------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sources:
-    """The mesh of every object, read once per source, and the normals settings of each."""
+def mesh(source: Any) -> Mesh:
+    """The mesh in a file, given by its `Content`, or of a shape.
 
-    meshes: tuple[Mesh, ...]
-    sources: tuple[Any, ...]
-
-
-def meshes(scene: Scene, loaded: Any) -> Sources:
-    """Every object's mesh; a source that several objects name is read once."""
+    Raises
+    ------
+    InputError
+        The file changed while it was read.
+    """
+    if not isinstance(source, Content):
+        return source.mesh()
     from illumcli.geometry.readers import read_mesh
-    from illumcli.scene.load import resolve
 
-    known: dict[str, Mesh] = {}
-    found, sources = [], []
-    for thing in scene.objects:
-        source = thing.mesh
-        if isinstance(source, str):
-            source = scene.meshes[source] if source in scene.meshes else MeshFile(file=source)
-        key = source.file if isinstance(source, MeshFile) else repr(source)
-        if key not in known:
-            known[key] = (
-                read_mesh(resolve(loaded, source.file)) if isinstance(source, MeshFile) else source.mesh()
-            )
-        found.append(known[key])
-        sources.append(source)
-    return Sources(tuple(found), tuple(sources))
+    made = read_mesh(source.path)
+    if source.has_changed:
+        raise InputError(f"{source.path}: changed while it was read; run again once it is whole")
+    return made
 
 
-def world(scene: Scene, meshes: Sources) -> World:
+def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
+    """The mesh of every object, by the number of its source."""
+    own = list(parts.values())
+    return tuple(own[k] for k in which)
+
+
+def world(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> World:
     """All triangles, placed, recentred and scaled to unit radius."""
     matrices = [
-        assemble.transform_matrix(thing.transform, mesh)
-        for thing, mesh in zip(scene.objects, meshes.meshes, strict=True)
+        assemble.transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)
     ]
-    return assemble.place(meshes.meshes, matrices)
+    return assemble.place(meshes, matrices)
+
+
+def frame(world: World) -> Frame:
+    """The scene's centre and radius."""
+    return world.frame
+
+
+@dataclass(frozen=True, slots=True)
+class Repairs:
+    """What was wrong with meshes and put right."""
+
+    repairs: Mapping[str, int]
+
+
+def repairs(world: World) -> Repairs:
+    """Class of fault -> count, all meshes together."""
+    return Repairs(world.repairs)
 
 
 def tracer_over(world: World) -> Tracer:
@@ -79,19 +95,22 @@ def tracer_over(world: World) -> Tracer:
     return Tracer(world.vertices, world.triangles)
 
 
-def corner_normals(scene: Scene, rate: list[str], meshes: Sources, world: World) -> CornerVectors:
-    """Shading normals of every corner; of flat-shaded objects their polygons' own."""
+def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> CornerVectors:
+    """Shading normals of every corner.
+
+    `how` says of each object whether they are its polygons' own (`flat`), what its file's description says
+    (`Normals`), or the mesh's own (None).
+    """
     from illumcli.geometry.normals import corner_normals as of_mesh
 
     known: dict[tuple[int, str], Any] = {}
     own = []
-    for mesh, source, how in zip(meshes.meshes, meshes.sources, rate, strict=True):
-        key = (id(mesh), "flat" if how == "constant" else repr(getattr(source, "normals", "")))
+    for mesh, said in zip(meshes, how, strict=True):
+        key = (id(mesh), repr(said))
         if key not in known:
-            if how == "constant":
+            if said == "flat":
                 known[key] = of_mesh(mesh, crease=0.0, use_file=False)
-            elif isinstance(source, MeshFile):
-                said = source.normals
+            elif said is not None:
                 known[key] = of_mesh(mesh, said.weights, said.crease, said.source == "file", said.polygon)
             else:
                 known[key] = of_mesh(mesh)
@@ -104,18 +123,24 @@ def uvs(world: World) -> CornerVectors:
     return assemble.world_uvs(world)
 
 
+def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
+    """Where u grows, at every corner of every triangle."""
+    return surface.uv_tangents(world, uvs)
+
+
 def polygon_centres(world: World) -> NDArray[np.float32]:
     """(P, 3) the centre of every polygon, in radii."""
     return assemble.polygon_centres(world)
 
 
-def polygon_normals(scene: Scene, meshes: Sources, world: World) -> NDArray[np.float32]:
-    """(P, 3) unit normal of every polygon, in scene directions."""
+def polygon_normals(
+    methods: tuple[str, ...], meshes: tuple[Mesh, ...], world: World
+) -> NDArray[np.float32]:
+    """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
     from illumcli.geometry.normals import polygon_normals as of_mesh
 
     parts = []
-    for mesh, source, placed in zip(meshes.meshes, meshes.sources, world.placed, strict=True):
-        method = source.normals.polygon if isinstance(source, MeshFile) else "newell"
+    for mesh, method, placed in zip(meshes, methods, world.placed, strict=True):
         turned = of_mesh(mesh, method) @ assemble.cofactors(placed.matrix[:3, :3]).T
         size = np.linalg.norm(turned, axis=1, keepdims=True)
         sign = -1 if placed.mirrored else 1
@@ -123,38 +148,54 @@ def polygon_normals(scene: Scene, meshes: Sources, world: World) -> NDArray[np.f
     return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 
 
-def materials_of(scene: Scene, loaded: Any, meshes: Sources, world: World) -> Materials:
-    """The materials of all triangles, their measurements found on disk."""
-    own = [_found(loaded, scene.material_of(thing)) for thing in scene.objects]
-    named = {name: _found(loaded, model) for name, model in scene.materials.items()}
-    names = [
-        thing.material if isinstance(thing.material, str) and not thing.override else name
-        for thing, name in zip(scene.objects, scene.object_names(), strict=True)
-    ]
-    imported = [isinstance(source, MeshFile) and source.materials for source in meshes.sources]
-    return materials(world, named, own, names, imported, default_material())
+def numbering(
+    own: tuple[Token | None, ...], named: tuple[str, ...], imported: tuple[str | None, ...], world: World
+) -> Numbering:
+    """The material number of every triangle, whatever the materials' parameters are."""
+    return number_materials(world, own, frozenset(named), imported)
 
 
-def _found(loaded: Any, model: Any) -> Any:
-    """The model with the path of its measurement, where it has one, as the scene means it."""
-    if not hasattr(model, "file"):
-        return model
-    from illumcli.scene.load import resolve
+def materials_of(
+    models: Mapping[Token, Any],
+    measured: Mapping[str, Content],
+    imported: tuple[str | None, ...],
+    numbering: Numbering,
+    meshes: tuple[Mesh, ...] = (),
+) -> Materials:
+    """The materials by number, their measurements found on disk; `meshes` where these bring some."""
+    found = {
+        token: model.at({"file": str(measured[model.file].path)}) if hasattr(model, "file") else model
+        for token, model in models.items()
+    }
+    libraries = {name: mesh.materials for name, mesh in zip(imported, meshes, strict=False) if name}
+    return materials(numbering, found, libraries)
 
-    return model.at({"file": str(resolve(loaded, model.file))})
+
+@dataclass(frozen=True)
+class Images:
+    """Reads the textures of a scene, each once."""
+
+    contents: Mapping[str, Content]
+    """By path, those that the scene itself names."""
+    loaded: Any = field(repr=False)
+    known: dict[Any, NDArray[np.float32]] = field(default_factory=dict, repr=False)
+
+    def __call__(self, path: str, space: Any) -> NDArray[np.float32]:
+        """(H, W, C) linear image of a texture of the scene, or of a mesh's own library."""
+        from illumcli.files.images import read_texture
+        from illumcli.scene.load import resolve
+
+        if (path, space) not in self.known:
+            found = self.contents[path].path if path in self.contents else resolve(self.loaded, path)
+            self.known[path, space] = read_texture(found, space)
+        return self.known[path, space]
 
 
-def image(loaded: Any, path: str, space: Any) -> NDArray[np.float32]:
-    """(H, W, C) linear image of a texture."""
-    from illumcli.files.images import read_texture
-    from illumcli.scene.load import resolve
-
-    return read_texture(resolve(loaded, path), space)
-
-
-def textures(scene: Scene, read: Any, purpose: str, world: World, materials: Materials) -> Varying:
+def textures(
+    object_names: tuple[str, ...], images: Images, purpose: str, world: World, materials: Materials
+) -> Varying:
     """What the parameters of materials that serve `purpose` vary by."""
-    return varying(world, materials, scene.object_names(), purpose, read)
+    return varying(world, materials, object_names, purpose, images)
 
 
 # --- per tile: samples and what they see --------------------------------------------------------------
@@ -202,16 +243,16 @@ class Rays:
 
     origins: Vectors
     directions: Vectors
-    skipped: NDArray[np.float64]  # (N,) from the eye to the origin, in radii
+    skipped: Lanes  # (N,) float64 from the eye to the origin, in radii
 
 
-def rays(film_filter: Any, world: World, view: Any, samples: Samples) -> Rays:
+def rays(film_filter: Any, frame: Frame, view: Any, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
     if samples.per_pixel == 1:
         points = np.stack([samples.x + 0.5, samples.y + 0.5], axis=1)
     else:
         points = film_points(samples.x, samples.y, samples.points, film_filter)
-    return Rays(*camera_rays(view.camera, world.frame, view.width, view.height, points))
+    return Rays(*camera_rays(view.camera, frame, view.width, view.height, points))
 
 
 def hits(tracer: Tracer, rays: Rays) -> Hits:
@@ -238,9 +279,9 @@ def points(
     return shading_rates.points(world, hits, facets, rate, normals, centres, polygon_normals)
 
 
-def material(world: World, materials: Materials, points: Points) -> Ids:
+def material(world: World, numbering: Numbering, points: Points) -> Ids:
     """(E,) material number at every point."""
-    return materials.number(world, points.triangle)
+    return numbering.number(world, points.triangle)
 
 
 def parameters(
@@ -250,51 +291,59 @@ def parameters(
     return parameters_at(world, textures, material, points.triangle, points.u, points.v, uvs)
 
 
-def view_vectors(view: Any, world: World, points: Points) -> Vectors:
+def view_vectors(view: Any, frame: Frame, points: Points) -> Vectors:
     """(E, 3) float32 unit vectors to the eye."""
     if view.camera.projection == "orthographic":
         backward = (-camera_axes(view.camera)[2]).astype(F)
         return np.asfortranarray(np.broadcast_to(backward, points.position.shape))
     from illumcli.lights._base import towards
 
-    return towards(world.frame.inward(view.camera.position), points.position)[0]
+    return towards(frame.inward(view.camera.position), points.position)[0]
 
 
-def tangents(scene: Scene, world: World, uvs: CornerVectors, points: Points) -> Vectors:
+def tangents(
+    grains: tuple[Any, ...], world: World, points: Points, uv_tangents: CornerVectors | None = None
+) -> Vectors:
     """(E, 3) float32 unit tangents: the grain of each object, or the direction of growing u."""
-    grain = surface.along_u(world, uvs, points.triangle)
+    if uv_tangents is None:
+        grain = np.zeros_like(points.n)
+    else:
+        grain = surface.along_u(uv_tangents, points.triangle, points.u, points.v)
     number = world.objects.take(points.triangle)
-    for i, (thing, placed) in enumerate(zip(scene.objects, world.placed, strict=True)):
-        if thing.grain is None:
+    for i, (own, placed) in enumerate(zip(grains, world.placed, strict=True)):
+        if own is None or not (lanes := np.flatnonzero(number == i)).size:
             continue
-        own = np.flatnonzero(number == i)
-        linear = placed.matrix[:3, :3]
-        if isinstance(thing.grain, tuple):
-            grain[own] = (linear @ thing.grain).astype(F)
+        linear = placed.matrix[:3, :3] / np.abs(placed.matrix[:3, :3]).max()
+        if isinstance(own, tuple):
+            way = linear @ (np.asarray(own) / np.abs(own).max())
+            grain[lanes] = way / (np.linalg.norm(way) or 1.0)
         else:
-            axis = assemble.cofactors(linear) @ thing.grain.axis
-            centre = world.frame.inward(linear @ thing.grain.centre + placed.matrix[:3, 3])
-            ring = np.cross(axis / np.linalg.norm(axis), rows(points.position, own) - centre)
-            grain[own] = ring.astype(F)
+            centre = world.frame.inward(placed.matrix[:3, :3] @ own.centre + placed.matrix[:3, 3])
+            grain[lanes] = surface.rings(linear, own.axis, centre, rows(points.position, lanes))
     return surface.tangent(points.n, surface.unit(grain))
 
 
 # --- per tile: light ----------------------------------------------------------------------------------
 
 
-def lit(light: Light, world: World, points: Points) -> Lit:
+def lit(light: Light, frame: Frame, points: Points) -> Lit:
     """The points a light reaches if nothing stands between."""
-    return lit_lanes(light, world.frame, points.position, points.n)
+    return lit_lanes(light, frame, points.position, points.n)
 
 
-def reach(light: Light, world: World, facets: Facets) -> Lit:
+def reach(light: Light, frame: Frame, facets: Facets) -> Lit:
     """The samples whose vertices or polygons a light may reach."""
-    return lit_lanes(light, world.frame, columns(facets.position, F))
+    return lit_lanes(light, frame, columns(facets.position, F))
 
 
 def same(lit: Lit) -> Lit:
     """The points are the samples."""
     return lit
+
+
+def free(lit: Lit, shadow: Lanes) -> Lit:
+    """The lit points that are not in shadow, where points are samples."""
+    return among(lit, np.flatnonzero(shadow.take(lit.lane)))
 
 
 def shadow_origins(world: World, hits: Hits, facets: Facets, normals: CornerVectors | None = None) -> Vectors:
@@ -318,7 +367,7 @@ def black(hits: Hits) -> Vectors:
 
 
 def direct(
-    light: Light,
+    color: tuple[float, float, float],
     materials: Materials,
     material: Ids,
     points: Points,
@@ -330,7 +379,7 @@ def direct(
     """One light's response per lobe at the samples, its shadow not applied."""
     given = {"n": points.n} | ({"v": v} if v is not None else {}) | ({"t": t} if t is not None else {})
     at_points = shading.response(
-        materials.models, materials.lobes, material, lit, light.color(), given, parameters
+        materials.models, materials.lobes, material, lit, color, given, parameters
     )
     return {name: points.spread(value) for name, value in at_points.items()}
 
@@ -345,11 +394,11 @@ def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Lanes | 
     return _shadowed(direct[name] if name in direct else black(hits), shadow)
 
 
-def arriving_light(light: Light, points: Points, lit: Lit, shadow: Lanes | None = None) -> Vectors:
+def arriving_light(color: tuple[float, float, float], points: Points, lit: Lit, shadow: Lanes | None = None) -> Vectors:
     """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
     out = np.zeros((lit.count, 3), F, order="F")
     cosine = dot(rows(points.n, lit.lane), lit.l)
-    out[lit.lane] = (lit.strength * cosine)[:, None] * np.asarray(light.color(), F)
+    out[lit.lane] = (lit.strength * cosine)[:, None] * np.asarray(color, F)
     return _shadowed(points.spread(out), shadow)
 
 
@@ -431,17 +480,17 @@ def alpha(hits: Hits) -> Lanes:
     return np.ones(len(hits.lane), F)
 
 
-def depth(view: Any, world: World, facets: Facets) -> Lanes:
+def depth(view: Any, frame: Frame, facets: Facets) -> Lanes:
     """(M,) distance from the eye's plane along the line of sight [scene units]."""
     forward = camera_axes(view.camera)[2]
-    eye = world.frame.inward(view.camera.position)
+    eye = frame.inward(view.camera.position)
     along = dot(facets.position - eye, forward[None, :])
-    return (along * world.frame.radius).astype(F)
+    return (along * frame.radius).astype(F)
 
 
-def world_position(world: World, facets: Facets) -> Vectors:
+def world_position(frame: Frame, facets: Facets) -> Vectors:
     """(M, 3) [scene units]."""
-    return columns(world.frame.outward(facets.position), F)
+    return columns(frame.outward(facets.position), F)
 
 
 def normal(points: Points) -> Vectors:
@@ -464,9 +513,9 @@ def object_id(world: World, hits: Hits) -> Lanes:
     return (world.objects.take(hits.triangle) + 1).astype(F)
 
 
-def material_id(world: World, materials: Materials, hits: Hits) -> Lanes:
+def material_id(world: World, numbering: Numbering, hits: Hits) -> Lanes:
     """(M,) number of the material, from 1."""
-    return (materials.number(world, hits.triangle) + 1).astype(F)
+    return (numbering.number(world, hits.triangle) + 1).astype(F)
 
 
 def triangle_id(hits: Hits) -> Lanes:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
-from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.assemble import CornerVectors, World, cofactors
 from illumcli.rays.tracer import Closest
 
 
@@ -137,18 +137,65 @@ def uv(world: World, uvs: CornerVectors, triangle: Ids, u: Lanes, v: Lanes) -> N
     return out
 
 
-def along_u(world: World, uvs: CornerVectors, triangle: Ids) -> Vectors:
-    """(M, 3) direction in which u grows on each triangle; zero where it has no uv or they are flat."""
-    v0, v1, v2 = (rows(world.vertices, world.triangles[:, k].take(triangle)) for k in range(3))
-    at = corner_rows(world, triangle, uvs)
+def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
+    """Where u grows, at every corner of every triangle, number 3 t + k for corner k of triangle t.
+
+    The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
+    the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
+    """
+    points = [rows(world.vertices, corner).astype(np.float64) for corner in world.triangles.T]
+    at = corner_rows(world, np.arange(len(world.triangles), dtype=np.int32), uvs)
+    along, hand = _along_u(points, at, uvs)
+    groups, parts = [], []
+    for k in range(3):
+        groups.append((world.triangles[:, k] * (len(uvs.values) + np.int64(1)) + at[k] + 1) * 3 + hand)
+        e1, e2 = points[k - 2] - points[k], points[k - 1] - points[k]
+        parts.append(along * np.arctan2(length(cross(e1, e2)), dot(e1, e2))[:, None])
+    _, index = np.unique(np.stack(groups, axis=1), return_inverse=True)
+    weights = np.stack(parts, axis=1).reshape(-1, 3)
+    sums: Vectors = np.stack(
+        [np.bincount(index.ravel(), part) for part in weights.T], axis=1, dtype=np.float64
+    )
+    return CornerVectors(columns(unit(sums), F), index.ravel().astype(np.int32))
+
+
+def _along_u(
+    points: Sequence[Vectors], at: Sequence[Ids], uvs: CornerVectors
+) -> tuple[Vectors, NDArray[np.int64]]:
+    """(T, 3) unit vectors where u grows on each triangle, and (T,) the handedness of its uv: 0, 1 flat, 2."""
     if not len(uvs.values):
-        return np.zeros((len(triangle), 3), F, order="F")
-    t0, t1, t2 = (rows(uvs.values, np.maximum(index, 0)) for index in at)
-    has = (at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0)
+        return np.zeros_like(points[0]), np.ones(len(points[0]), np.int64)
+    t0, t1, t2 = (rows(uvs.values, np.maximum(index, 0)).astype(np.float64) for index in at)
     a, b = t1 - t0, t2 - t0
-    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    sign = np.where(has, np.sign(twice), 0).astype(F)
-    return unit(sign[:, None] * (b[:, 1][:, None] * (v1 - v0) - a[:, 1][:, None] * (v2 - v0)))
+    has = (at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0)
+    hand = np.where(has, np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), 0)
+    e1, e2 = points[1] - points[0], points[2] - points[0]
+    way: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
+    return unit(way) * hand[:, None], hand.astype(np.int64) + 1
+
+
+def along_u(tangents: CornerVectors, triangle: Ids, u: Lanes, v: Lanes) -> Vectors:
+    """(M, 3) where u grows at points on triangles, not unit, from `uv_tangents`."""
+    a, b, c = (tangents.index.take(3 * triangle.astype(np.int64) + k) for k in range(3))
+    return linear(tangents, (a, b, c), u, v)
+
+
+def rings(
+    matrix: NDArray[np.float64], axis: Sequence[float], centre: Sequence[float], position: Vectors
+) -> Vectors:
+    """(M, 3) unit direction of the ring about an axis through each point; zero on the axis.
+
+    Parameters
+    ----------
+    matrix : (3, 3)
+        From the object's own directions, in which axis and rings are meant, to those of the world: where it
+        stretches unevenly, rings become ellipses.
+    centre : (3,)
+        A point on the axis, in the world, as `position` is.
+    """
+    own = (position - np.asarray(centre)) @ cofactors(matrix)  # by the inverse, times the determinant
+    ring = np.cross(axis, own) @ matrix.T
+    return unit(ring * np.sign(np.linalg.det(matrix)))
 
 
 def tangent(n: Vectors, grain: Vectors) -> Vectors:

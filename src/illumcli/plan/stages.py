@@ -481,10 +481,10 @@ def alpha(hits: Hits) -> Lanes:
 
 
 def depth(view: Any, frame: Frame, facets: Facets) -> Lanes:
-    """(M,) distance from the eye's plane along the line of sight [scene units]."""
+    """(M,) distance from the eye's plane along the line of sight, at least 0 [scene units]."""
     forward = camera_axes(view.camera)[2]
     eye = frame.inward(view.camera.position)
-    along = dot(facets.position - eye, forward[None, :])
+    along = np.maximum(dot(facets.position - eye, forward[None, :]), 0)
     return (along * frame.radius).astype(F)
 
 

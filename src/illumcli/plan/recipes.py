@@ -206,7 +206,9 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
 def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
     """Meshes, each source once, what is made of them all, and their normals."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
-    found = {mesh_name(scene, thing.mesh): source for thing, source in zip(scene.objects, sources, strict=True)}
+    found = {
+        mesh_name(scene, thing.mesh): source for thing, source in zip(scene.objects, sources, strict=True)
+    }
     names = list(found)
     which = tuple(names.index(mesh_name(scene, thing.mesh)) for thing in scene.objects)
     normals = tuple(source.normals if isinstance(source, MeshFile) else None for source in sources)
@@ -344,6 +346,10 @@ def _sums(scene: Scene) -> list[Recipe]:
             [*(["ambient"] if is_ambient(scene) else []), *(f"light:{name}" for name in lights)],
             [],
         )
+    if scene.depth_cue is not None:
+        cued = [Recipe.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
+    else:
+        cued = []
     return [
         ambient,
         *coupled,
@@ -351,5 +357,6 @@ def _sums(scene: Scene) -> list[Recipe]:
         total("unlit", *(f"unlit:{name}" for name in lights)),
         total("diffuse", *(f"diffuse:{name}" for name in lights)),
         total("specular", *(f"specular:{name}" for name in lights)),
-        total("beauty", *glow, *both),
+        total("uncued" if cued else "beauty", *glow, *both),
+        *cued,
     ]

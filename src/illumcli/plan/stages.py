@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, rows
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows
 from illumcli.errors import InputError
 from illumcli.files.content import Content
 from illumcli.frame import Frame
@@ -23,7 +23,7 @@ from illumcli.rays.camera import camera_rays, film_points
 from illumcli.rays.offsets import lifted
 from illumcli.rays.surface import Facets, Hits
 from illumcli.rays.tracer import Tracer
-from illumcli.scene.spec import Obscurance
+from illumcli.scene.spec import DepthCue, Obscurance
 from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
 from illumcli.shading.ambient import ambient_light
@@ -133,9 +133,7 @@ def polygon_centres(world: World) -> NDArray[np.float32]:
     return assemble.polygon_centres(world)
 
 
-def polygon_normals(
-    methods: tuple[str, ...], meshes: tuple[Mesh, ...], world: World
-) -> NDArray[np.float32]:
+def polygon_normals(methods: tuple[str, ...], meshes: tuple[Mesh, ...], world: World) -> NDArray[np.float32]:
     """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
     from illumcli.geometry.normals import polygon_normals as of_mesh
 
@@ -378,9 +376,7 @@ def direct(
 ) -> dict[str, Vectors]:
     """One light's response per lobe at the samples, its shadow not applied."""
     given = {"n": points.n} | ({"v": v} if v is not None else {}) | ({"t": t} if t is not None else {})
-    at_points = shading.response(
-        materials.models, materials.lobes, material, lit, color, given, parameters
-    )
+    at_points = shading.response(materials.models, materials.lobes, material, lit, color, given, parameters)
     return {name: points.spread(value) for name, value in at_points.items()}
 
 
@@ -394,7 +390,9 @@ def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Lanes | 
     return _shadowed(direct[name] if name in direct else black(hits), shadow)
 
 
-def arriving_light(color: tuple[float, float, float], points: Points, lit: Lit, shadow: Lanes | None = None) -> Vectors:
+def arriving_light(
+    color: tuple[float, float, float], points: Points, lit: Lit, shadow: Lanes | None = None
+) -> Vectors:
     """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
     out = np.zeros((lit.count, 3), F, order="F")
     cosine = dot(rows(points.n, lit.lane), lit.l)
@@ -417,6 +415,13 @@ def total(hits: Hits, **parts: Vectors) -> Vectors:
     for part in others[1:]:
         out += part
     return out
+
+
+def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: Vectors) -> Vectors:
+    """(M, 3) light that fades into a colour with the distance from the eye."""
+    share = (distance(view, frame, facets) - cue.near) / (cue.far - cue.near)
+    fade = (cue.strength * np.clip(share, 0, 1)).astype(F)[:, None]
+    return (1 - fade) * uncued + fade * np.asarray(cue.color, F)
 
 
 def obscurance_origins(facets: Facets) -> Vectors:
@@ -486,6 +491,14 @@ def depth(view: Any, frame: Frame, facets: Facets) -> Lanes:
     eye = frame.inward(view.camera.position)
     along = np.maximum(dot(facets.position - eye, forward[None, :]), 0)
     return (along * frame.radius).astype(F)
+
+
+def distance(view: Any, frame: Frame, facets: Facets) -> Lanes:
+    """(M,) float64 distance along the line of sight from the eye, or from its plane [scene units]."""
+    away = facets.position - frame.inward(view.camera.position)
+    if view.camera.projection == "orthographic":
+        return dot(away, camera_axes(view.camera)[2][None, :]) * frame.radius
+    return length(away) * frame.radius
 
 
 def world_position(frame: Frame, facets: Facets) -> Vectors:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
@@ -181,7 +181,7 @@ def along_u(tangents: CornerVectors, triangle: Ids, u: Lanes, v: Lanes) -> Vecto
 
 
 def rings(
-    matrix: NDArray[np.float64], axis: Sequence[float], centre: Sequence[float], position: Vectors
+    matrix: NDArray[np.float64], axis: Sequence[float], centre: ArrayLike, position: Vectors
 ) -> Vectors:
     """(M, 3) unit direction of the ring about an axis through each point; zero on the axis.
 

@@ -18,7 +18,17 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from illumcli.description import Color, Description, Number, Positive, Vector, nonzero, spread
+from illumcli.description import (
+    Color,
+    Description,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
+    Vector,
+    nonzero,
+    spread,
+)
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
@@ -219,6 +229,31 @@ class Ambient(Description):
 AmbientText: TypeAlias = Ambient | Color | Literal["separate", "coupled"]  # how a scene may write it
 
 
+class DepthCue(Description):
+    """Depth cueing: what is far away fades into a colour, whatever its material and light.
+
+    L' = (1 - a) L + a color,  a = strength * (distance - near) / (far - near), held within 0..strength
+
+    After Warnock (1969), A hidden surface algorithm for computer generated halftone pictures, University of
+    Utah, where intensity falls with the distance from the eye. No light behaves so; it orders by depth.
+    """
+
+    near: NonNegative
+    """Distance from the eye up to which nothing fades [scene units]."""
+    far: Positive
+    """Distance from which on it fades no further [scene units]."""
+    strength: Share = 1.0
+    """How much of the colour replaces the surface's at `far`."""
+    color: Color = (0.0, 0.0, 0.0)
+    """What it fades into: black, or the background's colour, as haze does."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> DepthCue:
+        if self.near >= self.far:
+            raise ValueError(f"near must be below far, is {self.near:g} with far {self.far:g}")
+        return self
+
+
 class Obscurance(Description):
     """w(p) by Monte Carlo: how open each point is to the ambient light."""
 
@@ -280,6 +315,8 @@ class Scene(Description):
     """Colour, form or both of the light from everywhere."""
     obscurance: Obscurance | None = None
     """By default w = 1 and no ray is cast for it."""
+    depth_cue: DepthCue | None = None
+    """Fade the beauty with the distance from the eye; by default not."""
     meshes: dict[Name, MeshSource] = Field(default_factory=dict)
     materials: dict[Name, AnyModel] = Field(default_factory=dict)
     objects: Annotated[tuple[Object, ...], Field(strict=False)] = ()

@@ -206,6 +206,16 @@ def varied(part, count, prefix=""):
     return found
 
 
+@pytest.mark.parametrize(
+    "Model", [Model for Model in MODELS if "file" not in Model.model_fields], ids=lambda Model: Model.__name__
+)
+def test_single_precision_follows_double(Model):
+    given = directions(1, 5000, np.float32, least=0.02)
+    single = response(Model(), given)
+    double = response(Model(), {name: value.astype(np.float64) for name, value in given.items()})
+    np.testing.assert_allclose(single, double, rtol=1e-5, atol=1e-6 * double.max())
+
+
 @claiming("reciprocal")
 @settings(max_examples=40, deadline=None)
 @given(data=st.data(), seed=seeds)

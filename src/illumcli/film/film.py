@@ -30,9 +30,12 @@ def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: in
         out = np.zeros((pixels, values.shape[1]), F)
         out[lane] = values
         return out
-    spread = np.zeros((pixels * samples, values.shape[1]))
-    spread[lane] = values
-    return spread.reshape(pixels, samples, -1).mean(axis=1).astype(F)
+    planes = values.T
+    if len(lane) < pixels * samples:
+        planes = np.zeros((values.shape[1], pixels * samples), F)
+        planes[:, lane] = values.T
+    by_pixel = planes.reshape(len(planes), pixels, samples)
+    return by_pixel.mean(axis=2, dtype=np.float64).T.astype(F)
 
 
 def pixel_nearest(values: NDArray[np.float32], lane: Ids, nearest: Ids, pixels: int) -> NDArray[np.float32]:

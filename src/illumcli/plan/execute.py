@@ -8,17 +8,22 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.film.film import pixel_means, pixel_nearest
+from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import View
 from illumcli.plan.stages import Tile
 from illumcli.rays.tracer import Interrupted
+from illumcli.visibility.arriving import Lit
+
+Planes: TypeAlias = dict[str, NDArray[np.float32]]  # layer -> (rows, columns, channels)
+Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
 
 LANES = 1 << 14
 """Samples per tile: a dozen buffers of that many stay in a core's cache of 1 MiB."""
@@ -30,15 +35,21 @@ class Tally:
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     rays: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    spared: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    """Points that a light does not reach, or does not reach freely: neither rays nor models see them."""
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def add(self, seconds: Mapping[str, float], rays: Mapping[str, int]) -> None:
+    def add(
+        self, seconds: Mapping[str, float], rays: Mapping[str, int], spared: Mapping[str, int] | None = None
+    ) -> None:
         """Add one tile's figures."""
         with self.lock:
             for name, value in seconds.items():
                 self.seconds[name] += value
             for name, count in rays.items():
                 self.rays[name] += count
+            for name, count in (spared or {}).items():
+                self.spared[name] += count
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,14 +60,22 @@ class Band:
     layers: Mapping[str, NDArray[np.float32]]  # layer -> (rows, width, channels)
 
 
-def run_once(plan: Plan, tally: Tally) -> dict[str, Any]:
+def run_once(plan: Plan, tally: Tally, artifacts: Artifacts | None = None) -> dict[str, Any]:
     """The buffers that no tile changes."""
     buffers: dict[str, Any] = {}
     for step in plan.once:
         start = time.perf_counter()
         buffers[step.makes] = step.make(buffers)
         tally.add({step.makes: time.perf_counter() - start}, {})
+        if artifacts is not None and step.makes in plan.keeps:
+            name = step.makes
+            artifacts.keep_once(name, plan.keeps[name], buffers[name], _cost(plan, name, tally))
     return buffers
+
+
+def _cost(plan: Plan, name: str, tally: Tally) -> float:
+    """Seconds of one processor that a buffer took, with all that had to be made for it."""
+    return sum(tally.seconds.get(need, 0.0) for need in plan.needed_for(name))
 
 
 def tile_side(samples: int) -> int:
@@ -72,11 +91,12 @@ def bands(
     tally: Tally,
     done: Callable[[int], None] = lambda pixels: None,
     side: int | None = None,
+    artifacts: Artifacts | None = None,
 ) -> Iterator[Band]:
     """A view's picture as bands of rows from the top, each as soon as its tiles are done.
 
-    The pixels do not depend on `threads` or `side`. When the consumer stops or is interrupted, tiles in
-    flight end at their next step.
+    The pixels do not depend on `threads`, `side` or `artifacts`, where what is worth it is kept. When the
+    consumer stops or is interrupted, tiles in flight end at their next step.
     """
     side = side or tile_side(view.samples)
     stop = threading.Event()
@@ -90,15 +110,16 @@ def bands(
     ahead = threads + 1
     last_use = plan.last_use()
     covered = any(step.makes == "alpha" for step in plan.tile)
+    keeper = Keeper(artifacts or Artifacts(), plan.keeps, view)
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
-            pending: list[tuple[Tile, Future[dict[str, NDArray[np.float32]]]]] = []
+            pending: list[tuple[Tile, Future[tuple[Planes, Kept]]]] = []
             queue = iter([tile for row in tiles for tile in row])
 
             def submit() -> None:
                 for tile in queue:
                     pending.append(
-                        (tile, pool.submit(_tile, plan, shared, view, tile, last_use, tally, stop))
+                        (tile, pool.submit(_tile, plan, shared, view, tile, last_use, tally, stop, keeper))
                     )
                     if len(pending) >= ahead + len(tiles[0]):
                         break
@@ -112,18 +133,25 @@ def bands(
                 }
                 if covered:
                     whole.setdefault("alpha", np.empty((height, view.width, 1), F))
+                kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
                     # a short wait, so that an interrupt reaches this thread
                     while not wait([future], timeout=0.2, return_when=FIRST_COMPLETED).done:
                         pass
-                    for name, values in future.result().items():
+                    layers, others = future.result()
+                    for name, values in layers.items():
                         whole[name][:, tile.x : tile.x + tile.width] = values
+                    for name, packed in others.items():
+                        kept[name].append(packed)
                     done(tile.width * tile.height)
                     submit()
+                keeper.write(kept)
                 yield Band(row[0].y, whole)
+            keeper.finish({name: _cost(plan, name, tally) for name in plan.keeps})
         finally:
             stop.set()
+            keeper.discard()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
@@ -135,41 +163,48 @@ def _tile(
     last_use: Mapping[str, int],
     tally: Tally,
     stop: threading.Event,
-) -> dict[str, NDArray[np.float32]]:
-    """Every layer of one tile, (rows, columns, channels) each."""
+    keeper: Keeper,
+) -> tuple[Planes, Kept]:
+    """Every layer of one tile, (rows, columns, channels) each, and what is kept of its buffers."""
     buffers: dict[str, Any] = {**shared, "view": view, "tile": tile}
-    tracer = buffers["tracer"] = shared["tracer"].counting(stop)
-    seconds, rays = {}, {}
+    tracer = None
+    if "tracer" in shared:
+        tracer = buffers["tracer"] = shared["tracer"].counting(stop)
+    seconds, rays, lanes, kept = {}, {}, {}, {}
     for number, step in enumerate(plan.tile):
         if stop.is_set():
             raise Interrupted
-        start, before = time.perf_counter(), tracer.rays
-        buffers[step.makes] = step.make(buffers)
+        start, before = time.perf_counter(), tracer.rays if tracer else 0
+        made = buffers[step.makes] = step.make(buffers)
         seconds[step.makes] = time.perf_counter() - start
-        if tracer.rays > before:
+        if tracer and tracer.rays > before:
             rays[step.makes] = tracer.rays - before
+        if isinstance(made, Lit):
+            lanes[step.makes] = made.count - len(made.lane)
+        if step.makes in keeper.names:
+            kept[step.makes] = keeper.take(step.makes, made, buffers["hits"], tile)
         for name in step.needs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)
     start = time.perf_counter()
-    out = _pixels(plan, buffers, tile)
+    out = _pixels(plan, buffers, view, tile)
     seconds["film"] = time.perf_counter() - start
-    tally.add(seconds, rays)
-    return out
+    tally.add(seconds, rays, lanes)
+    return out, kept
 
 
-def _pixels(plan: Plan, buffers: Mapping[str, Any], tile: Tile) -> dict[str, NDArray[np.float32]]:
-    samples, lane = buffers["samples"], buffers["hits"].lane
+def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> Planes:
+    lane = buffers["hits"].lane
     pixels = tile.width * tile.height
     out = {}
     for layer in plan.layers:
         values = buffers[layer.buffer]
         if layer.data:
-            made = pixel_nearest(values, lane, samples.nearest, pixels)
+            made = pixel_nearest(values, lane, buffers["samples"].nearest(), pixels)
         else:
-            made = pixel_means(values, lane, pixels, samples.per_pixel)
+            made = pixel_means(values, lane, pixels, view.samples)
         out[layer.name] = made.reshape(tile.height, tile.width, -1)
     if "alpha" in buffers and "alpha" not in out:
-        alpha = pixel_means(buffers["alpha"], lane, pixels, samples.per_pixel)
+        alpha = pixel_means(buffers["alpha"], lane, pixels, view.samples)
         out["alpha"] = alpha.reshape(tile.height, tile.width, 1)
     return out

@@ -211,28 +211,28 @@ class Tile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """The samples of a tile, pixel by pixel, row by row from the top."""
+    """The samples of a tile, pixel by pixel, row by row from the top: sample s of pixel p is lane
+    p * per_pixel + s."""
 
-    x: NDArray[np.int64]  # (N,) pixel
-    y: NDArray[np.int64]  # (N,)
-    sample: NDArray[np.int64]  # (N,) number within the pixel
+    x: NDArray[np.int64]  # (P,) pixel
+    y: NDArray[np.int64]  # (P,)
     points: NDArray[np.float64]  # (N, 2) in [0, 1)^2
     per_pixel: int
-    nearest: Ids  # (P,) the sample nearest to each pixel's centre
+
+    def nearest(self) -> Ids:
+        """(P,) the lane of the sample nearest to each pixel's centre."""
+        distance = np.square(self.points[:, 0] - 0.5) + np.square(self.points[:, 1] - 0.5)
+        own = np.argmin(distance.reshape(-1, self.per_pixel), axis=1)
+        return (own + np.arange(len(self.x)) * self.per_pixel).astype(np.int32)
 
 
 def samples(seed: int, view: Any, tile: Tile) -> Samples:
     """Where the tile's samples lie, keyed by pixel number."""
-    count = view.samples
     y, x = np.divmod(np.arange(tile.width * tile.height), tile.width)
     x, y = x + tile.x, y + tile.y
-    points = sampling.pixel_points(
-        sampling.stream(seed, "pixel"), (y * view.width + x).astype(np.uint32), count
-    )
-    distance = np.square(points - 0.5).sum(axis=1).reshape(-1, count)
-    nearest = (np.argmin(distance, axis=1) + np.arange(len(x)) * count).astype(np.int32)
-    sample = np.tile(np.arange(count), len(x))
-    return Samples(np.repeat(x, count), np.repeat(y, count), sample, points, count, nearest)
+    pixel = (y * view.width + x).astype(np.uint32)
+    points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples)
+    return Samples(x, y, points, view.samples)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,10 +246,8 @@ class Rays:
 
 def rays(film_filter: Any, frame: Frame, view: Any, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
-    if samples.per_pixel == 1:
-        points = np.stack([samples.x + 0.5, samples.y + 0.5], axis=1)
-    else:
-        points = film_points(samples.x, samples.y, samples.points, film_filter)
+    count = samples.per_pixel
+    points = film_points(samples.x, samples.y, samples.points, film_filter if count > 1 else None)
     return Rays(*camera_rays(view.camera, frame, view.width, view.height, points))
 
 
@@ -442,7 +440,8 @@ def obscurance(
     """(M,) w of every sample seen."""
     key = sampling.stream(seed, "obscurance")
     lane = hits.lane
-    draws = sampling.dither(key, samples.x[lane], samples.y[lane], samples.sample[lane])
+    pixel, sample = np.divmod(lane, samples.per_pixel)
+    draws = sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
     return open_share(
         tracer, obscurance_origins, facets.ng, draws, settings.samples, settings.falloff, world.frame.radius
     )

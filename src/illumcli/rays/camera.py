@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Lanes, Vectors, columns, dot, unit
+from illumcli.arrays import F, Lanes, Vectors, columns
 from illumcli.frame import Frame
 
 
@@ -48,48 +48,74 @@ def camera_rays(
     eye = frame.inward(camera.position)
     if camera.projection == "perspective":
         slope = np.tan(np.radians(camera.fov) / 2)
-        way = columns(forward + (slope * x)[:, None] * right + (slope * y)[:, None] * up)
-        d = unit(way)
-        o = np.broadcast_to(eye, d.shape)
+        x, y = slope * x, slope * y
+        # right, up and forward are orthonormal: the length needs no vector
+        scale = 1 / np.sqrt(1 + x * x + y * y)
+        d = _combined((scale, forward), (x * scale, right), (y * scale, up))
+        along = -(scale * (forward @ eye) + x * scale * (right @ eye) + y * scale * (up @ eye))
+        skipped = np.maximum(along - CLEAR, 0)
+        start = _combined((np.broadcast_to(1.0, len(x)), eye)) if not skipped.any() else eye + skipped[:, None] * d
     else:
         half = camera.extent / 2 / frame.radius
-        o = columns(eye + (half * x)[:, None] * right + (half * y)[:, None] * up)
-        d = np.broadcast_to(forward, o.shape)
-    skipped = entry(o, d)
-    start = o + skipped[:, None] * d
+        d = np.broadcast_to(forward, (len(x), 3))
+        plane = _combined((half * x, right), (half * y, up))
+        skipped = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
+        start = eye + skipped[0] * forward + plane if len(x) else plane
     return columns(start, F), columns(d, F), skipped
 
 
-def entry(o: Vectors, d: Vectors) -> Lanes:
-    """(N,) distance along `d` to a little before the sphere of radius 1; 0 for rays that start near it.
+CLEAR = 1.25
+"""Rays start this far before they pass the scene's centre, clear of its sphere of radius 1."""
 
-    A ray that misses the sphere starts where it passes nearest.
-    """
-    return np.maximum(-dot(o, d) - 1.25, 0.0)
+
+def _combined(*terms: tuple[Lanes, NDArray[np.float64]]) -> Vectors:
+    """(N, 3) float64 sum of a weight per lane times a vector."""
+    out = np.empty((len(terms[0][0]), 3), order="F")
+    for k in range(3):
+        weight, vector = terms[0]
+        np.multiply(weight, vector[k], out=out[:, k])
+        for weight, vector in terms[1:]:
+            out[:, k] += weight * vector[k]
+    return out
 
 
 def film_points(
-    x: NDArray[np.int64], y: NDArray[np.int64], spread: NDArray[np.float64], film_filter: Any
+    x: NDArray[np.int64], y: NDArray[np.int64], spread: NDArray[np.float64], film_filter: Any | None
 ) -> NDArray[np.float64]:
     """(N, 2) film positions [pixels]: each pixel's centre plus `spread` in [0, 1)^2 through the filter.
 
     Positions are drawn from the pixel filter itself, so that every sample weighs the same and no pixel
-    needs its neighbours' samples.
+    needs its neighbours' samples. Without a filter they are the centres.
+
+    Parameters
+    ----------
+    x, y : (P,) int
+        Pixels.
+    spread : (N, 2) float64
+        N / P points of each pixel, one pixel after the other.
     """
-    out = np.empty((len(x), 2), order="F")
-    width = film_filter.width
-    if film_filter.filter == "gaussian":
-        # radius of a Gaussian of deviation width / 4, cut off at width, by inversion
-        deviation = width / 4
-        inside = -np.expm1(-(width**2) / (2 * deviation**2))
-        r = deviation * np.sqrt(-2 * np.log1p(-spread[:, 0] * inside))
-        angle = 2 * np.pi * spread[:, 1]
-        offset = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
-    elif film_filter.filter == "tent":
-        low = spread < 0.5
-        offset = width / 2 * np.where(low, np.sqrt(2 * spread) - 1, 1 - np.sqrt(2 * (1 - spread)))
-    else:
-        offset = width * (spread - 0.5)
-    out[:, 0] = x + 0.5 + offset[:, 0]
-    out[:, 1] = y + 0.5 + offset[:, 1]
+    out = np.empty((len(spread), 2), order="F")
+    a, b = offsets(spread[:, 0], spread[:, 1], film_filter)
+    np.add(a.reshape(len(x), -1), (x + 0.5)[:, None], out=out[:, 0].reshape(len(x), -1))
+    np.add(b.reshape(len(y), -1), (y + 0.5)[:, None], out=out[:, 1].reshape(len(y), -1))
     return out
+
+
+def offsets(u: Lanes, v: Lanes, film_filter: Any | None) -> tuple[Lanes, Lanes]:
+    """Distances from the pixel's centre [pixels] of points drawn from the filter by inversion."""
+    if film_filter is None:
+        return np.zeros_like(u), np.zeros_like(v)
+    width = film_filter.width
+    if film_filter.filter == "box":
+        return width * (u - 0.5), width * (v - 0.5)
+    if film_filter.filter == "tent":
+        first, second = (
+            width / 2 * np.where(w < 0.5, np.sqrt(2 * w) - 1, 1 - np.sqrt(2 * (1 - w))) for w in (u, v)
+        )
+        return first, second
+    # the radius of a Gaussian of deviation width / 4, cut off at width
+    deviation = width / 4
+    inside = -np.expm1(-(width**2) / (2 * deviation**2))
+    r = deviation * np.sqrt(-2 * np.log1p(-u * inside))
+    angle = 2 * np.pi * v
+    return r * np.cos(angle), r * np.sin(angle)

@@ -87,11 +87,11 @@ def pixel_points(key: int, pixel: NDArray[np.uint32], count: int) -> NDArray[np.
     """
     if count == 1:
         return np.full((len(pixel), 2), 0.5, order="F")
-    out = np.empty((len(pixel), count, 2))
+    out = np.empty((2, len(pixel), count))
     for axis, base in enumerate(sobol(count)):
         seeds = hashed(key + axis & 0xFFFFFFFF, pixel)
-        out[:, :, axis] = owen(base[None, :], seeds[:, None])
-    return out.reshape(-1, 2)
+        out[axis] = owen(base[None, :], seeds[:, None])
+    return out.reshape(2, -1).T
 
 
 @lru_cache(maxsize=64)

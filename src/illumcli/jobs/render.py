@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import platform
@@ -19,14 +18,17 @@ from numpy.typing import NDArray
 from illumcli import __version__
 from illumcli.errors import InputError, OutputError
 from illumcli.files.names import check_unique, expand
+from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture
 from illumcli.film.film import Layer
 from illumcli.film.preview import viewable
+from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Band, Tally, bands, run_once
-from illumcli.plan.plan import Plan, plan
+from illumcli.plan.keys import digest
+from illumcli.plan.plan import Plan, content_key, plan, reusing
 from illumcli.plan.recipes import View
-from illumcli.scene.load import Loaded, load, resolve
-from illumcli.scene.spec import MeshFile
+from illumcli.scene.load import Loaded, load
+from illumcli.scene.spec import Scene
 
 Progress = Callable[[str, int, int], None]
 """Called with what is going on, how much is done and how much there is."""
@@ -57,6 +59,11 @@ class Report:
     repairs: dict[str, int] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
+    spared: dict[str, int] = field(default_factory=dict)
+    """Points that a light does not reach (`lit`) or not freely (`free`): no ray, no response."""
+    reused: dict[str, dict[str, str]] = field(default_factory=dict)
+    """Camera -> buffer -> where it was at hand: `memory` or `store`."""
+    warnings: list[str] = field(default_factory=list)
     clamped: int = 0
     total_seconds: float = 0.0
 
@@ -64,6 +71,16 @@ class Report:
         """The report as JSON has it, with versions and the peak of memory."""
         data = {name: getattr(self, name) for name in self.__slots__}
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A scene to render: its plan and the files it is to fill."""
+
+    loaded: Loaded
+    scene: Scene
+    plan: Plan
+    targets: tuple[Target, ...]
 
 
 def run(
@@ -75,8 +92,11 @@ def run(
     threads: int | None = None,
     force: bool = False,
     progress: Progress = lambda what, done, of: None,
+    cache: bool = True,
 ) -> tuple[list[Path], Report]:
     """Render a scene; the paths of every image, written or kept, and the report.
+
+    With `cache`, what earlier runs kept is used and what later runs may use is kept; the files are the same.
 
     Raises
     ------
@@ -84,38 +104,93 @@ def run(
         Before anything is rendered, where it can be known then.
     """
     start = time.perf_counter()
-    loaded = load(path, overrides)
+    work = prepared(load(path, overrides), pattern, only, seed)
+    store = opened_store() if cache else None
+    report = rendered(work, store, Memory(), threads, force, progress)
+    if store is not None:
+        store.finish()
+        report.warnings += [store.warning] if store.warning else []
+    report.total_seconds = time.perf_counter() - start
+    return [target.path for target in work.targets], report
+
+
+def opened_store() -> Store:
+    """The store that the user's environment names.
+
+    Raises
+    ------
+    InputError
+        ILLUM_CACHE_SIZE says no size.
+    """
+    try:
+        return Store(default_folder(), default_limit())
+    except ValueError as error:
+        raise InputError(f"ILLUM_CACHE_SIZE: {error}; write it as 500M or 4G") from None
+
+
+def prepared(
+    loaded: Loaded,
+    pattern: str | None = None,
+    only: Sequence[str] = (),
+    seed: int | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Work:
+    """What rendering a scene takes; `values` are more fields of its files' names."""
     scene = loaded.scene if seed is None else loaded.scene.model_copy(update={"seed": seed})
     steps = plan(scene, loaded, only)
+    patterns = (pattern,) if pattern else scene.outputs.files
+    return Work(loaded, scene, steps, tuple(image_set(loaded, scene, steps, patterns, values or {})))
+
+
+def rendered(
+    work: Work,
+    store: Store | None = None,
+    memory: Memory | None = None,
+    threads: int | None = None,
+    force: bool = False,
+    progress: Progress = lambda what, done, of: None,
+) -> Report:
+    """Render what is due and say what happened."""
+    start = time.perf_counter()
+    steps = work.plan
     threads = threads or len(os.sched_getaffinity(0))
-    identity = scene_identity(loaded, scene)
-    report = Report(str(path), identity, scene.seed, threads, skipped=dict(steps.skipped))
-    targets = image_set(loaded, scene, steps, (pattern,) if pattern else scene.outputs.files, identity)
-    due = [target for target in targets if not is_kept(target, force)]
-    report.kept = [str(target.path) for target in targets if target not in due]
-    if due:
-        tally = Tally()
-        shared = run_once(steps, tally)
-        report.repairs = repairs(shared)
-        for view in steps.views:
-            mine = [target for target in due if target.view is view]
-            if mine:
-                report.clamped += _render_view(scene, steps, shared, view, mine, threads, tally, progress)
-        report.seconds, report.rays = dict(tally.seconds), dict(tally.rays)
+    identity = digest([target.content for target in work.targets])
+    report = Report(str(work.loaded.path), identity, work.scene.seed, threads, skipped=dict(steps.skipped))
+    due = [target for target in work.targets if not is_kept(target, force)]
+    report.kept = [str(target.path) for target in work.targets if target not in due]
+    tally = Tally()
+    for view in steps.views:
+        mine = [target for target in due if target.view is view]
+        if mine:
+            artifacts = Artifacts(store, memory)
+            began = time.perf_counter()
+            narrowed = reusing(steps, view, artifacts)
+            tally.add({"artifacts": time.perf_counter() - began}, {})
+            report.reused[view.name] = dict(narrowed.reused)
+            report.skipped = dict(narrowed.skipped)
+            shared = run_once(narrowed, tally, artifacts)
+            report.repairs |= repairs(shared)
+            report.clamped += _render_view(
+                work.scene, narrowed, shared, view, mine, threads, tally, progress, artifacts
+            )
+    report.seconds, report.rays, report.spared = dict(tally.seconds), dict(tally.rays), dict(tally.spared)
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
-    return [target.path for target in targets], report
+    return report
 
 
 def repairs(shared: Mapping[str, Any]) -> dict[str, int]:
     """What was put right in meshes and textures: class -> count."""
     return {
-        what: count for made in shared.values() for what, count in getattr(made, "repairs", {}).items()
+        what: count
+        for name, made in shared.items()
+        if name == "repairs" or name.endswith("_textures")
+        for what, count in made.repairs.items()
     }
 
 
 def image_set(
-    loaded: Loaded, scene: Any, steps: Plan, patterns: Sequence[str], identity: str
+    loaded: Loaded, scene: Scene, steps: Plan, patterns: Sequence[str], more: Mapping[str, Any]
 ) -> list[Target]:
     """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer."""
     targets = []
@@ -127,14 +202,21 @@ def image_set(
             sets = [steps.layers] if suffix == ".exr" else [(layer,) for layer in steps.layers]
             for layers in sets:
                 name = "all" if suffix == ".exr" else layers[0].name
-                values = {
-                    **loaded.overrides, "scene": loaded.name, "camera": view.name, "layer": name, "frame": 0
-                }  # fmt: skip
-                parts = json.dumps([identity, view.name, [layer.name for layer in layers], suffix])
-                content = hashlib.blake2b(parts.encode(), digest_size=16).hexdigest()
-                targets.append(Target(Path(expand(pattern, values)), view, tuple(layers), content))
+                fields = {"scene": loaded.name, "camera": view.name, "layer": name, "frame": 0}
+                path = Path(expand(pattern, {**loaded.overrides, **fields, **more}))
+                targets.append(Target(path, view, tuple(layers), content(scene, steps, view, layers, suffix)))
     check_unique([str(target.path) for target in targets])
     return targets
+
+
+def content(scene: Scene, steps: Plan, view: View, layers: Sequence[Layer], suffix: str) -> str:
+    """Hash of everything that a file's pixels depend on: what its layers are made from, and how it codes
+    them."""
+    film = scene.film
+    coded = (suffix, view.name, [layer.name for layer in layers], scene.outputs.colour)
+    shown = (film.background, film.exposure if suffix == ".png" else 0.0)
+    buffers = dict.fromkeys([*(layer.buffer for layer in layers), "alpha"])
+    return digest((coded, shown, content_key(steps, view, buffers)))
 
 
 def is_kept(target: Target, force: bool) -> bool:
@@ -160,28 +242,6 @@ def is_kept(target: Target, force: bool) -> bool:
     return True
 
 
-def scene_identity(loaded: Loaded, scene: Any) -> str:
-    """Hash of everything a scene's pixels depend on: its values, its files' contents, this version."""
-    digest = hashlib.blake2b(digest_size=16)
-    said = scene.model_dump(exclude={"outputs": {"files"}})
-    digest.update(json.dumps([__version__, said], sort_keys=True, default=str).encode())
-    for thing in scene.objects:
-        source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
-        name = source if isinstance(source, str) else source.file if isinstance(source, MeshFile) else None
-        if name is not None:
-            digest.update(file_digest(resolve(loaded, name)))
-    return digest.hexdigest()
-
-
-def file_digest(path: Path) -> bytes:
-    """BLAKE2b-128 of a file's content."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).digest()
-    except OSError as error:
-        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}; check the path") from error
-
-
 def _render_view(
     scene: Any,
     steps: Plan,
@@ -191,6 +251,7 @@ def _render_view(
     threads: int,
     tally: Tally,
     progress: Progress,
+    artifacts: Artifacts,
 ) -> int:
     """Write one view's files band by band; how many values were beyond half's range."""
     from illumcli.files.images import ImageWriter
@@ -211,10 +272,10 @@ def _render_view(
             )
             for target in targets
         ]
-        for band in bands(steps, shared, view, threads, tally, advance):
+        for band in bands(steps, shared, view, threads, tally, advance, artifacts=artifacts):
             start = time.perf_counter()
             for target, writer in zip(targets, writers, strict=True):
-                writer.write_band(band.y, pixels_of(scene, target, band, shared["world"].frame))
+                writer.write_band(band.y, pixels_of(scene, target, band, shared["frame"]))
             tally.add({"write": time.perf_counter() - start}, {})
         start = time.perf_counter()
         clamped = sum(writer.close().clamped for writer in writers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field
@@ -39,6 +39,10 @@ class Light(Description):
     def color(self) -> tuple[float, float, float]:
         """Colour times strength: intensity [W/sr] or irradiance [W/m^2]."""
         return getattr(self, self.power)
+
+    def placed(self) -> Self:
+        """This light with neither colour nor name: all that `arriving` depends on."""
+        return self.model_copy(update={self.power: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
     def arriving(self, position: Vectors, frame: Frame) -> Arriving:
         """Light at `position` [(N, 3), radii from the scene's centre]."""

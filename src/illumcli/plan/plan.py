@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from illumcli import __version__
 from illumcli.demand import Recipe, order
 from illumcli.errors import LimitError
 from illumcli.film.film import Layer
+from illumcli.plan.artifacts import Artifacts, Book
+from illumcli.plan.keys import Keys, digest
 from illumcli.plan.recipes import View, active_lights, is_ambient, is_emissive, layers, recipes, views
 from illumcli.scene.spec import Scene
 
@@ -29,10 +32,16 @@ class Plan:
     """Buffer -> why it is not computed."""
     expected_rays: Mapping[str, int]
     """Upper bounds by purpose, all views together."""
+    reused: Mapping[str, str] = field(default_factory=dict)
+    """Buffer -> where it is at hand: `memory` or `store`."""
+    keeps: Mapping[str, str] = field(default_factory=dict)
+    """Buffers that are made and may be kept -> the key they are kept by."""
+    scene: Scene | None = field(default=None, repr=False)
+    book: Mapping[str, Recipe] = field(default_factory=dict, repr=False)
 
     def last_use(self) -> dict[str, int]:
         """The last tile step that reads each buffer made in the tile; those of layers are kept."""
-        kept = {layer.buffer for layer in self.layers} | {"hits", "samples", "alpha"}
+        kept = {layer.buffer for layer in self.layers} | {"hits", "samples", "alpha"}  # the film reads them
         made = {step.makes for step in self.tile}
         last: dict[str, int] = {}
         for number, step in enumerate(self.tile):
@@ -53,7 +62,22 @@ class Plan:
             "tile": [step.makes for step in self.tile],
             "skipped": dict(self.skipped),
             "expected_rays": dict(self.expected_rays),
+            "reused": dict(self.reused),
         }
+
+    def needed_for(self, name: str) -> frozenset[str]:
+        """Every buffer that `name` is made from, itself included, those at hand left out."""
+        needs: set[str] = set()
+
+        def visit(name: str) -> None:
+            if name in needs or name in self.reused or name in GIVEN:
+                return
+            needs.add(name)
+            for need in self.book[name].needs.values():
+                visit(need)
+
+        visit(name)
+        return frozenset(needs)
 
 
 def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
@@ -65,10 +89,45 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
         A film larger or more rays than this program takes on.
     """
     book = recipes(scene, loaded)
-    wanted = layers(scene, only or scene.outputs.layers)
+    wanted = tuple(layers(scene, only or scene.outputs.layers))
+    all_views = tuple(views(scene))
+    once, tile = _steps(book, wanted)
+    made = {step.makes for step in (*once, *tile)}
+    rays = _expected_rays(scene, all_views, made)
+    _refuse(all_views, rays)
+    reasons = _why_not(scene, book, made)
+    return Plan(all_views, wanted, once, tile, reasons, rays, scene=scene, book=book)
+
+
+def reusing(made: Plan, view: View, artifacts: Artifacts) -> Plan:
+    """The plan for one view, with what is at hand loaded instead of made."""
+    book = Book(made.book, view, artifacts)
+    once, tile = _steps(book, made.layers)
+    steps = {step.makes for step in (*once, *tile)}
+    found = {name: where for name, where in artifacts.reused.items() if name in steps}
+    rays = _expected_rays(made.scene, (view,), steps - found.keys())
+    skipped = dict(made.skipped)
+    for step in (*made.once, *made.tile):
+        if step.makes not in steps:
+            skipped[step.makes] = "all that needs it is at hand"
+    kept = {name: book.keys_of(name) for name in steps - found.keys() if artifacts.keeps(name)}
+    return Plan((view,), made.layers, once, tile, skipped, rays, found, kept, made.scene, made.book)
+
+
+def content_key(made: Plan, view: View, buffers: Iterable[str]) -> str:
+    """Hash of all that these buffers of a view depend on, and of this version."""
+    keys = Keys(made.book, view, __version__)
+    return digest([keys(name) for name in buffers])
+
+
+def _steps(
+    book: Mapping[str, Recipe], wanted: Sequence[Layer]
+) -> tuple[tuple[Recipe, ...], tuple[Recipe, ...]]:
+    """What runs once and what runs per tile, each after all it needs."""
     coverage = ["alpha"] if any(layer.buffer == "beauty" for layer in wanted) else []
-    outputs = [*dict.fromkeys(layer.buffer for layer in wanted), *coverage, "hits", "samples"]
-    steps = order(book, outputs, GIVEN)
+    nearest = ["samples"] if any(layer.data for layer in wanted) else []
+    filled = dict.fromkeys(layer.buffer for layer in wanted)
+    steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", "repairs"], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []
     for step in steps:
@@ -77,16 +136,12 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
             tile.append(step)
         else:
             once.append(step)
-    all_views = tuple(views(scene))
-    rays = _expected_rays(scene, all_views, {step.makes for step in steps})
-    _refuse(all_views, rays)
-    made = {step.makes for step in steps}
-    return Plan(all_views, tuple(wanted), tuple(once), tuple(tile), _why_not(scene, book, made), rays)
+    return tuple(once), tuple(tile)
 
 
-def _expected_rays(scene: Scene, all_views: Sequence[View], made: set[str]) -> dict[str, int]:
+def _expected_rays(scene: Any, all_views: Sequence[View], made: set[str]) -> dict[str, int]:
     samples = sum(view.width * view.height * view.samples for view in all_views)
-    rays = {"primary": samples}
+    rays = {"primary": samples} if "hits" in made else {}
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in made and light.shadows and any(light.color()):
             rays[f"shadow:{name}"] = samples

@@ -21,7 +21,6 @@ class Hits:
     triangle: Ids  # (M,)
     u: Lanes  # (M,) float32 weight of corner 1
     v: Lanes  # (M,) float32 weight of corner 2
-    distance: Lanes  # (M,) float32 from the ray's origin, in radii
 
 
 def seen(closest: Closest) -> Hits:
@@ -29,7 +28,7 @@ def seen(closest: Closest) -> Hits:
     lane = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
     return Hits(
         lane,
-        *(getattr(closest, name).take(lane) for name in ("triangle", "u", "v", "distance")),
+        *(getattr(closest, name).take(lane) for name in ("triangle", "u", "v")),
     )
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,20 @@ from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.geometry.assemble import World
 from illumcli.models._base import IlluminationModel
 
+Token: TypeAlias = tuple[str, ...]
+"""Which material it is, whatever its parameters are: `("material", name)` of the scene, `("object", name)` of
+one object, `("mesh", mesh, name)` of a mesh's own library, or `("default",)`."""
+
+DEFAULT: Token = ("default",)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Materials:
-    """Models by number, and the number of every object or, where meshes select several, triangle."""
+class Numbering:
+    """The material numbers of every object or, where meshes select several, triangle."""
 
-    models: tuple[IlluminationModel, ...]
-    names: tuple[str, ...]
+    tokens: tuple[Token, ...]  # by number
     of_object: NDArray[np.int32]  # (O,) material number
     of_triangle: NDArray[np.int32] | None = None  # (T,) where it differs within objects
-    lobes: tuple[Mapping[str, Any], ...] = field(default=())
 
     def number(self, world: World, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
@@ -32,72 +36,83 @@ class Materials:
         return self.of_object.take(world.objects.take(triangle))
 
 
-def materials(
-    world: World,
-    named: Mapping[str, IlluminationModel],
-    own: Sequence[IlluminationModel | None],
-    own_names: Sequence[str],
-    imported: Sequence[bool],
-    default: IlluminationModel,
-) -> Materials:
-    """The materials of all objects.
+def numbering(
+    world: World, own: Sequence[Token | None], named: Collection[str], imported: Sequence[str | None]
+) -> Numbering:
+    """Numbers the materials of all objects.
 
     Parameters
     ----------
-    named : mapping
-        The scene's materials, which a mesh file selects by name.
-    own, own_names : sequences
+    own : sequence
         Each object's own material, None where its mesh selects them.
+    named : collection of str
+        The scene's materials, which a mesh file selects by name.
     imported : sequence
-        Per object: take what the scene does not name from the mesh file's own library.
-    default : IlluminationModel
-        For what selects nothing that is known.
+        Per object: the name of the mesh whose own library has what the scene does not name, or None.
     """
-    models: list[IlluminationModel] = []
-    names: list[str] = []
-
-    def number(name: str, model: IlluminationModel) -> int:
-        for k, known in enumerate(models):
-            if known is model or (names[k] == name and known == model):
-                return k
-        models.append(model)
-        names.append(name)
-        return len(models) - 1
-
+    tokens: dict[Token, int] = {}
     of_object = np.zeros(len(own), np.int32)
     of_triangle = np.zeros(len(world.triangles), np.int32)
     several = False
-    for i, (placed, model) in enumerate(zip(world.placed, own, strict=True)):
+    for i, (placed, token, library) in enumerate(zip(world.placed, own, imported, strict=True)):
         mesh = placed.mesh
-        mine = world.objects == i if model is None and mesh.material_names else None
-        if mine is None:
-            of_object[i] = number(own_names[i] if model else "default", model or default)
+        if token is not None or not mesh.material_names:
+            of_object[i] = tokens.setdefault(token or DEFAULT, len(tokens))
             continue
         several = True
-        choices = [number("default", default)]
+        choices = [tokens.setdefault(DEFAULT, len(tokens))]
         for name in mesh.material_names:
             if name in named:
-                choices.append(number(name, named[name]))
-            elif imported[i] and name in mesh.materials:
-                choices.append(number(name, imported_model(mesh.materials[name])))
+                choices.append(tokens.setdefault(("material", name), len(tokens)))
+            elif library is not None and name in mesh.materials:
+                choices.append(tokens.setdefault(("mesh", library, name), len(tokens)))
             else:
                 choices.append(choices[0])
         selected = (
             mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
         )
+        mine = world.objects == i
         polygon = world.polygons[mine] - placed.first_polygon
         of_triangle[mine] = np.asarray(choices, np.int32).take(selected.take(polygon) + 1)
     if several:
-        for i, (placed, model) in enumerate(zip(world.placed, own, strict=True)):
-            if model is not None or not placed.mesh.material_names:
+        for i, (placed, token) in enumerate(zip(world.placed, own, strict=True)):
+            if token is not None or not placed.mesh.material_names:
                 of_triangle[world.objects == i] = of_object[i]
-    return Materials(
-        tuple(models),
-        tuple(names),
-        of_object,
-        of_triangle if several else None,
-        tuple(model.lobes() for model in models),
+    return Numbering(tuple(tokens), of_object, of_triangle if several else None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Materials:
+    """Models by number."""
+
+    models: tuple[IlluminationModel, ...]
+    names: tuple[str, ...]
+    numbering: Numbering
+    lobes: tuple[Mapping[str, Any], ...]
+
+    def number(self, world: World, triangle: Ids) -> Ids:
+        """(N,) material number of each triangle."""
+        return self.numbering.number(world, triangle)
+
+
+def materials(
+    numbering: Numbering, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Any]
+) -> Materials:
+    """The materials that are numbered.
+
+    Parameters
+    ----------
+    known : mapping
+        Those of the scene, its objects and the default.
+    libraries : mapping
+        Mesh -> its own library: name -> keys of a material.
+    """
+    models = tuple(
+        imported_model(libraries[token[1]][token[2]]) if token[0] == "mesh" else known[token]
+        for token in numbering.tokens
     )
+    names = tuple(token[-1] for token in numbering.tokens)
+    return Materials(models, names, numbering, tuple(model.lobes() for model in models))
 
 
 def imported_model(description: Mapping[str, Any]) -> IlluminationModel:

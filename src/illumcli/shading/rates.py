@@ -79,10 +79,11 @@ def points(
 
 
 def _samples(hits: Hits, facet: Facets, n: Vectors) -> Points:
-    return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, _same)
+    return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, as_they_are)
 
 
-def _same(values: NDArray[Any]) -> NDArray[Any]:
+def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
+    """The values at the points, where these are the samples."""
     return values
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from illumcli.arrays import Ids, Lanes, Vectors, dot, rows
 from illumcli.frame import Frame
@@ -32,8 +33,19 @@ def lit(light: Light, frame: Frame, position: Vectors, n: Vectors | None = None)
     reached = arriving.strength > 0
     if n is not None:
         reached &= dot(n, arriving.l) > 0
-    lane = np.flatnonzero(reached).astype(np.int32)
-    if len(lane) == len(position):
-        return Lit(lane, len(position), arriving.l, arriving.distance, arriving.strength)
-    parts = rows(arriving.l, lane), arriving.distance.take(lane), arriving.strength.take(lane)
-    return Lit(lane, len(position), *parts)
+    everywhere = Lit(
+        np.arange(len(position), dtype=np.int32),
+        len(position),
+        arriving.l,
+        arriving.distance,
+        arriving.strength,
+    )
+    return among(everywhere, np.flatnonzero(reached))
+
+
+def among(lit: Lit, which: NDArray[np.intp]) -> Lit:
+    """Some of the lit lanes, by their row in `lit`."""
+    if len(which) == len(lit.lane):
+        return lit
+    parts = rows(lit.l, which), lit.distance.take(which), lit.strength.take(which)
+    return Lit(lit.lane.take(which), lit.count, *parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -42,3 +43,39 @@ def _readers() -> dict[str, str]:
     """Suffix -> module."""
     names = [module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")]
     return {f".{name}": name for name in names} | OTHER_SUFFIXES
+
+
+def companions(path: Path) -> list[Path]:
+    """The files that a mesh file may name, whether they are there or not: material libraries with their
+    textures, buffers; more of them than are read, never fewer."""
+    suffix = path.suffix.lower()
+    if suffix == ".obj":
+        libraries = _named(path, rb"^\s*mtllib[ \t]+(.*)")
+        images = [
+            each
+            for library in libraries
+            if library.is_file()
+            for each in _named(library, rb"^\s*map_.*?[ \t](.*)")
+        ]
+        return [*libraries, *images]
+    if suffix in (".gltf", ".glb"):
+        return _named(path, rb'"uri"\s*:\s*"([^"]{1,4096})"')
+    return []
+
+
+def _named(path: Path, pattern: bytes) -> list[Path]:
+    """The paths beside `path` that its text gives: each whole, and by the last of its words."""
+    from urllib.parse import unquote
+
+    data = path.read_bytes()
+    word = b"mtllib" if b"mtllib" in pattern else b"map_" if b"map_" in pattern else b'"uri"'
+    if word not in data:
+        return []
+    found: dict[Path, None] = {}
+    for match in re.finditer(pattern, data, re.MULTILINE):
+        said = match[1].decode("utf-8", "surrogateescape").strip()
+        if "\0" in said or said.startswith("data:"):
+            continue
+        for name in (said, *said.split()):
+            found[path.parent / unquote(name.replace("\\", "/"))] = None
+    return list(found)

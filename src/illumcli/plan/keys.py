@@ -1,0 +1,68 @@
+"""What a buffer depends on, as one hash: its recipe, the values bound in it, and the keys of what it needs.
+
+Nothing is listed by hand. A recipe binds only the parts of the scene that its function reads, so the wiring
+itself says that a colour changes no hit, and that a lamp's place changes that lamp's shadow alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from illumcli.demand import Recipe
+
+MAKERS = ("geometry", "rays", "visibility", "lights", "shading", "plan", "models", "arrays.py", "frame.py")
+"""Sources that decide about the content of what is kept between runs."""
+
+
+class Keys:
+    """The key of every buffer in a book, 32 hexadecimal digits, found when asked for."""
+
+    def __init__(self, book: Mapping[str, Recipe], view: Any, salt: str) -> None:
+        self._book = book
+        self._salt = salt
+        self._known = {"tile": "tile", "view": repr(view)}
+
+    def __call__(self, name: str) -> str:
+        """The key of the buffer `name`, of all tiles together."""
+        if name not in self._known:
+            recipe = self._book[name]
+            needs = [(parameter, self(need)) for parameter, need in recipe.needs.items()]
+            self._known[name] = digest((self._salt, identity(recipe.function), needs))
+        return self._known[name]
+
+
+def digest(value: object) -> str:
+    """32 hexadecimal digits that stand for the `repr` of a value."""
+    return hashlib.blake2b(repr(value).encode(), digest_size=16).hexdigest()
+
+
+def identity(function: Callable[..., Any]) -> str:
+    """A function by name with the values bound in it; the same text in every process."""
+    if isinstance(function, partial):
+        return repr((identity(function.func), function.args, sorted(function.keywords.items())))
+    return f"{function.__module__}.{function.__qualname__}"
+
+
+@cache
+def code() -> str:
+    """Hash of the sources that make what is kept, and of the numpy, ray core and processor they run on.
+
+    Processors differ in the instructions they have, and with them the last bits of their results.
+    """
+    from importlib.metadata import version
+
+    features: dict[str, bool] = import_module("numpy._core._multiarray_umath").__cpu_features__
+    digest = hashlib.blake2b(digest_size=16)
+    root = Path(__file__).parents[1]
+    for name in MAKERS:
+        place = root / name
+        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes())
+    libraries = {name: version(name) for name in ("numpy", "embreex")}
+    digest.update(repr((libraries, sorted(name for name, has in features.items() if has))).encode())
+    return digest.hexdigest()

@@ -49,7 +49,7 @@ def rusinkiewicz(
 
 
 def merl_coordinates(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any]:
-    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d modulo pi."""
+    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d and 0..180 by phi_d."""
     return (
         np.sqrt(theta_h * (2 / np.pi)) * 90,
         theta_d * (2 / np.pi) * 90,

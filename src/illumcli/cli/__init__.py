@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from importlib import import_module
@@ -15,11 +16,14 @@ from illumcli.errors import IllumError
 
 COMMANDS = {
     "render": "Render scenes; print the path of every image.",
+    "ao-bake": "Bake obscurance at the vertices of a mesh or scene.",
     "plan": "What will run for a scene, what is skipped and why.",
     "check": "Validate scenes; every problem at once.",
     "compare": "Measure the difference between two images.",
     "verify": "Check the models against reference vectors.",
+    "stress": "Run the numerical stability suite.",
     "models": "Models, their parameters, ranges, formulas, sources.",
+    "brdf": "Draw models: polar slices, a lit sphere and floor, lobes.",
     "schema": "Print the JSON schema of scenes.",
 }
 
@@ -33,7 +37,8 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        return getattr(import_module(f"illumcli.cli.{name}"), name)
+        module = name.replace("-", "_")
+        return getattr(import_module(f"illumcli.cli.{module}"), module)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         try:
@@ -66,6 +71,8 @@ def illum() -> None:
 def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
     signal.signal(signal.SIGTERM, _interrupt)
+    # pydantic looks for plug-ins in every installed package, a tenth of a small render's start; there are none
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         status = illum.main(standalone_mode=False)
     except IllumError as error:
@@ -94,7 +101,5 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 def _die_by(number: signal.Signals) -> None:
     """End by the signal itself, so that the caller sees what happened."""
-    import os
-
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F
 from illumcli.film.film import pixel_means, pixel_nearest
 from illumcli.plan.artifacts import Artifacts, Keeper
+from illumcli.memory import keep_freed_memory
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import View
 from illumcli.plan.stages import Tile
@@ -111,6 +112,7 @@ def bands(
     last_use = plan.last_use()
     covered = any(step.makes == "alpha" for step in plan.tile)
     keeper = Keeper(artifacts or Artifacts(), plan.keeps, view)
+    keep_freed_memory()
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
             pending: list[tuple[Tile, Future[tuple[Planes, Kept]]]] = []

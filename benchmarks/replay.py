@@ -1,0 +1,123 @@
+"""What does a whole obscurance-bound render cost beside its own rays alone?
+
+Reference: the same rays, recorded where the renderer asks them, put to embreex's own scene in the same chunks
+by as many threads: no generation, no checks, no shading, no files. The rays are recorded a band at a time and
+replayed at once, so that they need not all fit in memory. Seeds 1, 2, ...: no kept hit is met again.
+
+    PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from _bench import REPEATS, SMALL, Took, ambient_scene, header, ratio, table, took
+from illumcli.jobs.render import run
+from illumcli.plan import execute
+from illumcli.plan.plan import plan
+from illumcli.rays.tracer import Tracer
+from illumcli.scene.load import load
+
+Question = tuple[str, np.ndarray, np.ndarray, Any]
+
+
+def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
+    """The world and the questions of every band of tiles, as the renderer asks them."""
+    loaded = load(path)
+    steps = plan(loaded.scene, loaded)
+    shared = execute.run_once(steps, execute.Tally())
+    asked: list[Question] = []
+    own = {name: getattr(Tracer, name) for name in ("closest", "distance", "occluded")}
+
+    def recording(name: str) -> Any:
+        def question(self: Tracer, origins: np.ndarray, directions: np.ndarray, *more: Any) -> Any:
+            asked.append((name, np.ascontiguousarray(origins), np.ascontiguousarray(directions), more))
+            return own[name](self, origins, directions, *more)
+
+        return question
+
+    try:
+        for name in own:
+            setattr(Tracer, name, recording(name))
+        for _ in execute.bands(steps, shared, steps.views[0], threads, execute.Tally()):
+            if len(asked) > 200:
+                yield shared["world"], asked[:]
+                asked.clear()
+        yield shared["world"], asked[:]
+    finally:
+        for name, function in own.items():
+            setattr(Tracer, name, function)
+
+
+def scene_of(world: Any) -> Any:
+    """embreex's own scene over the world's triangles, built."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles))
+    probe = np.zeros((1, 3), np.float32)
+    scene.run(probe, probe + np.float32(1), query="OCCLUDED")
+    return scene
+
+
+def ask(scene: Any, question: Question) -> None:
+    """One recorded question, put to embreex."""
+    name, origins, directions, more = question
+    if name == "closest":
+        scene.run(origins, directions, query="INTERSECT", output=1)
+    elif name == "distance":
+        scene.run(origins, directions, query="DISTANCE")
+    else:
+        far = np.broadcast_to(np.minimum(more[0] if more else np.inf, 1e37), len(origins))
+        scene.run(origins, directions, far.astype(np.float32), query="OCCLUDED")
+
+
+def replay(path: Path, threads: int) -> tuple[Took, int]:
+    """Seconds that all rays of a render take alone, and their number."""
+    wall = cpu = 0.0
+    rays, scene = 0, None
+    with ThreadPoolExecutor(threads) as pool:
+        for world, questions in recorded(path, threads):
+            scene = scene or scene_of(world)
+            own = took(lambda s=scene, q=questions: list(pool.map(lambda each: ask(s, each), q)))
+            wall, cpu = wall + own.wall, cpu + own.cpu
+            rays += sum(len(question[1]) for question in questions)
+    return Took(wall, cpu), rays
+
+
+def main(rays: int, width: int, height: int) -> None:
+    threads = len(os.sched_getaffinity(0))
+    header(
+        "What does a whole obscurance-bound render cost beside its own rays alone?",
+        film=f"{width}x{height}", rays_per_pixel=rays, threads=threads,
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.chdir(folder)
+        os.environ["ILLUM_CACHE"] = str(folder / "cache")
+        scene = ambient_scene(folder, width, height, rays)
+        times: dict[str, list[Took]] = {"whole render, in process": [], "its rays alone": []}
+        run(scene, only=["obscurance"], force=True)  # parsed meshes are kept from here on, as a user has them
+        count = 0
+        for seed in range(1, REPEATS + 1):
+            whole = took(lambda seed=seed: run(scene, only=["obscurance"], seed=seed, force=True))
+            alone, count = replay(scene, threads)
+            times["whole render, in process"].append(whole)
+            times["its rays alone"].append(alone)
+        print(f"# {count} rays")
+        table(times)
+        ratio("whole / rays alone", times, "whole render, in process", "its rays alone")
+
+
+if __name__ == "__main__":
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    main(numbers[0] if numbers else (4 if SMALL else 64), *((48, 27) if SMALL else (1280, 720)))

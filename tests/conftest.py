@@ -13,6 +13,17 @@ ROOT = Path(__file__).parents[1]
 MESHES = ROOT.parent / "shared" / "meshes"
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _own_cache(tmp_path_factory):
+    """Runs of tests keep their artifacts apart from the user's."""
+    before = os.environ.get("ILLUM_CACHE")
+    os.environ["ILLUM_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    yield
+    del os.environ["ILLUM_CACHE"]
+    if before is not None:
+        os.environ["ILLUM_CACHE"] = before
+
+
 @pytest.fixture
 def root() -> Path:
     """The repository."""

@@ -44,3 +44,11 @@ allow_option = click.option(
     metavar="DIR",
     help="Let scenes read files below DIR too (also: ILLUM_ALLOW).",
 )
+
+no_cache_option = click.option(
+    "--no-cache",
+    "cache",
+    flag_value=False,
+    default=True,
+    help="Neither use nor keep artifacts of other runs; see illum cache.",
+)

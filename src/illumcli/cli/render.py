@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import overrides_option, scenes_argument
+from illumcli.cli._options import no_cache_option, overrides_option, scenes_argument
 
 
 @click.command()
@@ -24,6 +24,7 @@ from illumcli.cli._options import overrides_option, scenes_argument
     "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
 )
 @click.option("--force", is_flag=True, help="Replace files that differ.")
+@no_cache_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @click.option(
     "-v", "--verbose", is_flag=True, help="Say what was skipped, repaired and kept, and where time went."
@@ -37,6 +38,7 @@ def render(
     threads: int | None,
     report: Path | None,
     force: bool,
+    cache: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -55,7 +57,7 @@ def render(
 
     reports = []
     for scene in scenes:
-        paths, done = run(scene, overrides, pattern, only, seed, threads, force, reporter(quiet))
+        paths, done = run(scene, overrides, pattern, only, seed, threads, force, reporter(quiet), cache)
         reports.append(done)
         for path in paths:
             click.echo(path)
@@ -63,7 +65,12 @@ def render(
             click.echo(f"{kept}: kept, its content is the same", err=True)
         for what, count in {} if quiet else done.repairs.items():
             click.echo(f"{scene}: {what}: {count}", err=True)
+        for warning in done.warnings:
+            click.echo(warning, err=True)
         if verbose:
+            for camera, reused in done.reused.items():
+                for name, where in reused.items():
+                    click.echo(f"reused {name} of {camera}: from the {where}", err=True)
             for name, why in done.skipped.items():
                 click.echo(f"skipped {name}: {why}", err=True)
             for name, seconds in sorted(done.seconds.items(), key=lambda item: -item[1]):

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.film.film import pixel_means, pixel_nearest
-from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.memory import keep_freed_memory
+from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import View
-from illumcli.plan.stages import Tile
+from illumcli.plan.stages import Scattered, Tile
 from illumcli.rays.tracer import Interrupted
 from illumcli.visibility.arriving import Lit
 
@@ -155,6 +155,32 @@ def bands(
             stop.set()
             keeper.discard()
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def at_pixels(
+    plan: Plan,
+    shared: Mapping[str, Any],
+    view: View,
+    x: NDArray[np.int64],
+    y: NDArray[np.int64],
+    threads: int,
+    tally: Tally,
+) -> Planes:
+    """Layer -> (K, channels) at K pixels of a view: what `bands` makes there, and nothing else is made."""
+    some = max(1, LANES // view.samples)
+    tiles = [Scattered.at(x[a : a + some], y[a : a + some]) for a in range(0, len(x), some)]
+    last_use, keeper = plan.last_use(), Keeper(Artifacts(), {}, view)
+    stop = threading.Event()
+    with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
+        try:
+            made = [
+                pool.submit(_tile, plan, shared, view, tile, last_use, tally, stop, keeper) for tile in tiles
+            ]
+            parts = [future.result()[0] for future in made]
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+    return {name: np.concatenate([part[name][0] for part in parts]) for name in parts[0]}
 
 
 def _tile(

@@ -133,7 +133,7 @@ def polygon_centres(world: World) -> NDArray[np.float32]:
     return assemble.polygon_centres(world)
 
 
-def polygon_normals(methods: tuple[str, ...], meshes: tuple[Mesh, ...], world: World) -> NDArray[np.float32]:
+def polygon_normals(methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> NDArray[np.float32]:
     """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
     from illumcli.geometry.normals import polygon_normals as of_mesh
 
@@ -208,6 +208,27 @@ class Tile:
     width: int
     height: int
 
+    def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Column and row of every pixel, row by row from the top."""
+        y, x = np.divmod(np.arange(self.width * self.height), self.width)
+        return x + self.x, y + self.y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scattered(Tile):
+    """Pixels that need not lie together, as a tile of one row."""
+
+    columns: NDArray[np.int64]
+    rows: NDArray[np.int64]
+
+    @classmethod
+    def at(cls, x: NDArray[np.int64], y: NDArray[np.int64]) -> Scattered:
+        """The pixels of these columns and rows."""
+        return cls(0, 0, len(x), 1, x, y)
+
+    def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return self.columns, self.rows
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
@@ -228,8 +249,7 @@ class Samples:
 
 def samples(seed: int, view: Any, tile: Tile) -> Samples:
     """Where the tile's samples lie, keyed by pixel number."""
-    y, x = np.divmod(np.arange(tile.width * tile.height), tile.width)
-    x, y = x + tile.x, y + tile.y
+    x, y = tile.pixels()
     pixel = (y * view.width + x).astype(np.uint32)
     points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples)
     return Samples(x, y, points, view.samples)

@@ -54,7 +54,11 @@ def camera_rays(
         d = _combined((scale, forward), (x * scale, right), (y * scale, up))
         along = -(scale * (forward @ eye) + x * scale * (right @ eye) + y * scale * (up @ eye))
         skipped = np.maximum(along - CLEAR, 0)
-        start = _combined((np.broadcast_to(1.0, len(x)), eye)) if not skipped.any() else eye + skipped[:, None] * d
+        start = (
+            _combined((np.broadcast_to(1.0, len(x)), eye))
+            if not skipped.any()
+            else eye + skipped[:, None] * d
+        )
     else:
         half = camera.extent / 2 / frame.radius
         d = np.broadcast_to(forward, (len(x), 3))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,9 @@ from illumcli.arrays import F, Lanes, Vectors, columns, dot
 
 SHARE = 4 * 2.0**-24
 """Four times the distance at which false self-hits begin; contact gaps of 1e-6 radii still shade."""
+
+
+ULP = 2.0**-23
 
 
 def lifted(position: NDArray[np.float64], ng: Vectors, edge: Lanes) -> Vectors:
@@ -23,29 +28,32 @@ def lifted(position: NDArray[np.float64], ng: Vectors, edge: Lanes) -> Vectors:
     edge : (N,)
         The facet's longest edge.
     """
-    step = (SHARE * (dot(np.abs(ng), np.abs(position)) + edge))[:, None] * ng
-    origin = columns(position + step, F)
-    outward = np.copysign(F(np.inf), step).astype(F)
-    return np.where(step != 0, np.nextafter(origin, outward), origin)
+    size = np.abs(position)
+    step = (SHARE * (dot(np.abs(ng), size) + edge))[:, None] * ng
+    # twice the rounding to float32 outwards, so that rounding never brings a component back inwards
+    size *= ULP
+    step += np.copysign(size, ng, out=size)
+    step += position
+    return columns(step, F)
 
 
-def over_tangent_planes(
-    position: NDArray[np.float64],
-    corners: tuple[Vectors, Vectors, Vectors],
-    normals: tuple[Vectors, Vectors, Vectors],
-    weights: tuple[Lanes, Lanes, Lanes],
-) -> NDArray[np.float64]:
-    """(N, 3) `position` moved to the mean of its projections on the corners' tangent planes.
+def tangent_lift(
+    position: Vectors,
+    corners: Sequence[Vectors],
+    normals: Sequence[Vectors],
+    weights: Sequence[Lanes],
+) -> Vectors:
+    """(N, 3) the way from `position` to the mean of its projections on the corners' tangent planes.
 
-    A smooth-shaded mesh lights points that its flat facets shade; a shadow ray that starts from here leaves
-    the curved surface the normals pretend. Where the surface is hollow the point stays.
+    A smooth-shaded mesh lights points that its flat facets shade; a shadow ray that starts there leaves
+    the curved surface the normals pretend. Where the surface is hollow the way is 0.
 
     References
     ----------
     Hanika, J. (2021). Hacking the shadow terminator. Ray Tracing Gems II, chapter 4.
     """
-    moved = position.copy(order="F")
+    way = np.zeros_like(position)
     for corner, normal, weight in zip(corners, normals, weights, strict=True):
         below = np.minimum(dot(position - corner, normal), 0)
-        moved -= (weight * below)[:, None] * normal
-    return moved
+        way -= (weight * below)[:, None] * normal
+    return way

@@ -50,14 +50,15 @@ def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors
     e1, e2 = v1 - v0, v2 - v0
     position = v0 + u[:, None] * e1 + v[:, None] * e2
     ng = unit(cross(e1, e2))
-    edge = np.sqrt(np.maximum(np.maximum(dot(e1, e1), dot(e2, e2)), dot(e2 - e1, e2 - e1)))
     behind = dot(ng, towards_eye) < 0
-    return Facets(position, columns(facing(ng, behind), F), edge.astype(F), behind)
+    sides = columns(e1, F), columns(e2, F), columns(e2 - e1, F)
+    edge = np.maximum(np.maximum(length(sides[0]), length(sides[1])), length(sides[2]))
+    return Facets(position, facing(columns(ng, F), behind), edge, behind)
 
 
 def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
     """`n`, turned over where the eye sees the back."""
-    return n * np.where(behind, -1, 1).astype(n.dtype)[:, None]
+    return n * (1 - 2 * behind.astype(n.dtype))[:, None]
 
 
 def corner_rows(world: World, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, columns, rows
 from illumcli.geometry.assemble import CornerVectors, World
-from illumcli.rays.offsets import lifted, over_tangent_planes
+from illumcli.rays.offsets import lifted, tangent_lift
 from illumcli.rays.surface import Facets, Hits, corner_rows, facing
 from illumcli.rays.tracer import Tracer
 from illumcli.visibility.arriving import Lit
@@ -19,10 +19,10 @@ def shadow_origins(world: World, hits: Hits, facet: Facets, normals: CornerVecto
     position = facet.position
     if normals is not None:
         at = corner_rows(world, hits.triangle, normals)
-        corners = tuple(rows(world.vertices, world.triangles[:, k].take(hits.triangle)) for k in range(3))
-        ends = tuple(facing(rows(normals.values, index), facet.behind) for index in at)
+        corners = [rows(world.vertices, world.triangles[:, k].take(hits.triangle)) for k in range(3)]
+        ends = [facing(rows(normals.values, index), facet.behind) for index in at]
         weights = (1 - hits.u - hits.v, hits.u, hits.v)
-        position = over_tangent_planes(position, corners, ends, weights)  # type: ignore[arg-type]
+        position = position + tangent_lift(columns(position, F), corners, ends, weights)
     return lifted(position, facet.ng, facet.edge)
 
 

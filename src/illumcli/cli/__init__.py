@@ -16,6 +16,7 @@ from illumcli.errors import IllumError
 
 COMMANDS = {
     "render": "Render scenes; print the path of every image.",
+    "sweep": "Render the variants of a scene; share what they have in common.",
     "ao-bake": "Bake obscurance at the vertices of a mesh or scene.",
     "plan": "What will run for a scene, what is skipped and why.",
     "check": "Validate scenes; every problem at once.",
@@ -24,6 +25,7 @@ COMMANDS = {
     "stress": "Run the numerical stability suite.",
     "models": "Models, their parameters, ranges, formulas, sources.",
     "brdf": "Draw models: polar slices, a lit sphere and floor, lobes.",
+    "cache": "List, verify, prune what is kept between runs.",
     "schema": "Print the JSON schema of scenes.",
 }
 

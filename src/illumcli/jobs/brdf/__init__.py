@@ -1,0 +1,168 @@
+"""Draw BRDFs: polar slices, a lit sphere, a lit plane, the lobe in space."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from illumcli.errors import InputError, OutputError
+from illumcli.jobs.brdf import views
+from illumcli.models._base import IlluminationModel
+from illumcli.scene.faults import faults
+from illumcli.scene.override import Override, parse
+from illumcli.scene.source import Problem
+from illumcli.variants import member, suggestion
+
+VIEWS = ("polar", "sphere", "plane", "lobe")
+PACKAGE = "illumcli.models"
+
+
+def run(
+    names: Sequence[str],
+    overrides: Sequence[str] = (),
+    output: Path | None = None,
+    table: Path | None = None,
+    chosen: Sequence[str] = VIEWS,
+    angles: Sequence[float] = (15.0, 40.0, 65.0),
+    log: bool = False,
+    times_cos: bool = False,
+    force: bool = False,
+) -> list[Path]:
+    """Draw the models `names` side by side; the paths written.
+
+    Parameters
+    ----------
+    overrides : sequence of str
+        `PARAMETER=VALUE` for every model, or `MODEL.PARAMETER=VALUE`; MODEL is a name or a number from 1.
+    output : Path, optional
+        A picture, .png or .svg.
+    table : Path, optional
+        The polar slices as CSV.
+    angles : sequence of float
+        Angles of incidence [degrees].
+
+    Raises
+    ------
+    InputError
+        Models or parameters that do not exist, values out of range; all at once.
+    OutputError
+        A different file is there and `force` is not given.
+    """
+    kind = "" if output is None else output.suffix.lower().removeprefix(".")
+    if output is not None and kind not in ("png", "svg"):
+        raise InputError(f"{output}: pictures of BRDFs are .png or .svg; choose one of these")
+    models = described(names, overrides)
+    files: dict[Path, bytes] = {}
+    if table is not None:
+        files[table] = slices_table(models, angles, times_cos).encode()
+    if output is not None:
+        from illumcli.jobs.brdf.figure import drawn
+
+        files[output] = drawn(models, chosen, angles, log, times_cos, kind)
+    _write(files, force)
+    return list(files)
+
+
+def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
+    """The models by name, with their parameters; those named twice are numbered by their place."""
+    problems: list[str] = []
+    read: list[Problem] = []
+    changes = [(text, change) for text in overrides if (change := parse(text, read))]
+    problems += map(str, read)
+    models: dict[str, IlluminationModel] = {}
+    applied: set[str] = set()
+    fields: list[str] = []
+    for place, name in enumerate(names, start=1):
+        title = name if names.count(name) == 1 else f"{name} {place}"
+        try:
+            Model = member(PACKAGE, name)
+        except LookupError as error:
+            problems.append(f"no model '{name}'; {error}")
+            applied |= {text for text, change in changes if change.steps[0] in (name, str(place))}
+            continue
+        fields += [field for field in Model.model_fields if field != "model"]
+        mine = [(text, own) for text, change in changes if (own := _for(change, name, place, Model, names))]
+        applied |= {text for text, _ in mine}
+        made, found = _described(Model, mine)
+        problems += [f"{title}: {fact}" if not fact.startswith("-D ") else fact for fact in found]
+        if made is not None:
+            models[title] = made
+    known = tuple(dict.fromkeys([*names, *fields]))
+    for text, change in changes:
+        if text not in applied:
+            way = suggestion(change.steps[0], known)
+            problems.append(f"-D {text}: no model or parameter '{change.steps[0]}'; {way}")
+    if problems:
+        raise InputError(dict.fromkeys(problems))
+    return models
+
+
+def _for(
+    change: Override, name: str, place: int, Model: type[BaseModel], names: Sequence[str]
+) -> tuple[tuple[str, ...], Any] | None:
+    """Steps within the model and the value, where the override is meant for it."""
+    first, *rest = change.steps
+    if first in (name, str(place)) and rest:
+        return tuple(rest), change.value.plain()
+    if first in Model.model_fields and first != "model" and first not in names:
+        return change.steps, change.value.plain()
+    return None
+
+
+def _described(
+    Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
+) -> tuple[IlluminationModel | None, list[str]]:
+    """The model with its changes, or None and what is wrong, after the override that it comes from."""
+    keys: dict[str, Any] = {"model": Model.model_fields["model"].default}
+    said: dict[tuple[str, ...], str] = {}
+    for text, (steps, value) in changes:
+        here = keys
+        for step in steps[:-1]:
+            here = here.setdefault(step, {})
+            if not isinstance(here, dict):
+                return None, [
+                    f"-D {text}: nothing is inside {step}, which has a value of its own; give it whole"
+                ]
+        here[steps[-1]] = value
+        said[steps] = text
+    classes: dict[int, type[BaseModel]] = {}
+    try:
+        return Model.model_validate(keys, context=classes), []
+    except ValidationError as error:
+        found = []
+        for path, fact in faults(error, keys, classes):
+            where = ".".join(map(str, path))
+            given = [text for steps, text in said.items() if path[: len(steps)] == steps]
+            found.append(f"-D {given[-1]}: {fact}" if given else f"{where}: {fact}" if where else fact)
+        return None, found
+
+
+def slices_table(models: Mapping[str, IlluminationModel], angles: Sequence[float], times_cos: bool) -> str:
+    """The polar slices as CSV: model, both angles [degrees], values; the light is at negative angles."""
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    kind = "response" if times_cos else "f"
+    rows.writerow(["model", "incidence", "view", *(f"{kind}.{channel}" for channel in "RGB")])
+    for title, model in models.items():
+        for angle in angles:
+            view, found = views.polar_slice(model, angle, times_cos)
+            for at, color in zip(view.tolist(), found.tolist(), strict=True):
+                rows.writerow([title, f"{angle:g}", f"{at:.10g}", *(repr(each) for each in color)])
+    return out.getvalue()
+
+
+def _write(files: Mapping[Path, bytes], force: bool) -> None:
+    from illumcli.files.atomic import write_bytes
+
+    for path, data in files.items():
+        if not force and path.exists() and path.read_bytes() != data:
+            raise OutputError(
+                f"{path}: a different file is there; use --force to replace it, or another name"
+            )
+    for path, data in files.items():
+        write_bytes(path, data)

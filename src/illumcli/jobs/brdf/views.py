@@ -1,0 +1,154 @@
+"""What the views of a BRDF show, as arrays in double precision: slices, lobes, a lit sphere, a lit plane.
+
+The surface is z = 0 with its normal along z and its grain along x; light comes from the left, in the plane of
+x and z. A value is f_r = response / n.l, or with `times_cos` the response itself, which is what a light of
+irradiance 1 makes leave. For the intensity models of the texts f_r is what a BRDF would be that gives the
+same picture; it grows without bound as the light sinks to the horizon.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Vectors, columns, cross, dot, unit
+from illumcli.models._base import IlluminationModel
+from illumcli.shading.terms import evaluate, words
+
+Doubles = NDArray[np.float64]
+
+SUN = (-0.55, 0.6, 0.58)
+"""From the sphere to its light; the eye looks along -z."""
+LAMP = (0.0, 3.0, 0.8)
+"""The light over the plane, behind what the eye looks at."""
+EYE = (0.0, -4.0, 1.5)
+
+
+def values(
+    model: IlluminationModel, n: Vectors, l: Vectors, v: Vectors, t: Vectors, times_cos: bool = True
+) -> Doubles:
+    """(N, 3) the response, or f_r, per lane; 0 where light or eye is at or below the horizon."""
+    out = np.zeros(l.shape, order="F")
+    n_l = dot(n, l)
+    lit = np.flatnonzero((n_l > 0) & (dot(n, v) > 0))
+    lobes = model.lobes()
+    if not (lit.size and lobes):
+        return out
+    at = {"n": n, "l": l, "v": v, "t": t}
+    given: dict[str, Any] = {word: columns(at[word][lit]) for word in words(lobes) & at.keys()}
+    if "light" in words(lobes):
+        given["light"] = np.ones(3)
+    out[lit] = sum(evaluate(lobes, given).values())
+    if not times_cos:
+        out[lit] /= n_l[lit][:, None]
+    return out
+
+
+def _seen_from(model: IlluminationModel, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
+    """(N, 3) values of the flat surface lit from `incidence` degrees, seen from unit vectors `v`."""
+
+    def everywhere(vector: tuple[float, float, float]) -> Vectors:
+        return np.broadcast_to(np.array(vector), v.shape)
+
+    angle = np.radians(incidence)
+    l = everywhere((-np.sin(angle), 0.0, np.cos(angle)))
+    return values(model, everywhere((0.0, 0.0, 1.0)), l, v, everywhere((1.0, 0.0, 0.0)), times_cos)
+
+
+def slice_angles(incidence: float) -> Doubles:
+    """Angles of view of a slice, degrees from -90 on the light's side to 90, without the horizon itself.
+
+    They are a quarter apart, less about the mirror direction, where a highlight may be narrower.
+    """
+    near = np.geomspace(1e-3, 2, 40)
+    angles = np.concatenate([np.linspace(-90, 90, 721), incidence + near, incidence - near, [incidence]])
+    return np.unique(angles[np.abs(angles) < 90])
+
+
+def polar_slice(
+    model: IlluminationModel, incidence: float, times_cos: bool = False
+) -> tuple[Doubles, Doubles]:
+    """(K,) angles of view in degrees and (K, 3) values in the plane of incidence.
+
+    Parameters
+    ----------
+    incidence : float
+        Angle of the light to the normal [degrees]; its mirror direction is seen at the same angle of view.
+    """
+    angles = slice_angles(incidence)
+    theta = np.radians(angles)
+    v = columns(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1))
+    return angles, _seen_from(model, incidence, v, times_cos)
+
+
+def lobe(
+    model: IlluminationModel, incidence: float, times_cos: bool = False, steps: int = 90
+) -> tuple[Doubles, Doubles]:
+    """(S + 1, 2 S + 1, 3) unit directions over the hemisphere, and (S + 1, 2 S + 1, 3) values there.
+
+    The columns run from the mirror direction to the horizon, crowded at their beginning: a narrow highlight
+    is drawn as well as a wide one.
+    """
+    angle = np.radians(incidence)
+    around = np.linspace(0, 2 * np.pi, 2 * steps + 1)
+    horizon = np.arctan2(np.cos(angle), np.cos(around) * np.sin(angle)) - 1e-6
+    away = np.linspace(0, 1, steps + 1)[:, None] ** 2 * horizon
+    x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
+    v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
+    found = _seen_from(model, incidence, unit(columns(v.reshape(-1, 3))), times_cos)
+    return v, np.reshape(found, v.shape)
+
+
+def irradiance(model: IlluminationModel) -> float:
+    """Of the light in pictures: pi for a BRDF, so that white Lambert is white, 1 for the intensity models."""
+    return np.pi if model.physical or getattr(model, "normalised", False) else 1.0
+
+
+def lit_sphere(model: IlluminationModel, size: int = 256) -> Doubles:
+    """(size, size, 4) linear R, G, B and coverage of a ball under one light; its grain runs around y."""
+    x, y, inside = _disc(2 * size)
+    n = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1).reshape(-1, 3)
+    n = columns(n[inside.ravel()])
+    l, v = (np.broadcast_to(np.array(a) / np.linalg.norm(a), n.shape) for a in (SUN, (0.0, 0.0, 1.0)))
+    t = unit(cross(np.broadcast_to((0.0, 1.0, 0.0), n.shape), n))
+    return _halved(values(model, n, columns(l), columns(v), t) * irradiance(model), inside)
+
+
+def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
+    """(size / 2, size, 4) linear R, G, B and coverage of a floor seen low, against its lamp.
+
+    Its grain runs from left to right. The light does not fall off with distance.
+    """
+    across, down = np.meshgrid(
+        (np.arange(2 * size) + 0.5) / size - 1, 0.32 + 0.68 * (np.arange(size) + 0.5) / size
+    )
+    eye, forward = np.array(EYE), np.array([0.0, 1.0, 0.0])
+    ray = forward + np.stack([0.75 * across, 0 * across, -0.75 * down], axis=-1)
+    distance = eye[2] / -ray[..., 2]
+    p = (eye + distance[..., None] * ray).reshape(-1, 3)
+    inside = (np.abs(p[:, 0]) < 1.5) & (p[:, 1] < 2.6)
+    p = columns(p[inside])
+    n, t = (np.broadcast_to(np.array(a), p.shape) for a in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    l, v = unit(columns(np.array(LAMP) - p)), unit(columns(eye - p))
+    return _halved(values(model, n, l, v, t) * irradiance(model), inside.reshape(across.shape))
+
+
+def _disc(size: int) -> tuple[Doubles, Doubles, NDArray[np.bool_]]:
+    """x, y upwards and whether inside the unit disc, at the centres of size x size pixels."""
+    x, y = np.meshgrid((np.arange(size) + 0.5) * 2 / size - 1, 1 - (np.arange(size) + 0.5) * 2 / size)
+    return x / 0.98, y / 0.98, x * x + y * y < 0.98**2
+
+
+def _halved(lanes: Doubles, inside: NDArray[np.bool_]) -> Doubles:
+    """(H / 2, W / 2, 4) the means of two by two pixels; `lanes` are those `inside`."""
+    height, width = inside.shape
+    whole = np.zeros((height, width, 4))
+    whole[inside] = np.concatenate([lanes, np.ones((len(lanes), 1))], axis=1)
+    return whole.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3))
+
+
+def luminance(color: Doubles) -> Doubles:
+    """Of linear R, G, B (Rec. 709)."""
+    return color @ np.array([0.2126, 0.7152, 0.0722])

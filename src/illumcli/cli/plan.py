@@ -6,16 +6,19 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import overrides_option, scene_argument
+from illumcli.cli._options import no_cache_option, overrides_option, scene_argument
 
 
 @click.command()
 @scene_argument
 @overrides_option
 @click.option("--only", "only", multiple=True, metavar="LAYER", help="Plan these layers alone.")
-@click.option("--json", "as_json", is_flag=True, help="As JSON.")
-def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json: bool) -> None:
-    """Print what will run for SCENE, what is skipped and why; read no mesh, trace nothing.
+@click.option("--json", "as_json", is_flag=True, help="As JSON, a list with each camera's plan.")
+@no_cache_option
+def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json: bool, cache: bool) -> None:
+    """Print what will run for SCENE, what is reused, what is skipped and why; parse no mesh, trace nothing.
+
+    Files are hashed to know what is reused; with --no-cache they are not opened.
 
     \b
     Examples:
@@ -24,4 +27,4 @@ def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json
     """
     from illumcli.jobs.plan import run
 
-    click.echo(run(scene, overrides, only, as_json))
+    click.echo(run(scene, overrides, only, as_json, cache))

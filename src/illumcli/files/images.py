@@ -24,6 +24,7 @@ from illumcli.files.atomic import Part
 from illumcli.pixels import from_srgb, refuse_nonfinite
 
 LARGEST_HALF = 65504.0
+SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
 READ_ROWS = 64  # rows held at once while reading back
 ChannelType: TypeAlias = Literal["half", "float", "uint8", "uint16"]
 Metadata: TypeAlias = Mapping[str, Any]
@@ -329,6 +330,47 @@ def flip(
         raise RuntimeError(found.geterror())
     errors = np.asarray(found.get_pixels(oiio.FLOAT))[..., 0]
     return float(errors.mean(dtype=np.float64)), errors
+
+
+def write_sheet(
+    path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], labels: Sequence[str]
+) -> None:
+    """Write a contact sheet as PNG: pictures row by row, each scaled to a cell, its label below.
+
+    Parameters
+    ----------
+    pictures : iterable of (H, W, 1 or 3) uint8
+        Display values; taken one at a time.
+    labels : sequence of str
+        As many.
+    """
+    side, gap, text = SHEET_CELL, 8, 14
+    columns = max(1, min(len(labels), round((len(labels) * 1.6) ** 0.5)))
+    cells: list[NDArray[np.uint8]] = []
+    for picture, label in zip(pictures, labels, strict=True):
+        height = max(1, round(side * picture.shape[0] / picture.shape[1]))
+        source = _display(np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture)
+        small = oiio.ImageBufAlgo.resize(source, roi=oiio.ROI(0, side, 0, height, 0, 1, 0, 3))
+        cell = _display(np.full((height + 2 * gap + text, side + gap, 3), 255, np.uint8))
+        oiio.ImageBufAlgo.paste(cell, gap // 2, gap // 2, 0, 0, small)
+        fitting = label if len(label) <= side // 8 else f"{label[: side // 8 - 1]}…"
+        oiio.ImageBufAlgo.render_text(cell, gap // 2, height + gap + text, fitting, text, "", (0.0, 0.0, 0.0))
+        cells.append(np.asarray(cell.get_pixels(oiio.UINT8)))
+    tall = max(len(cell) for cell in cells)
+    blank = np.full((tall, side + gap, 3), 255, np.uint8)
+    cells = [np.concatenate([cell, blank[len(cell) :]]) for cell in cells]
+    cells += [blank] * (-len(cells) % columns)
+    rows = [np.concatenate(cells[k : k + columns], axis=1) for k in range(0, len(cells), columns)]
+    whole = np.concatenate(rows)
+    with ImageWriter(path, whole.shape[1], whole.shape[0], dict.fromkeys("RGB", "uint8")) as writer:
+        writer.write_band(0, whole)
+
+
+def _display(pixels: NDArray[np.uint8]) -> oiio.ImageBuf:
+    """A buffer of (H, W, 3) display values, for arithmetic on them as they are."""
+    buffer = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.UINT8))
+    buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels))
+    return buffer
 
 
 def _buffer(pixels: NDArray[Any]) -> oiio.ImageBuf:

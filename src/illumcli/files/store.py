@@ -262,6 +262,25 @@ class Writer:
             self.discard()
 
 
+def described(path: Path) -> dict[str, Any]:
+    """What an entry says of itself, not verified.
+
+    Raises
+    ------
+    OSError
+    Refused
+    """
+    with path.open("rb") as file:
+        head = file.read(_HEADER.size)
+        if len(head) < _HEADER.size or head[:8] != _MAGIC:
+            raise Refused("not an entry of this program")
+        try:
+            said: dict[str, Any] = json.loads(file.read(min(_HEADER.unpack(head)[2], MAPPED)))
+        except ValueError:
+            raise Refused("damaged: its description cannot be read") from None
+    return said
+
+
 def read_entry(path: Path, key: str) -> Stored:
     """The entry at `path`, sound to the last bit and of this key.
 

@@ -8,33 +8,53 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
-from illumcli.plan.plan import Plan, plan
+from illumcli.jobs.render import opened_store
+from illumcli.plan.artifacts import Artifacts
+from illumcli.plan.plan import Plan, plan, reusing
 from illumcli.scene.load import load
 
 
-def run(path: Path, overrides: Sequence[str] = (), only: Sequence[str] = (), as_json: bool = False) -> str:
-    """The plan of a scene as a table, or as JSON."""
+def run(
+    path: Path,
+    overrides: Sequence[str] = (),
+    only: Sequence[str] = (),
+    as_json: bool = False,
+    cache: bool = True,
+) -> str:
+    """The plan of a scene as a table, or as JSON; with `cache` for what the store holds now."""
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
-    return json.dumps(made.as_data(), indent=1) if as_json else table(made)
+    store = opened_store() if cache else None
+    parts = [reusing(made, view, Artifacts(store, look=True)) for view in made.views]
+    return json.dumps([part.as_data() for part in parts], indent=1) if as_json else table(parts)
 
 
-def table(made: Plan) -> str:
-    """The plan in words: what runs once, what per tile, what does not and why."""
+def table(parts: Sequence[Plan]) -> str:
+    """Plans in words, one per view: what runs once, what per tile, what does not and why."""
+    return "\n\n".join("\n".join(_lines(part)) for part in parts)
+
+
+def _lines(made: Plan) -> list[str]:
+    view = made.views[0]
+    memory = made.expected_bytes()
     lines = [
-        *(f"view    {v.name}: {v.width} x {v.height}, {v.samples} samples per pixel" for v in made.views),
+        f"view    {view.name}: {view.width} x {view.height}, {view.samples} samples per pixel",
         _row("layers", [layer.name for layer in made.layers]),
-        _row("once", [step.makes for step in made.once]),
-        _row("tile", [step.makes for step in made.tile]),
+        _row("once", [step.makes for step in made.once if step.makes not in made.reused]),
+        _row("tile", [step.makes for step in made.tile if step.makes not in made.reused]),
+        _row("reused", list(made.reused)),
         _row("rays", [f"{name} {count:,}" for name, count in made.expected_rays.items()]),
+        _row("memory", [f"{name} {size / 2**20:,.1f} MiB" for name, size in memory.items()]),
     ]
     reasons = defaultdict(list)
     for name, why in made.skipped.items():
         reasons[why].append(name)
     for why, names in reasons.items():
         lines.append(_row("unused", names) + f"\n          ({why})")
-    return "\n".join(lines)
+    return [line for line in lines if line.strip()]
 
 
 def _row(head: str, names: Sequence[str]) -> str:
+    if not names:
+        return ""
     return textwrap.fill(", ".join(names), 100, initial_indent=f"{head:8}", subsequent_indent=" " * 8)

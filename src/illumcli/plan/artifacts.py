@@ -159,7 +159,7 @@ class Memory:
 
     def __init__(self, wanted: frozenset[str] = frozenset(), limit: int = MEMORY) -> None:
         self.wanted = wanted
-        """Keys of tile buffers that another variant reads."""
+        """Keys of buffers that the next variant reads."""
         self.limit = limit
         self.once: dict[str, Any] = {}
         self._tiles: dict[str, dict[Tile, Any]] = {}
@@ -189,13 +189,13 @@ class Memory:
         """Every tile of these keys has been added."""
         self._complete |= keys & self._tiles.keys()
 
-    def retire(self, wanted: frozenset[str]) -> None:
-        """Let go of everything but these keys."""
-        self.wanted = wanted
-        for key in self._tiles.keys() - wanted:
+    def retire(self) -> None:
+        """Let go of everything that is not wanted."""
+        for key in self._tiles.keys() - self.wanted:
             gone = self._tiles.pop(key)
             self._complete.discard(key)
             self._bytes -= sum(array.nbytes for each in gone.values() for array in arrays_in(each))
+        self.once = {key: value for key, value in self.once.items() if key in self.wanted}
 
 
 def arrays_in(value: Any) -> Iterator[NDArray[Any]]:
@@ -264,7 +264,7 @@ class Artifacts:
 
     def keeps(self, name: str) -> bool:
         """May a buffer of this name be kept?"""
-        return self.memory is not None or (self.store is not None and not self.look and is_kept(name))
+        return self.memory is not None or (self.store is not None and is_kept(name))
 
     def keep_once(self, name: str, key: str, value: Any, seconds: float) -> None:
         """Keep a buffer of the whole scene that took `seconds` with all it needs, if it is worth it."""
@@ -336,12 +336,12 @@ class Keeper:
         )
         """The buffers that every tile hands over."""
 
-    def take(self, name: str, buffer: Any, hits: Hits, tile: Tile) -> NDArray[Any] | None:
+    def take(self, name: str, buffer: Any, hits: Hits | None, tile: Tile) -> NDArray[Any] | None:
         """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread."""
         if self._memory is not None:
             self._memory.add(self._keys[name], tile, buffer)
         kind = kind_of(name)
-        if name not in self._writers or kind is None:
+        if name not in self._writers or kind is None or hits is None:
             return None
         packed = kind.pack(buffer)
         return None if packed is None else spread_out(kind, packed, hits, tile, self._view.samples)

@@ -19,15 +19,12 @@ from illumcli.memory import keep_freed_memory
 from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import View
-from illumcli.plan.stages import Scattered, Tile
+from illumcli.plan.stages import LANES, Scattered, Tile, tile_side
 from illumcli.rays.tracer import Interrupted
 from illumcli.visibility.arriving import Lit
 
 Planes: TypeAlias = dict[str, NDArray[np.float32]]  # layer -> (rows, columns, channels)
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
-
-LANES = 1 << 14
-"""Samples per tile: a dozen buffers of that many stay in a core's cache of 1 MiB."""
 
 
 @dataclass(slots=True)
@@ -77,11 +74,6 @@ def run_once(plan: Plan, tally: Tally, artifacts: Artifacts | None = None) -> di
 def _cost(plan: Plan, name: str, tally: Tally) -> float:
     """Seconds of one processor that a buffer took, with all that had to be made for it."""
     return sum(tally.seconds.get(need, 0.0) for need in plan.needed_for(name))
-
-
-def tile_side(samples: int) -> int:
-    """Pixels along a square tile's side, a power of two."""
-    return int(max(4, 2 ** int(np.log2(max(1, LANES / samples)) / 2)))
 
 
 def bands(
@@ -210,7 +202,7 @@ def _tile(
         if isinstance(made, Lit):
             lanes[step.makes] = made.count - len(made.lane)
         if step.makes in keeper.names:
-            kept[step.makes] = keeper.take(step.makes, made, buffers["hits"], tile)
+            kept[step.makes] = keeper.take(step.makes, made, buffers.get("hits"), tile)
         for name in step.needs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)

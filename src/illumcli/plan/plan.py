@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from illumcli import __version__
 from illumcli.demand import Recipe, order
 from illumcli.errors import LimitError
 from illumcli.film.film import Layer
-from illumcli.plan.artifacts import Artifacts, Book
-from illumcli.plan.keys import Keys, digest
+from illumcli.plan.artifacts import Artifacts, Book, Picture, kind_of
+from illumcli.plan.keys import Keys, code, digest
 from illumcli.plan.recipes import View, active_lights, is_ambient, is_emissive, layers, recipes, views
+from illumcli.plan.stages import tile_side
 from illumcli.scene.spec import Scene
 
 GIVEN = ("view", "tile")
@@ -63,7 +67,21 @@ class Plan:
             "skipped": dict(self.skipped),
             "expected_rays": dict(self.expected_rays),
             "reused": dict(self.reused),
+            "expected_bytes": self.expected_bytes(),
         }
+
+    def expected_bytes(self) -> dict[str, int]:
+        """What the run takes beyond its meshes: a band of tiles, and each artifact that may be written, whose
+        pages the system may drop. Upper bounds."""
+        sizes = {}
+        for view in self.views:
+            lanes = min(view.height, tile_side(view.samples)) * view.width * view.samples
+            sizes["band"] = lanes * 4 * sum(len(layer.channels) for layer in self.layers) // view.samples
+            for name in self.keeps:
+                if kind := kind_of(name):
+                    shape, dtype = Picture.shape(kind, view)
+                    sizes[name] = math.prod(shape) * np.dtype(dtype).itemsize
+        return sizes
 
     def needed_for(self, name: str) -> frozenset[str]:
         """Every buffer that `name` is made from, itself included, those at hand left out."""
@@ -118,6 +136,25 @@ def content_key(made: Plan, view: View, buffers: Iterable[str]) -> str:
     """Hash of all that these buffers of a view depend on, and of this version."""
     keys = Keys(made.book, view, __version__)
     return digest([keys(name) for name in buffers])
+
+
+def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
+    """Keys of what `following` has in common with this plan and reads where they part, and of what both make
+    once: kept in memory from one to the other, they spare the second all that lies behind them."""
+    if following is None:
+        return frozenset()
+    wanted: set[str] = set()
+    for view in following.views:
+        if view not in made.views:
+            continue
+        own, other = (Keys(each.book, view, code()) for each in (made, following))
+        common = {step.makes for step in following.tile if step.makes in made.book}
+        common = {name for name in common if own(name) == other(name)}
+        asked = {layer.buffer for layer in following.layers} | {"hits", "samples", "alpha"}
+        read = {need for step in following.tile if step.makes not in common for need in step.needs.values()}
+        wanted |= {other(name) for name in common & (asked | read)}
+        wanted |= {other(step.makes) for step in following.once}
+    return frozenset(wanted)
 
 
 def _steps(

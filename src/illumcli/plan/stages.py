@@ -199,6 +199,15 @@ def textures(
 # --- per tile: samples and what they see --------------------------------------------------------------
 
 
+LANES = 1 << 14
+"""Samples per tile: a dozen buffers of that many stay in a core's cache of 1 MiB."""
+
+
+def tile_side(samples: int) -> int:
+    """Pixels along a square tile's side, a power of two."""
+    return int(max(4, 2 ** int(np.log2(max(1, LANES / samples)) / 2)))
+
+
 @dataclass(frozen=True, slots=True)
 class Tile:
     """A rectangle of pixels."""

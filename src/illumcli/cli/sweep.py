@@ -1,0 +1,101 @@
+"""``illum sweep``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from illumcli.cli._options import allow_option, no_cache_option, scene_argument
+
+if TYPE_CHECKING:
+    from illumcli.jobs.sweep import Outcome
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command()
+@scene_argument
+@click.option(
+    "-D",
+    "axes",
+    multiple=True,
+    metavar="PATH=VALUES",
+    help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog.",
+)
+@click.option("--zip", "together", is_flag=True, help="First values together, then second ones, ...")
+@click.option("--rows", type=_FILE, metavar="FILE.csv", help="A variant per row: paths in the first line.")
+@click.option(
+    "--frames",
+    metavar="FIRST:LAST[:STEP]",
+    help="A variant per frame; a value may be a formula of frame.",
+)
+@click.option(
+    "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."
+)
+@click.option("--only", "only", multiple=True, metavar="LAYER", help="Render these layers alone.")
+@click.option("--sheet", type=_FILE, metavar="FILE.png", help="Write a contact sheet, labelled.")
+@click.option("--table", type=_FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, error.")
+@click.option(
+    "--reference", metavar="N|FILE", help="What the table's errors are against: variant N or an image."
+)
+@click.option("--report", type=_FILE, metavar="FILE.json", help="Write every variant's report.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="By default the scene's.")
+@click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
+@click.option("--force", is_flag=True, help="Replace files that differ, render those that do not.")
+@no_cache_option
+@allow_option
+@click.option("-q", "--quiet", is_flag=True, help="No progress.")
+def sweep(
+    scene: Path,
+    axes: tuple[str, ...],
+    together: bool,
+    rows: Path | None,
+    frames: str | None,
+    pattern: str | None,
+    only: tuple[str, ...],
+    sheet: Path | None,
+    table: Path | None,
+    reference: str | None,
+    report: Path | None,
+    seed: int | None,
+    threads: int | None,
+    force: bool,
+    cache: bool,
+    quiet: bool,
+) -> None:
+    """Render the variants of SCENE in one process; print the path of every image.
+
+    What no override touches is made once. A sweep that was stopped goes on where it was: images that are
+    there with the same content are kept.
+
+    \b
+    Every value with every other, the last path fastest:
+      illum sweep scene.yaml -D materials.clay.exponent=4:256:7log -D ambient=0.2,0.4 --sheet all.png
+    A turntable: the eye on a circle, once around in 120 frames:
+      illum sweep scene.yaml --frames 0:119 -D 'camera.position=[4*cos(frame*pi/60), 1, 4*sin(frame*pi/60)]'
+    """
+    from illumcli.cli._progress import reporter
+    from illumcli.jobs import sweep as job
+
+    def written(outcome: Outcome) -> None:
+        for path in outcome.paths if outcome.report else []:
+            click.echo(path)
+        for kept in outcome.report.kept if outcome.report and not quiet else []:
+            click.echo(f"{kept}: kept, its content is the same", err=True)
+
+    if reference is not None and table is None:
+        raise click.UsageError("--reference is what the errors of --table are against; give --table")
+    variants = job.variants_of(axes, together, rows, frames)
+    done = job.run(scene, variants, pattern, only, seed, threads, force, cache, reporter(quiet), written)
+    for warning in done.warnings:
+        click.echo(warning, err=True)
+    if table is not None:
+        job.write_table(table, done, reference)
+    if sheet is not None:
+        job.sheet(done, sheet)
+    if report is not None:
+        job.write_report(report, done)
+    if error := job.failed(done):
+        raise error

@@ -65,6 +65,8 @@ class MeshFile(Description):
     normals: Normals = DEFAULTS
     materials: bool = False
     """True: import the materials that the file's own library describes."""
+    obscurance: str | None = None
+    """Path of values that `illum ao-bake` wrote for this mesh as .npz: no obscurance ray is cast for it."""
 
 
 def _mesh_kind(value: Any) -> str:
@@ -261,6 +263,12 @@ class Obscurance(Description):
     """Rays per pixel sample."""
     falloff: AnyFalloff = Field(default={"falloff": "step"}, validate_default=True)
     """By default every occluder counts fully: ambient occlusion."""
+    sampler: Literal["spiral", "owen", "random"] = "spiral"
+    """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
+    less error where mu is smooth. `random`: independent rays, for scale."""
+    faces: Literal["count", "ignore", "one_sided"] = "count"
+    """Faces met from behind `count` like others, are passed through (`ignore`), or let the ray go
+    (`one_sided`)."""
 
 
 LAYERS = (

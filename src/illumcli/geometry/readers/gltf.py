@@ -307,6 +307,21 @@ def _parts(document: _Document) -> Iterator[_Part]:
             yield part
 
 
+def primitives_of(path: Path) -> list[tuple[int, int, int]]:
+    """(mesh, number of the primitive in it, vertices) for each run of vertices that `read` gives, in its order."""
+    document = _document(path)
+    found = []
+    for index, _ in _nodes(document):
+        node = document.item("nodes", index)
+        if "mesh" not in node:
+            continue
+        for number, primitive in enumerate(document.item("meshes", node["mesh"])["primitives"]):
+            if primitive.get("mode", _TRIANGLES) >= _TRIANGLES:
+                accessor = document.item("accessors", primitive["attributes"]["POSITION"])
+                found.append((node["mesh"], number, accessor["count"]))
+    return found
+
+
 def _nodes(document: _Document) -> Iterator[tuple[int, NDArray[np.float64]]]:
     """The nodes of the scene with their (4, 4) transform to world space, each before its children."""
     nodes = document.json.get("nodes", [])

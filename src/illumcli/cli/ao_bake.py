@@ -1,0 +1,173 @@
+"""``illum ao-bake``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from illumcli.cli._options import SCENE, overrides_option
+
+_EPILOG = """\b
+Examples:
+  illum ao-bake bunny.ply -o bunny.npz
+  illum ao-bake bunny.obj -o bunny.glb -o bunny.ply --target-error 0.005
+  illum ao-bake rock.glb -o rock.ao.glb --falloff exponential --tau 2 --max-distance 0.5r --ground y
+  illum ao-bake scenes/teapot.yaml -o baked/teapot.npz --occluders own
+"""
+
+
+class _Distance(click.ParamType):
+    name = "D|Dr"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        text = str(value)
+        if re.fullmatch(r"[0-9.]+([eE][-+]?[0-9]+)?r?", text):
+            number = text.removesuffix("r")
+            try:
+                return text if text.endswith("r") and float(number) > 0 else float(number)
+            except ValueError:
+                pass
+        return self.fail(f"'{text}' is no distance; write 0.2 for scene units, 0.5r for half the radius")
+
+
+@click.command(name="ao-bake", epilog=_EPILOG)
+@click.argument("source", metavar="INPUT", type=SCENE)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    metavar="OUT",
+    multiple=True,
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help=".npz, .ply or .glb; may be repeated.",
+)
+@click.option("--samples", type=click.IntRange(1, 65536), help="Rays per vertex, by default 256.")
+@click.option(
+    "--target-error",
+    type=click.FloatRange(0, 1, min_open=True),
+    metavar="E",
+    help="Stop when the root mean square error of all vertices is at most E, instead of --samples.",
+)
+@click.option("--max-distance", type=_Distance(), help="Occluders beyond it do not count: 0.2, or 0.5r.")
+@click.option(
+    "--falloff",
+    type=click.Choice(["step", "exponential", "linear", "smooth", "power"]),
+    default="step",
+    show_default=True,
+    help="Weight of an occluder by its distance.",
+)
+@click.option(
+    "--tau", type=click.FloatRange(0, min_open=True), help="Of --falloff exponential, by default 1."
+)
+@click.option(
+    "--exponent", type=click.FloatRange(0, min_open=True), help="Of --falloff power, by default 0.5."
+)
+@click.option(
+    "--sampler", type=click.Choice(["spiral", "owen", "random"]), default="spiral", show_default=True
+)
+@click.option(
+    "--faces",
+    type=click.Choice(["count", "ignore", "one-sided"]),
+    default="count",
+    show_default=True,
+    help="Faces met from behind count, are passed through, or let the ray go.",
+)
+@click.option(
+    "--method",
+    type=click.Choice(["vertex", "fit"]),
+    default="vertex",
+    show_default=True,
+    help="Ask at the vertices, or all over the surface and fit.",
+)
+@click.option(
+    "--occluders",
+    multiple=True,
+    metavar="scene|own|NAME",
+    help="What hides an object's vertices: the whole scene, itself, or itself and objects by name.",
+)
+@click.option("--ground", type=click.Choice(["x", "y", "z"]), help="Add a ground plane; the axis that is up.")
+@click.option("--bent-normal", is_flag=True, help="Also the mean direction of what is open.")
+@click.option(
+    "--color",
+    "channel",
+    type=click.Choice(["r", "g", "b", "a", "rgb"]),
+    help="Also as 8-bit vertex colour in this channel of .ply and .glb.",
+)
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, help="Of every random number.")
+@click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
+@overrides_option
+@click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
+)
+@click.option("--force", is_flag=True, help="Replace files that differ.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress.")
+@click.option("-v", "--verbose", is_flag=True, help="Say what was skipped and where time went.")
+def ao_bake(
+    source: Path,
+    outputs: tuple[Path, ...],
+    samples: int | None,
+    target_error: float | None,
+    max_distance: float | str | None,
+    falloff: str,
+    tau: float | None,
+    exponent: float | None,
+    faces: str,
+    occluders: tuple[str, ...],
+    threads: int | None,
+    overrides: tuple[str, ...],
+    report: Path | None,
+    force: bool,
+    quiet: bool,
+    verbose: bool,
+    **more: Any,
+) -> None:
+    """Bake obscurance at every vertex of INPUT, a mesh file or a scene; print the path of every file.
+
+    1 is open. The values keep the order and the number of the file's own vertices, and each says its standard
+    error. An interrupted bake goes on where it stopped when the same command is given again.
+    """
+    from illumcli.cli._progress import reporter
+    from illumcli.jobs.ao_bake import Settings, run, write_report
+
+    if samples is not None and target_error is not None:
+        raise click.UsageError("--samples and --target-error exclude each other; give one")
+    if tau is not None and falloff != "exponential":
+        raise click.UsageError("--tau belongs to --falloff exponential")
+    if exponent is not None and falloff != "power":
+        raise click.UsageError("--exponent belongs to --falloff power")
+    if max_distance is None and falloff in ("linear", "smooth", "power"):
+        raise click.UsageError(f"--falloff {falloff} needs --max-distance, as in --max-distance 0.5r")
+    if target_error is not None and more["method"] == "fit":
+        raise click.UsageError("--target-error works with --method vertex; give --samples")
+    said = {"max_distance": max_distance, "tau": tau, "exponent": exponent}
+    settings = Settings(
+        samples=samples or 256,
+        target_error=target_error,
+        falloff={"falloff": falloff, **{name: value for name, value in said.items() if value is not None}},
+        faces=faces.replace("-", "_"),
+        occluders=occluders or ("scene",),
+        **more,
+    )
+    paths, done = run(source, outputs, settings, overrides, threads, force, reporter(quiet))
+    for path in paths:
+        click.echo(path)
+    if not quiet:
+        for kept in done.kept:
+            click.echo(f"{kept}: kept, its content is the same", err=True)
+        for what, count in done.repairs.items():
+            click.echo(f"{source}: {what}: {count}", err=True)
+        for text in dict.fromkeys(done.left_out):
+            click.echo(f"left out: {text}", err=True)
+        for text in done.warnings:
+            click.echo(text, err=True)
+        if done.written:
+            click.echo(done.summary(), err=True)
+    if verbose:
+        for name, seconds in done.seconds.items():
+            click.echo(f"{seconds:8.3f} s  {name}", err=True)
+    if report is not None:
+        write_report(report, done)

@@ -1,0 +1,441 @@
+"""Bake obscurance at every vertex of a mesh or a scene, with its error, into files of its meshes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli import __version__
+from illumcli.arrays import F, columns, cross, rows, unit
+from illumcli.demand import order
+from illumcli.errors import InputError, OutputError
+from illumcli.files.vertex_data import (
+    SUFFIXES,
+    Baked,
+    Shape,
+    add_to_glb,
+    mesh_hash,
+    read_content,
+    write_glb,
+    write_npz,
+    write_ply,
+)
+from illumcli.geometry.assemble import World, cofactors
+from illumcli.geometry.mesh import Mesh
+from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders, PartFile
+from illumcli.jobs.ao_bake_points import Vertices, vertex_points
+from illumcli.jobs.render import peak_memory
+from illumcli.plan.recipes import recipes
+from illumcli.rays.tracer import Tracer
+from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
+from illumcli.scene.spec import Obscurance, Scene
+from illumcli.visibility.horizon import Horizon
+from illumcli.visibility.obscurance import Errors, Method
+
+Progress = Callable[[str, int, int], None]
+
+GROUND_GAP = 1e-4
+"""How far the added ground lies below the lowest point, in radii: what stands on it is closed below."""
+GROUND_SIZE = 1e3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a bake is asked for."""
+
+    samples: int = 256
+    target_error: float | None = None
+    falloff: Mapping[str, Any] = field(default_factory=lambda: {"falloff": "step"})
+    sampler: str = "spiral"
+    faces: str = "count"
+    method: str = "vertex"  # or `fit`
+    occluders: tuple[str, ...] = ("scene",)  # or `own`, or names of objects
+    ground: str | None = None  # up axis
+    bent_normal: bool = False
+    channel: str | None = None
+    seed: int = 0
+
+    def obscurance(self) -> Obscurance:
+        """The same as a scene has it."""
+        return Obscurance.model_validate(
+            {
+                "samples": self.samples,
+                "falloff": dict(self.falloff),
+                "sampler": self.sampler,
+                "faces": self.faces,
+            }
+        )
+
+
+@dataclass(slots=True)
+class Report:
+    """What happened."""
+
+    input: str
+    content: str
+    seed: int
+    threads: int
+    vertices: int = 0
+    triangles: int = 0
+    unreferenced: int = 0
+    without_normal: int = 0
+    copies: int = 0
+    open: int = 0  # points with nothing above their tangent plane: no ray
+    cast: int = 0  # points that cast rays
+    rmse: float = 0.0  # root mean square error over all vertices
+    target_error: float | None = None
+    rays: dict[str, int] = field(default_factory=dict)
+    samples: dict[int, int] = field(default_factory=dict)  # rays a point -> points
+    repairs: dict[str, int] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    written: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+
+    def as_data(self) -> dict[str, Any]:
+        """The report as JSON has it."""
+        data = {name: getattr(self, name) for name in self.__slots__}
+        return {"illum": __version__, **data, "peak_memory_bytes": peak_memory()}
+
+    def summary(self) -> str:
+        """One line: how right it is and what it took."""
+        rays = sum(self.rays.values())
+        return (
+            f"{self.vertices} vertices: error {self.rmse:.2g} (root mean square), {rays} rays, "
+            f"{self.open} points open without a ray"
+        )
+
+
+def run(
+    path: Path,
+    outputs: Sequence[Path],
+    settings: Settings,
+    overrides: Sequence[str] = (),
+    threads: int | None = None,
+    force: bool = False,
+    progress: Progress = lambda what, done, of: None,
+) -> tuple[list[Path], Report]:
+    """Bake a mesh file, or every mesh of a scene in its place; the files, written or kept, and the report.
+
+    Raises
+    ------
+    InputError, OutputError
+        Before anything is baked, where it can be known then.
+    """
+    check_outputs(outputs)
+    clock = _Clock()
+    loaded = bare(path, overrides) if path.suffix.lower() in MESH_SUFFIXES else load(path, overrides)
+    scene = loaded.scene
+    world = world_of(scene, loaded)
+    meshes = [placed.mesh for placed in world.placed]
+    hashes = [mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes]
+    content = content_hash(scene, hashes, settings)
+    threads = threads or len(os.sched_getaffinity(0))
+    report = Report(str(path), content, settings.seed, threads, target_error=settings.target_error)
+    report.vertices, report.triangles = len(world.vertices), len(world.triangles)
+    report.repairs = dict(world.repairs)
+    due = [each for each in outputs if not is_kept(each, content, force)]
+    report.kept = [str(each) for each in outputs if each not in due]
+    clock.lap(report, "read")
+    if due:
+        part = due[0].with_name(f".{due[0].name}.unfinished")
+        baked = bake(scene, world, settings, threads, progress, report, part, clock)
+        about = {
+            "content": content,
+            "version": __version__,
+            "input": path.name,
+            "meshes": dict(zip(scene.object_names(), hashes, strict=True)),
+            "parameters": parameters(settings),
+            "seed": settings.seed,
+            "rmse": report.rmse,
+            "rays": sum(report.rays.values()),
+        }
+        baked = replace(baked, about=about)
+        write(path, due, scene, world, baked, settings, report)
+        part.unlink(missing_ok=True)
+        clock.lap(report, "write")
+    report.written = [str(each) for each in due]
+    return list(outputs), report
+
+
+def world_of(scene: Scene, loaded: Loaded) -> World:
+    """The scene's meshes in their places, made as a render makes them."""
+    buffers: dict[str, Any] = {}
+    for step in order(recipes(scene, loaded), ["world"]):
+        buffers[step.makes] = step.make(buffers)
+    return buffers["world"]
+
+
+def check_outputs(outputs: Sequence[Path]) -> None:
+    """Refuse suffixes nobody writes and files named twice."""
+    problems = [
+        f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(SUFFIXES)}"
+        for each in outputs
+        if each.suffix.lower() not in SUFFIXES
+    ]
+    if len({os.path.abspath(each) for each in outputs}) < len(outputs):
+        problems.append("an output is named twice; give each file once")
+    if problems:
+        raise InputError(problems)
+
+
+def bare(path: Path, overrides: Sequence[str]) -> Loaded:
+    """A scene of one mesh file alone, as it stands."""
+    found = load(path, overrides)
+    about = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
+    return replace(found, scene=Scene.model_validate(about))
+
+
+def parameters(settings: Settings) -> dict[str, Any]:
+    """What a value depends on besides the scene, as JSON has it."""
+    said = {name: getattr(settings, name) for name in Settings.__dataclass_fields__}
+    return {**said, "falloff": dict(settings.falloff), "occluders": list(settings.occluders)}
+
+
+def content_hash(scene: Scene, hashes: Sequence[str], settings: Settings) -> str:
+    """Of all that the values and the files depend on."""
+    placed = [thing.transform.model_dump() for thing in scene.objects]
+    text = json.dumps(
+        [__version__, parameters(settings), list(hashes), placed, scene.object_names()], default=str
+    )
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def is_kept(path: Path, content: str, force: bool) -> bool:
+    """True where the file is there already with the same content.
+
+    Raises
+    ------
+    OutputError
+        A different file stands there and `force` is not given.
+    """
+    if force or not path.exists():
+        return False
+    if read_content(path) != content:
+        raise OutputError(f"{path}: a different file is there; use --force to replace it, or another -o")
+    return True
+
+
+def bake(
+    scene: Scene,
+    world: World,
+    settings: Settings,
+    threads: int,
+    progress: Progress,
+    report: Report,
+    part: Path,
+    clock: _Clock,
+) -> Baked:
+    """Obscurance of every vertex of the world."""
+    occluders = occluders_of(scene, world, settings)
+    wanted = settings.obscurance()
+    method = Method(settings.samples, wanted.falloff, world.frame.radius, wanted.sampler, wanted.faces)
+    clock.lap(report, "build")
+    if settings.method == "fit":
+        from illumcli.jobs.ao_bake_fit import fitted
+
+        made = fitted(world, occluders, method, settings.seed, threads, progress, report.rays)
+        say_vertices(report, made.vertices)
+        report.open, report.cast, report.samples = made.open, made.points, {settings.samples: made.points}
+        report.rmse = (
+            float(np.sqrt(np.mean(np.square(made.error, dtype=np.float64)))) if len(made.error) else 0.0
+        )
+        clock.lap(report, "cast")
+        return Baked(made.w, made.error)
+    vertices = vertex_points(world)
+    caster = Caster(vertices.points, occluders, method, settings.seed, threads, progress)
+    say_vertices(report, vertices)
+    clock.lap(report, "points")
+    is_open = caster.open()
+    lanes = np.flatnonzero(~is_open)
+    report.open, report.cast = int(is_open.sum()), len(lanes)
+    clock.lap(report, "horizon")
+    share = len(lanes) / max(len(is_open), 1)
+    if settings.target_error is None:
+        samples = np.full(len(lanes), settings.samples)
+    else:
+        samples = caster.samples_for(lanes, share, settings.target_error)
+        clock.lap(report, "pilot")
+    kept = PartFile(part, report.content, len(is_open), settings.bent_normal)
+    found = caster.cast("values", lanes, samples, 0, settings.bent_normal, kept)
+    clock.lap(report, "cast")
+    errors = caster.errors(lanes, samples, 1 << 20)
+    clock.lap(report, "errors")
+    report.rmse = errors.rmse * share**0.5
+    if settings.target_error is not None and report.rmse > settings.target_error:
+        report.warnings.append(
+            f"error {report.rmse:.2g} is above the {settings.target_error:g} asked for; the seed or the limit of "
+            f"{MOST_SAMPLES} rays a vertex stands in the way"
+        )
+    report.rays = dict(caster.rays)
+    count, points = np.unique(samples, return_counts=True)
+    report.samples = dict(zip(count.tolist(), points.tolist(), strict=True))
+    return spread(vertices.source, vertices.points.n, lanes, samples, found, errors)
+
+
+def say_vertices(report: Report, vertices: Vertices) -> None:
+    """Count what became of the vertices."""
+    report.unreferenced, report.without_normal = vertices.unreferenced, vertices.without_normal
+    report.copies = vertices.copies
+
+
+def spread(
+    source: NDArray[np.int64], n: Any, lanes: NDArray[np.int64], samples: Any, found: Any, errors: Errors
+) -> Baked:
+    """From the points that were asked to all vertices: a vertex without a point is open, its error 0."""
+    w, error = np.ones(len(n) + 1, F), np.zeros(len(n) + 1, F)  # the last row is for source -1
+    w[lanes], error[lanes] = found.w, errors.at(found.unevenness, samples)
+    if found.bent is None:
+        return Baked(w[source], error[source])
+    bent = np.concatenate([n, np.zeros((1, 3), F)])
+    bent[lanes] = found.bent
+    return Baked(w[source], error[source], bent[source])
+
+
+def occluders_of(scene: Scene, world: World, settings: Settings) -> list[Occluders]:
+    """What hides the vertices of each object: the scene, the object itself, or it and objects by name."""
+    names = scene.object_names()
+    unknown = [name for name in settings.occluders if name not in (*names, "scene", "own")]
+    if unknown:
+        raise InputError(
+            f"--occluders {unknown[0]}: no object of that name; there are: scene, own, {', '.join(names)}"
+        )
+    known: dict[tuple[int, ...], Occluders] = {}
+    found = []
+    for number in range(len(names)):
+        if "scene" in settings.occluders:
+            things = tuple(range(len(names)))
+        else:
+            things = tuple(sorted({number, *(names.index(n) for n in settings.occluders if n in names)}))
+        if things not in known:
+            known[things] = _occluders(world, things, settings)
+        found.append(known[things])
+    return found
+
+
+def _occluders(world: World, things: tuple[int, ...], settings: Settings) -> Occluders:
+    triangles = world.triangles
+    if len(things) < len(world.placed):
+        triangles = triangles[np.isin(world.objects, things)]
+    vertices = world.vertices
+    if settings.ground is not None:
+        vertices, triangles = _with_ground(vertices, triangles, world.triangles, "xyz".index(settings.ground))
+    facets = None
+    if settings.faces != "count":
+        corner = [columns(rows(vertices, triangles[:, k]), np.float64) for k in range(3)]
+        facets = columns(unit(cross(corner[1] - corner[0], corner[2] - corner[0])), F)
+    return Occluders(Tracer(vertices, triangles), Horizon(vertices, triangles), facets)
+
+
+def _with_ground(
+    vertices: NDArray[np.float32], triangles: NDArray[np.int32], used: NDArray[np.int32], up: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """A large square under everything, facing up."""
+    level = vertices[np.unique(used), up].min(initial=0) - GROUND_GAP
+    a, b = (up + 1) % 3, (up + 2) % 3
+    square = np.empty((4, 3), F)
+    square[:, up] = level
+    square[:, a], square[:, b] = [-GROUND_SIZE, GROUND_SIZE, GROUND_SIZE, -GROUND_SIZE], [
+        -GROUND_SIZE, -GROUND_SIZE, GROUND_SIZE, GROUND_SIZE
+    ]  # fmt: skip
+    first = len(vertices)
+    faces = np.array([[first, first + 1, first + 2], [first, first + 2, first + 3]], np.int32)
+    return np.concatenate([vertices, square]), np.concatenate([triangles, faces])
+
+
+def write(
+    path: Path,
+    outputs: Sequence[Path],
+    scene: Scene,
+    world: World,
+    baked: Baked,
+    settings: Settings,
+    report: Report,
+) -> None:
+    """All files of a bake."""
+    alone = path.suffix.lower() if path.suffix.lower() in MESH_SUFFIXES else ""
+    shapes: list[Shape] | None = None
+    for each in outputs:
+        kind = each.suffix.lower()
+        if kind == ".npz":
+            write_npz(each, baked)
+            continue
+        if shapes is None:
+            shapes = [shape_of(scene, world, i, report) for i in range(len(world.placed))]
+        if kind == ".ply":
+            write_ply(each, shapes, baked, path if alone == ".ply" else None, settings.channel)
+        elif alone == ".glb" and settings.channel is None and (counts := primitives(path)):
+            add_to_glb(each, path, counts, baked)
+        else:
+            write_glb(each, shapes, baked, settings.channel)
+
+
+def shape_of(scene: Scene, world: World, number: int, report: Report) -> Shape:
+    """An object in its place, with what belongs to its vertices alone."""
+    placed = world.placed[number]
+    mesh, linear = placed.mesh, placed.matrix[:3, :3]
+    name = scene.object_names()[number]
+    attributes: dict[str, NDArray[Any]] = dict(mesh.attributes)
+    for kind, table, index in (
+        ("normal", mesh.normals, mesh.corner_normals),
+        ("uv", mesh.uvs, mesh.corner_uvs),
+    ):
+        if table is None or index is None:
+            continue
+        own = per_vertex(mesh, table, index)
+        if own is None:
+            report.left_out.append(f"{name}: {kind}s that differ between the polygons of a vertex")
+            continue
+        turned = own @ cofactors(linear).T * (-1 if placed.mirrored else 1) if kind == "normal" else own
+        attributes[kind] = turned
+    triangles = world.triangles[world.objects == number] - np.int32(placed.first_vertex)
+    vertices = mesh.vertices @ linear.T + placed.matrix[:3, 3]
+    return Shape(name, vertices, mesh.corners, mesh.starts, triangles, attributes)
+
+
+def per_vertex(
+    mesh: Mesh, table: NDArray[np.float64], index: NDArray[np.int32]
+) -> NDArray[np.float64] | None:
+    """(V, k) rows of a table that corners refer to, by vertex; None where corners of a vertex disagree."""
+    row = np.full(len(mesh.vertices), -1, np.int64)
+    row[mesh.corners] = index
+    if (index < 0).any() or not np.array_equal(table[row[mesh.corners]], table[index]):
+        return None
+    return np.where((row >= 0)[:, None], table[row], 0.0)
+
+
+def primitives(path: Path) -> list[tuple[int, int, int]]:
+    """(mesh, primitive, vertices) of a GLB in the order of its reader; empty where a mesh stands twice."""
+    from illumcli.geometry.readers.gltf import primitives_of
+
+    found = primitives_of(path)
+    return found if len({each[:2] for each in found}) == len(found) else []
+
+
+def write_report(path: Path, report: Report) -> None:
+    """Write the report as JSON."""
+    from illumcli.files.atomic import write_text
+
+    write_text(path, json.dumps(report.as_data(), indent=1) + "\n")
+
+
+class _Clock:
+    """Seconds between laps."""
+
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+
+    def lap(self, report: Report, name: str) -> None:
+        now = time.perf_counter()
+        report.seconds[name] = now - self._last
+        self._last = now

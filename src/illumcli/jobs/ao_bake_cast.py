@@ -1,0 +1,322 @@
+"""Casts the rays of a bake: pieces on threads, finished ones kept in a file, errors from fresh scrambles."""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F
+from illumcli.files.atomic import refused
+from illumcli.geometry.order import compact
+from illumcli.jobs.ao_bake_points import Points
+from illumcli.rays.sampling import hashed, stream, unit_interval
+from illumcli.rays.tracer import Tracer
+from illumcli.visibility.horizon import Horizon
+from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
+
+RAYS = 1 << 20
+"""Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
+LANES = 1 << 14
+PAIRS_SHARE, FEWEST_PAIRS = 100, 256
+"""The error is learnt from one point in so many, and from so many at least."""
+PILOT = 16
+AIM = 0.94
+"""What is aimed at, as a share of the error asked for: the error itself is known to some 4 %."""
+ROUNDS = 6
+FEWEST_SAMPLES, MOST_SAMPLES = 8, 65536
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Occluders:
+    """What the points of an object may be hidden by."""
+
+    tracer: Tracer
+    horizon: Horizon
+    facets: NDArray[np.float32] | None = None  # (T, 3) unit normals, where back faces are told apart
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cast:
+    """What was found at M points; those that are known to be open have w = 1 and no unevenness."""
+
+    w: NDArray[np.float32]
+    unevenness: NDArray[np.float32]
+    bent: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A unit of work: a function of the points it names and its own fields alone."""
+
+    lanes: NDArray[np.int64]
+    samples: int
+    thing: int
+
+
+@dataclass(slots=True, eq=False)
+class Caster:
+    """The points of a bake and the means to cast from them."""
+
+    points: Points
+    occluders: Sequence[Occluders]  # per object
+    method: Method
+    seed: int
+    threads: int
+    progress: Progress
+    rays: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    order: NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.order = compact(self.points.origins)
+
+    def open(self) -> NDArray[np.bool_]:
+        """(M,) True where nothing is above a point's tangent plane."""
+        out = np.zeros(len(self.points.number), bool)
+        pieces = list(self._pieces(np.arange(len(out)), np.full(len(out), RAYS // LANES)))
+
+        def ask(piece: Piece, stop: threading.Event) -> NDArray[np.bool_]:
+            part = self.points.take(piece.lanes)
+            return self.occluders[piece.thing].horizon.clears(part.origins, part.n)
+
+        for number, found in self._run("horizon", pieces, ask):
+            out[pieces[number].lanes] = found
+        return out
+
+    def cast(
+        self,
+        purpose: str,
+        lanes: NDArray[np.int64],
+        samples: NDArray[np.int64],
+        replicate: int,
+        bent: bool = False,
+        kept: PartFile | None = None,
+    ) -> Cast:
+        """Estimates at some lanes with their own number of rays each.
+
+        Parameters
+        ----------
+        samples : (K,) int
+            Rays of each lane.
+        replicate : int
+            Every number is a scramble of its own; 0 is the one whose values are given out.
+        """
+        count = len(self.points.number)
+        out = Cast(np.ones(count, F), np.zeros(count, F), np.zeros((count, 3), F) if bent else None)
+        keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase")]
+        pieces = list(self._pieces(lanes, samples))
+
+        def ask(piece: Piece, stop: threading.Event) -> tuple[Estimates, int]:
+            part = self.points.take(piece.lanes)
+            draws = np.stack([unit_interval(hashed(key, part.number)) for key in keys])
+            around = self.occluders[piece.thing]
+            tracer = around.tracer.counting(stop)
+            method = replace(self.method, samples=piece.samples, facets=around.facets)
+            return estimates(tracer, part.origins, part.n, draws, method, bent=bent), tracer.rays
+
+        done = kept.read(pieces, out) if kept is not None else set()
+        waiting = [piece for number, piece in enumerate(pieces) if number not in done]
+        numbers = [number for number in range(len(pieces)) if number not in done]
+        for at, (found, rays) in self._run(purpose, waiting, ask):
+            piece = waiting[at]
+            out.w[piece.lanes], out.unevenness[piece.lanes] = found.w, found.unevenness
+            if out.bent is not None and found.bent is not None:
+                out.bent[piece.lanes] = found.bent
+            self.rays[purpose] += rays
+            if kept is not None:
+                kept.write(numbers[at], piece, out)
+        return Cast(out.w[lanes], out.unevenness[lanes], None if out.bent is None else out.bent[lanes])
+
+    def errors(self, lanes: NDArray[np.int64], samples: NDArray[np.int64], replicate: int) -> Errors:
+        """The error law of `lanes`, from pairs of scrambles numbered from `replicate` on, at a few of them.
+
+        None of these rays is among those whose values are given out.
+        """
+        if not len(lanes):
+            return Errors(0.0, 0.0, 0.0, 0)
+        draw = hashed(stream(self.seed, "ao pairs"), self.points.number[lanes])
+        few = np.argsort(draw, kind="stable")[: max(-(-len(lanes) // PAIRS_SHARE), FEWEST_PAIRS)]
+        few = np.sort(few)
+        halves: list[list[Cast]] = [[], []]
+        rounds = -(-FEWEST_PAIRS // len(few))
+        for again in range(rounds):
+            for half in (0, 1):
+                number = replicate + 2 * again + half
+                halves[half].append(self.cast("errors", lanes[few], samples[few], number))
+        a, b = (
+            Estimates(np.concatenate([c.w for c in half]), np.concatenate([c.unevenness for c in half]))
+            for half in halves
+        )
+        return Errors.of_pairs(a, b, np.tile(samples[few], rounds))
+
+    def samples_for(self, lanes: NDArray[np.int64], share: float, target: float) -> NDArray[np.int64]:
+        """(K,) rays of each lane that reach a root mean square error of `target` over all points, of which
+        `lanes` are the `share` that is not open; with the fewest rays in all.
+
+        A pilot of few rays says where the error is: with L of a lane's neighbourhood its variance is
+        L N^-3/2, and the sum of N at a given sum of variances is least where N goes with L^(2/5). Pairs of
+        scrambles then measure what the counts reach. All these rays are thrown away: what is kept was not
+        looked at when the counts were chosen, which keeps the estimate unbiased.
+
+        References
+        ----------
+        Kirk, D. and Arvo, J. (1991). Unbiased sampling techniques for image synthesis. SIGGRAPH '91.
+        """
+        if not len(lanes):
+            return np.zeros(0, np.int64)
+        pilot = self.cast("pilot", lanes, np.full(len(lanes), PILOT), 1)
+        near = _averaged_along(self.order, lanes, pilot.unevenness, len(self.points.number))
+        weight = (1 + near) ** 0.4
+        aim = AIM * target / np.sqrt(share)
+        scale = float((np.mean(weight) * 0.1 * PILOT**-0.5 / aim**2) ** (2 / 3))
+        first = 2
+        for _ in range(ROUNDS):
+            samples = _steps(weight * scale)
+            reached = self.errors(lanes, samples, first).rmse
+            first += 2 * FEWEST_PAIRS
+            if (
+                0.9 * aim <= reached <= aim
+                or samples.min() == MOST_SAMPLES
+                or samples.max() == FEWEST_SAMPLES
+            ):
+                break
+            # towards the middle of the band
+            scale *= float(np.clip((reached / (0.95 * aim)) ** (4 / 3), 0.05, 20.0))
+        return samples
+
+    def _pieces(self, lanes: NDArray[np.int64], samples: NDArray[np.int64]) -> Iterator[Piece]:
+        """Lanes of one object and one number of rays, near each other."""
+        rays = np.zeros(len(self.order), np.int64)
+        rays[lanes] = samples
+        thing = self.points.thing[self.order]
+        along = rays[self.order]
+        for own in np.unique(thing):
+            for count in np.unique(along[(thing == own) & (along > 0)]):
+                group = self.order[(along == count) & (thing == own)]
+                size = max(1, RAYS // int(count))
+                for first in range(0, len(group), size):
+                    yield Piece(group[first : first + size], int(count), int(own))
+
+    def _run(self, what: str, pieces: Sequence[Piece], ask: Callable[..., Any]) -> Iterator[tuple[int, Any]]:
+        """Results of `ask(piece, stop)` as they come; when the consumer stops, pieces in flight end soon."""
+        stop = threading.Event()
+        total = sum(len(piece.lanes) * piece.samples for piece in pieces)
+        done = 0
+        with ThreadPoolExecutor(self.threads, thread_name_prefix="bake") as pool:
+            try:
+                queue = iter(range(len(pieces)))
+                pending: dict[Future[Any], int] = {}
+                while True:
+                    for number in queue:
+                        pending[pool.submit(ask, pieces[number], stop)] = number
+                        if len(pending) > self.threads:
+                            break
+                    if not pending:
+                        break
+                    # a short wait, so that an interrupt reaches this thread
+                    finished = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED).done
+                    for future in finished:
+                        number = pending.pop(future)
+                        yield number, future.result()
+                        done += len(pieces[number].lanes) * pieces[number].samples
+                        self.progress(what, done, total)
+            finally:
+                stop.set()
+                pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _averaged_along(
+    order: NDArray[np.int64], lanes: NDArray[np.int64], values: NDArray[np.float32], count: int
+) -> NDArray[np.float64]:
+    """(K,) mean of the values over each lane and its four neighbours to either side along the order."""
+    whole, known = np.zeros(count), np.zeros(count)
+    whole[lanes], known[lanes] = values, 1
+    kernel = np.ones(9)
+    sums = np.convolve(whole[order], kernel, "full")[4 : 4 + count]
+    weights = np.convolve(known[order], kernel, "full")[4 : 4 + count]
+    out = np.zeros(count)
+    out[order] = sums / np.maximum(weights, 1)
+    return out[lanes]
+
+
+def _steps(samples: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Numbers of rays in steps of a quarter octave: few different patterns, long pieces."""
+    bounded = np.clip(samples, FEWEST_SAMPLES, MOST_SAMPLES)
+    return np.clip(np.rint(2 ** (np.rint(4 * np.log2(bounded)) / 4)), FEWEST_SAMPLES, MOST_SAMPLES).astype(
+        np.int64
+    )
+
+
+class PartFile:
+    """Finished pieces of a bake in a file, for the run that takes it up again.
+
+    A header names the content that is baked; each piece is known to be whole by its checksum. The file stays
+    when a run is interrupted and goes when it is done.
+    """
+
+    def __init__(self, path: Path, content: str, points: int, bent: bool) -> None:
+        self.path = path
+        self._header = content.encode().ljust(64, b"\0")
+        self._width = 5 if bent else 2
+        self._points = points
+        self._sums: NDArray[np.uint32] | None = None
+        self._values: NDArray[np.float32] | None = None
+
+    def read(self, pieces: Sequence[Piece], out: Cast) -> set[int]:
+        """Open the file and copy what it has of these pieces to `out`; their numbers."""
+        size = 64 + 4 * len(pieces) + 4 * self._width * self._points
+        try:
+            old = self.path.exists() and self.path.stat().st_size == size
+            if old:
+                with self.path.open("rb") as file:
+                    old = file.read(64) == self._header
+            if not old:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                with self.path.open("wb") as file:
+                    file.write(self._header)
+                    file.truncate(size)
+            data = np.memmap(self.path, np.uint8, "r+", shape=(size,))
+        except OSError as error:
+            raise refused(str(self.path), error) from error
+        self._sums = data[64 : 64 + 4 * len(pieces)].view(np.uint32)
+        self._values = data[64 + 4 * len(pieces) :].view(F).reshape(self._points, self._width)
+        done = set()
+        for number, piece in enumerate(pieces):
+            rows = self._values[piece.lanes] if self._sums[number] else None
+            if rows is not None and _checksum(rows) == self._sums[number]:
+                out.w[piece.lanes], out.unevenness[piece.lanes] = rows[:, 0], rows[:, 1]
+                if out.bent is not None:
+                    out.bent[piece.lanes] = rows[:, 2:]
+                done.add(number)
+        return done
+
+    def write(self, number: int, piece: Piece, out: Cast) -> None:
+        """Keep a finished piece."""
+        assert self._values is not None
+        assert self._sums is not None
+        parts = [out.w[piece.lanes, None], out.unevenness[piece.lanes, None]]
+        rows = np.concatenate(parts if out.bent is None else [*parts, out.bent[piece.lanes]], axis=1)
+        self._values[piece.lanes] = rows
+        self._sums[number] = _checksum(rows)
+
+    def remove(self) -> None:
+        """The bake is done."""
+        self._sums = self._values = None
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+
+def _checksum(rows: NDArray[np.float32]) -> int:
+    """CRC-32, never 0, which stands for a piece that is not there."""
+    return zlib.crc32(np.ascontiguousarray(rows).data) or 1

@@ -1,0 +1,163 @@
+"""Which points have nothing above their tangent plane: they are open, and no ray need tell.
+
+The vertices of all occluders stand in a tree of clusters, eight to one. A cluster is bounded by a round slab
+that lies along its surface, whose height falls with the square of its width; points that lie together are
+asked about together. So on a convex surface of any fineness a group looks at some hundreds of clusters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Vectors
+from illumcli.geometry.order import compact
+
+FAN = 8
+GROUP = 64  # points asked about together
+GROUPS_AT_ONCE = 64
+MOST_CLUSTERS = 1 << 13
+"""Groups that look at more clusters than this, on average, cast rays instead."""
+PROBES = 64
+CLEARLY = 1e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slabs:
+    """A level of the tree: K round slabs."""
+
+    centre: NDArray[np.float64]  # (K, 3)
+    axis: NDArray[np.float64]  # (K, 3) unit
+    low: NDArray[np.float64]  # (K,) along the axis
+    high: NDArray[np.float64]  # (K,)
+    width: NDArray[np.float64]  # (K,) radius across the axis
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Groups:
+    """Planes that are nearly the same: those of group g hold every plane of its points.
+
+    For a point o with normal n, and any x: n.(x - o) <= axis.(x - centre) + spread |x - centre| + room.
+    """
+
+    centre: NDArray[np.float64]  # (G, 3)
+    axis: NDArray[np.float64]  # (G, 3)
+    spread: NDArray[np.float64]  # (G,)
+    room: NDArray[np.float64]  # (G,)
+
+
+class Horizon:
+    """The vertices of occluders, asked what is above a plane. Read-only, safe to ask from threads."""
+
+    def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
+        used = np.zeros(len(vertices), bool)
+        used[triangles.ravel()] = True
+        points = np.unique(np.asarray(vertices[used], np.float64), axis=0)
+        self._points = points[compact(points)]
+        self._levels: list[Slabs] = []
+        size = FAN
+        while len(self._points) > size:
+            self._levels.append(slabs(self._points, size))
+            size *= FAN
+        self._probes = extremes(self._points)
+
+    def clears(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
+        """(M,) True where no occluder reaches above the plane through an origin with normal `n`.
+
+        Origins are those of rays, off the surface by more than the rounding of this test; points in a row
+        should lie close together. False may also mean that it was too much work to tell.
+        """
+        if not len(self._points):
+            return np.ones(len(origins), bool)
+        height = np.einsum("ij,ij->i", np.asarray(origins, np.float64), n)
+        out = (np.ascontiguousarray(n, F) @ self._probes.T).max(axis=1) <= height + CLEARLY
+        left = np.flatnonzero(out)
+        for first in range(0, len(left), GROUP * GROUPS_AT_ONCE):
+            lane = left[first : first + GROUP * GROUPS_AT_ONCE]
+            out[lane] = self._below(np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64))
+        return out
+
+    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) True where all points are below, for points that no probe is above."""
+        out = np.zeros(len(o), bool)
+        planes = groups(o, n)
+        group, cluster = self._near(planes)
+        if group is None:
+            return out
+        bounds = np.searchsorted(group, np.arange(len(planes.centre) + 1))
+        for g in range(len(planes.centre)):
+            lane = slice(g * GROUP, (g + 1) * GROUP)
+            first = cluster[bounds[g] : bounds[g + 1]] * FAN
+            rows = (first[:, None] + np.arange(FAN)).ravel()
+            near = self._points[rows[rows < len(self._points)]]
+            height = np.einsum("ij,ij->i", o[lane], n[lane])
+            out[lane] = (n[lane] @ near.T).max(axis=1, initial=-np.inf) <= height
+        return out
+
+    def _near(self, planes: Groups) -> tuple[NDArray[np.int64] | None, NDArray[np.int64]]:
+        """Pairs (group, cluster of `FAN` points), by group, that may have a point above a plane; None where
+        they are too many."""
+        count = len(planes.centre)
+        group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all
+        for level in reversed(self._levels):
+            group = np.repeat(group, FAN)
+            cluster = (cluster[:, None] * FAN + np.arange(FAN)).ravel()
+            inside = cluster < len(level.centre)
+            group, cluster = group[inside], cluster[inside]
+            if len(group) > MOST_CLUSTERS * count:
+                return None, cluster
+            axis = planes.axis[group]
+            away = level.centre[cluster] - planes.centre[group]
+            upright = np.einsum("ij,ij->i", axis, level.axis[cluster])
+            low, high, width = level.low[cluster], level.high[cluster], level.width[cluster]
+            reach = np.einsum("ij,ij->i", axis, away) + np.maximum(upright * high, upright * low)
+            reach += np.sqrt(np.maximum(1 - upright * upright, 0)) * width
+            far = np.sqrt(np.einsum("ij,ij->i", away, away)) + width + np.maximum(high, -low)
+            kept = reach + planes.spread[group] * far + planes.room[group] > 0
+            group, cluster = group[kept], cluster[kept]
+        return group, cluster
+
+
+def groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> Groups:
+    """Every `GROUP` planes in a row, through `o` with unit normals `n`, as one."""
+    count = -(-len(o) // GROUP)
+    more = count * GROUP - len(o)
+    o = np.concatenate([o, np.repeat(o[-1:], more, axis=0)]).reshape(count, GROUP, 3)
+    n = np.concatenate([n, np.repeat(n[-1:], more, axis=0)]).reshape(count, GROUP, 3)
+    centre, axis = o.mean(axis=1), n.mean(axis=1)
+    size = np.linalg.norm(axis, axis=1, keepdims=True)
+    axis = np.where(size > 0.1, axis / np.maximum(size, 0.1), n[:, 0])
+    spread = np.linalg.norm(n - axis[:, None], axis=2).max(axis=1)
+    room = -np.einsum("gpi,gpi->gp", n, o - centre[:, None]).min(axis=1)
+    return Groups(centre, axis / np.linalg.norm(axis, axis=1, keepdims=True), spread, room)
+
+
+def slabs(points: NDArray[np.float64], size: int) -> Slabs:
+    """A slab around each `size` points in a row, along the plane that fits them best."""
+    count = -(-len(points) // size)
+    padded = np.concatenate([points, np.repeat(points[-1:], count * size - len(points), axis=0)])
+    group = padded.reshape(count, size, 3)
+    centre = group.mean(axis=1)
+    centred = group - centre[:, None]
+    _, vectors = np.linalg.eigh(np.einsum("kpi,kpj->kij", centred, centred))
+    axis = np.ascontiguousarray(vectors[:, :, 0])
+    along = np.einsum("kpi,ki->kp", centred, axis)
+    across = centred - along[:, :, None] * axis[:, None]
+    width = np.sqrt(np.einsum("kpi,kpi->kp", across, across).max(axis=1))
+    # a rounding wider than they are: bounds must hold
+    room = 1e-12
+    return Slabs(centre, axis, along.min(axis=1) - room, along.max(axis=1) + room, width + room)
+
+
+def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K, 3) the points farthest out along directions spread over the sphere; most others lie behind them."""
+    k = np.arange(PROBES)
+    z = 1 - (2 * k + 1) / PROBES
+    angle = np.pi * (3 - 5**0.5) * k
+    r = np.sqrt(1 - z * z)
+    spread = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+    if not len(points):
+        return points
+    return points[np.unique([int(np.argmax(points @ d)) for d in spread])].astype(F)

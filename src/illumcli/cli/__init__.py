@@ -21,6 +21,7 @@ COMMANDS = {
     "plan": "What will run for a scene, what is skipped and why.",
     "check": "Validate scenes; every problem at once.",
     "compare": "Measure the difference between two images.",
+    "converge": "Run time against error: seconds and rays beside RMSE.",
     "verify": "Check the models against reference vectors.",
     "stress": "Run the numerical stability suite.",
     "models": "Models, their parameters, ranges, formulas, sources.",

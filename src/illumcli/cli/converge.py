@@ -1,0 +1,102 @@
+"""`illum converge`: run time against error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from illumcli.cli._options import no_cache_option, overrides_option, scene_argument
+
+if TYPE_CHECKING:
+    from illumcli.jobs.converge import Vary
+    from illumcli.jobs.sampled import Sampler
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+_EPILOG = """\b
+Examples:
+  illum converge scenes/obscurance.yaml
+  illum converge scenes/obscurance.yaml --from 8 --to 1024 --csv curve.csv -o curve.png
+  illum converge scenes/teapot.yaml --vary pixels --layer beauty --sampler spiral
+"""
+
+
+@click.command(epilog=_EPILOG)
+@scene_argument
+@overrides_option
+@click.option(
+    "--vary",
+    type=click.Choice(["obscurance", "pixels", "both"]),
+    help="What is doubled: obscurance rays, samples per pixel, or the two in turn. By default obscurance.",
+)
+@click.option("--from", "first", type=click.IntRange(1, 65536), help="The fewest per pixel.")
+@click.option("--to", "last", type=click.IntRange(2, 65536), help="The most per pixel.")
+@click.option("--layer", metavar="NAME", help="By default obscurance, or beauty where samples vary.")
+@click.option(
+    "--sampler",
+    "samplers",
+    multiple=True,
+    type=click.Choice(["spiral", "owen", "random"]),
+    help="Only this sampler of obscurance rays; may be repeated.",
+)
+@click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Other seeds.")
+@click.option(
+    "--width", type=click.IntRange(1, 65536), default=320, show_default=True, help="Of the film, at most."
+)
+@click.option("--camera", metavar="NAME", help="By default the first.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="By default the scene's.")
+@click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
+@click.option("--csv", "csv_file", type=_FILE, metavar="FILE.csv", help="A line per picture rendered.")
+@click.option("-o", "--output", type=_FILE, metavar="FILE.png", help="The curves as .png or .svg.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@no_cache_option
+@click.option("-q", "--quiet", is_flag=True, help="No progress.")
+def converge(
+    scene: Path,
+    overrides: tuple[str, ...],
+    vary: Vary | None,
+    first: int | None,
+    last: int | None,
+    layer: str | None,
+    samplers: tuple[Sampler, ...],
+    repeats: int,
+    width: int,
+    camera: str | None,
+    seed: int | None,
+    threads: int | None,
+    csv_file: Path | None,
+    output: Path | None,
+    as_json: bool,
+    cache: bool,
+    quiet: bool,
+) -> None:
+    """Measure run time against error of SCENE: seconds and rays beside the RMSE to a reference.
+
+    The reference comes from other random numbers and many more samples, in two halves whose difference states
+    its own error; it is kept between runs. `random needs` is how many times as many samples plain random
+    sampling takes for the same error. Seconds are those of casting and shading, without reading the scene.
+    """
+    import json
+    import sys
+
+    from illumcli.cli._progress import reporter
+    from illumcli.jobs import converge_report
+    from illumcli.jobs.converge import SAMPLERS, run
+
+    if output is not None:
+        converge_report.check_picture(output)
+    found = run(
+        scene, overrides, vary, first, last, layer, samplers or SAMPLERS, repeats, seed, threads, camera,
+        width, reporter(quiet), cache,
+    )  # fmt: skip
+    if csv_file is not None:
+        converge_report.write_csv(csv_file, found)
+    if output is not None:
+        converge_report.write_picture(output, found)
+    if as_json:
+        click.echo(json.dumps(found.as_data(), indent=2))
+        return
+    click.echo(converge_report.as_table(found))
+    if sys.stdout.isatty():
+        click.echo(converge_report.drawn(found.curves))

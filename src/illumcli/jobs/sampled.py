@@ -1,0 +1,134 @@
+"""A scene's layer at any sampling, as an array, whole or at some pixels: what measuring its error takes."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.film.film import Layer
+from illumcli.plan.execute import Tally, at_pixels, bands
+from illumcli.plan.plan import Plan, plan
+from illumcli.plan.recipes import View
+from illumcli.rays.sampling import stream
+from illumcli.scene.load import Loaded
+from illumcli.scene.spec import Scene
+
+Sampler: TypeAlias = Literal["spiral", "owen", "random"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How finely a picture is sampled, and by which random numbers."""
+
+    pixel: int  # samples per pixel; 1 looks through the pixel's centre
+    obscurance: int  # rays per sample
+    sampler: Sampler
+    seed: int
+
+    @property
+    def rays(self) -> int:
+        """Obscurance rays per pixel."""
+        return self.pixel * self.obscurance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """A view of a scene and one of its layers, with the buffers that no sampling changes."""
+
+    loaded: Loaded
+    view: View
+    layer: Layer
+    threads: int
+    shared: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def scene(self) -> Scene:
+        return self.loaded.scene
+
+    def planned(self, sampling: Sampling) -> tuple[Plan, View]:
+        """The plan and the view at a sampling, all that no tile changes being made."""
+        update: dict[str, Any] = {"seed": sampling.seed}
+        if self.scene.obscurance is not None:
+            finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
+            update["obscurance"] = self.scene.obscurance.model_copy(update=finer)
+        steps = plan(self.scene.model_copy(update=update), self.loaded, [self.layer.name])
+        for step in steps.once:
+            if step.makes not in self.shared:
+                self.shared[step.makes] = step.make(self.shared)
+        return steps, replace(self.view, samples=sampling.pixel)
+
+    def picture(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
+        """(H, W, channels) the layer at a sampling, the rays it took, and the seconds."""
+        steps, view = self.planned(sampling)
+        tally, start = Tally(), time.perf_counter()
+        rows = [band.layers for band in bands(steps, self.shared, view, self.threads, tally)]
+        seconds = time.perf_counter() - start
+        return np.concatenate([row[self.layer.name] for row in rows]), sum(tally.rays.values()), seconds
+
+    def pixels(
+        self, sampling: Sampling, x: NDArray[np.int64], y: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], int]:
+        """(K, channels) the layer at K pixels, and the rays it took."""
+        steps, view = self.planned(sampling)
+        tally = Tally()
+        made = at_pixels(steps, self.shared, view, x, y, self.threads, tally)
+        return made[self.layer.name].astype(np.float64), sum(tally.rays.values())
+
+    def scattered(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Columns and rows of `count` pixels drawn at random; of all of them where they are fewer."""
+        pixels = self.view.width * self.view.height
+        random = np.random.default_rng(stream(self.scene.seed, purpose))
+        y, x = np.divmod(np.sort(random.choice(pixels, min(count, pixels), replace=False)), self.view.width)
+        return x, y
+
+
+def subject(
+    loaded: Loaded, name: str, threads: int | None = None, camera: str | None = None, width: int | None = None
+) -> Subject:
+    """A scene's layer, ready to be sampled.
+
+    Parameters
+    ----------
+    name : str
+        Of a layer that is the mean of its pixels' samples; data layers such as depth have no error.
+    camera : str, optional
+        By default the first.
+    width : int, optional
+        The film is scaled down to at most this many pixels across.
+
+    Raises
+    ------
+    InputError
+        No such layer, or one without error; no such camera.
+    """
+    steps = plan(loaded.scene, loaded, [name])
+    view = chosen_view(steps.views, camera)
+    if len(steps.layers) != 1 or steps.layers[0].data:
+        raise InputError(
+            f"layer '{name}' is no mean of a pixel's samples; take beauty, ambient, obscurance or one light"
+        )
+    if width is not None and view.width > width:
+        view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
+    return Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+
+
+def chosen_view(views: Sequence[View], camera: str | None) -> View:
+    """The view of this name, or the first.
+
+    Raises
+    ------
+    InputError
+    """
+    if camera is None:
+        return views[0]
+    named = {view.name: view for view in views}
+    if camera not in named:
+        raise InputError(f"no camera '{camera}'; there are: {', '.join(named)}")
+    return named[camera]

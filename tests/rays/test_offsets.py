@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.geometry.mesh import Mesh
+from illumcli.jobs.stress.rays import grazing, icosphere, surface_points, world_of
 from illumcli.rays.offsets import lifted, tangent_lift
 from illumcli.rays.tracer import Tracer
 
@@ -87,3 +89,12 @@ def test_tangent_lift_reaches_the_sphere_and_leaves_hollows_alone(ball):
     assert (np.linalg.norm(centre + lift, axis=1) >= 1).all()
     hollow = tuple(-corner for corner in corners)
     assert not tangent_lift(centre, corners, hollow, (third, third, third)).any()
+
+
+def test_a_needle_turned_out_of_its_axes_does_not_hit_itself():
+    ball = icosphere(5)
+    world = world_of(Mesh.of_triangles(ball.vertices * [1, 1e-3, 1e-3], ball.corners))
+    tracer = Tracer(world.vertices, world.triangles)
+    position, facet = surface_points(world, 50_000, seed=0)
+    up = grazing(facet.ng.astype(float), seed=0)
+    assert not tracer.occluded(lifted(position, facet.ng, facet.edge), up).any()

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
+from illumcli.rays.offsets import effective_edge
 from illumcli.rays.tracer import Closest
 
 
@@ -38,7 +39,7 @@ class Facets:
 
     position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees
     ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
-    edge: Lanes  # (M,) float32 longest edge, in radii
+    edge: Lanes  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
     behind: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
 
 
@@ -49,10 +50,12 @@ def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors
     )
     e1, e2 = v1 - v0, v2 - v0
     position = v0 + u[:, None] * e1 + v[:, None] * e2
-    ng = unit(cross(e1, e2))
+    normal = cross(e1, e2)
+    ng = unit(normal)
     behind = dot(ng, towards_eye) < 0
     sides = columns(e1, F), columns(e2, F), columns(e2 - e1, F)
     edge = np.maximum(np.maximum(length(sides[0]), length(sides[1])), length(sides[2]))
+    edge = effective_edge(edge, length(normal))
     return Facets(position, facing(columns(ng, F), behind), edge, behind)
 
 

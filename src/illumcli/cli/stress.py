@@ -1,0 +1,27 @@
+"""``illum stress``."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command()
+@click.option("--quick", is_flag=True, help="Every case, small: some seconds instead of some minutes.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress.")
+def stress(quick: bool, as_json: bool, quiet: bool) -> None:
+    """Run the numerical stability suite: scenes, rays, models and meshes at the limits.
+
+    Every picture goes the whole way from a scene file to an image file and back. Scenes that make no sense
+    must be refused, all others must render without a NaN, an infinite or a negative value.
+
+    Exit status: 0 all passed, 3 some case failed.
+    """
+    import json
+
+    from illumcli.cli._progress import reporter
+    from illumcli.jobs import stress as job
+
+    result = job.run(quick, reporter(quiet))
+    click.echo(json.dumps(job.as_data(result), indent=2) if as_json else job.as_table(result))
+    job.check(result)

@@ -34,6 +34,22 @@ class Baked:
     about: Mapping[str, Any] = field(default_factory=dict)
     """Parameters, seed, error, hash of the mesh, version."""
 
+    def of(self, name: str, count: int) -> NDArray[np.float32] | None:
+        """(V,) values of the mesh of `count` vertices, in a bake of several that of the object `name`; None
+        where there is none that long."""
+        if len(self.obscurance) == count:
+            return self.obscurance
+        first = 0
+        for own, vertices in dict(self.about.get("vertices", {})).items():
+            if own == name and vertices == count:
+                return self.obscurance[first : first + count]
+            first += vertices
+        return None
+
+    def hashes(self) -> list[str]:
+        """Of the meshes that were baked."""
+        return list(dict(self.about.get("meshes", {})).values())
+
     def columns(self) -> dict[str, NDArray[np.float32]]:
         """What is written, by name."""
         found = {"obscurance": self.obscurance, "standard_error": self.standard_error}
@@ -210,8 +226,7 @@ def _joined(shapes: Sequence[Shape]) -> dict[str, NDArray[Any]]:
             values = srgb_bytes(values)
         if values.dtype.kind == "f":
             values = values.astype(np.float32)
-        for column, label in zip(_flat(values), _labels(name, values), strict=True):
-            columns[label] = column
+        columns |= dict(zip(_labels(name, values), _flat(values), strict=True))
     return columns
 
 

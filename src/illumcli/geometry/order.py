@@ -25,9 +25,8 @@ def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
     """
     count = len(points)
     order = along_curve(points)
-    blocks = -(-count // BLOCK)
-    padded = np.concatenate([order, np.full(blocks * BLOCK - count, -1)])
-    size = BLOCK
+    size = min(BLOCK, 1 << max(count - 1, 1).bit_length())
+    padded = np.concatenate([order, np.full(-count % size, -1)])
     while size > SMALLEST:
         boxes = padded.reshape(-1, size)
         own = points[boxes]

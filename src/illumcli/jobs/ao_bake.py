@@ -155,6 +155,9 @@ def run(
             "version": __version__,
             "input": path.name,
             "meshes": dict(zip(scene.object_names(), hashes, strict=True)),
+            "vertices": {
+                name: len(mesh.vertices) for name, mesh in zip(scene.object_names(), meshes, strict=True)
+            },
             "parameters": parameters(settings),
             "seed": settings.seed,
             "rmse": report.rmse,
@@ -274,8 +277,8 @@ def bake(
     report.rmse = errors.rmse * share**0.5
     if settings.target_error is not None and report.rmse > settings.target_error:
         report.warnings.append(
-            f"error {report.rmse:.2g} is above the {settings.target_error:g} asked for; the seed or the limit of "
-            f"{MOST_SAMPLES} rays a vertex stands in the way"
+            f"error {report.rmse:.2g} is above the {settings.target_error:g} asked for: no vertex casts more "
+            f"than {MOST_SAMPLES} rays"
         )
     report.rays = dict(caster.rays)
     count, points = np.unique(samples, return_counts=True)

@@ -117,7 +117,8 @@ class System:
     def at(self, area: AreaPoints, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(M,) what vertex values give at the points."""
         corner = self.corner[area.triangle]
-        return sum(weight * x[corner[:, k]] for k, weight in enumerate(barycentric(area)))
+        a, b, c = (weight * x[corner[:, k]] for k, weight in enumerate(barycentric(area)))
+        return a + b + c
 
     def times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(V, k) the matrix times k vectors."""

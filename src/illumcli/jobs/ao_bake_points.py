@@ -47,8 +47,8 @@ def vertex_points(world: World) -> Vertices:
     """Every vertex that has a normal; copies at one place that agree in their normal cast rays once.
 
     The normal is the mean of the triangles at the vertex by angle. Where a mesh holds several vertices at one
-    place (seams of uv, loose triangles) those within 60 degrees share their triangles, so that a seam does not
-    show and an edge that is sharp stays sharp.
+    place (seams of uv, loose triangles) those within 60 degrees share their triangles, so that a seam does
+    not show and an edge that is sharp stays sharp.
     """
     sums, longest, used = _around(world)
     thing = _thing_of_vertex(world)

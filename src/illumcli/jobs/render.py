@@ -184,7 +184,7 @@ def repairs(shared: Mapping[str, Any]) -> dict[str, int]:
     return {
         what: count
         for name, made in shared.items()
-        if name == "repairs" or name.endswith("_textures")
+        if name in ("repairs", "baked") or name.endswith("_textures")
         for what, count in made.repairs.items()
     }
 

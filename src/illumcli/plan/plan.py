@@ -15,7 +15,16 @@ from illumcli.errors import LimitError
 from illumcli.film.film import Layer
 from illumcli.plan.artifacts import Artifacts, Book, Picture, kind_of
 from illumcli.plan.keys import Keys, code, digest
-from illumcli.plan.recipes import View, active_lights, is_ambient, is_emissive, layers, recipes, views
+from illumcli.plan.recipes import (
+    View,
+    active_lights,
+    is_ambient,
+    is_baked,
+    is_emissive,
+    layers,
+    recipes,
+    views,
+)
 from illumcli.plan.stages import tile_side
 from illumcli.scene.spec import Scene
 
@@ -182,7 +191,7 @@ def _expected_rays(scene: Any, all_views: Sequence[View], made: set[str]) -> dic
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in made and light.shadows and any(light.color()):
             rays[f"shadow:{name}"] = samples
-    if "obscurance" in made and scene.obscurance:
+    if {"obscurance", "obscurance_origins"} <= made and scene.obscurance:
         rays["obscurance"] = samples * scene.obscurance.samples
     return rays
 
@@ -213,6 +222,8 @@ def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[s
             reasons[name] = "the light's intensity is 0"
         elif kind in ("shadow", "reach") and light and not active[light].shadows:
             reasons[name] = "the light casts no shadows"
+        elif name == "obscurance_origins" and any(is_baked(scene)):
+            reasons[name] = "the obscurance is baked"
         elif kind in ("obscurance", "obscurance_origins") and scene.obscurance is None:
             reasons[name] = "the scene has no obscurance: w = 1"
         elif kind in ("ambient", "ambient_color", "obscurance", "obscurance_origins") and not is_ambient(

@@ -134,6 +134,11 @@ def is_ambient(scene: Scene) -> bool:
     return models is None or any(_glows(model, model.ambient_color()) for model in models)
 
 
+def weighs_ambient(scene: Scene) -> bool:
+    """Is the ambient light weighed by obscurance, traced or baked?"""
+    return scene.obscurance is not None or any(is_baked(scene))
+
+
 def is_emissive(scene: Scene) -> bool:
     """Does any surface emit light?"""
     models = candidates(scene)
@@ -183,7 +188,7 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
         Recipe.of(stages.shadow_origins, **smooth),
         Recipe.of(stages.obscurance_origins),
-        Recipe.of(partial(stages.obscurance, scene.obscurance or Obscurance(), scene.seed), "obscurance"),
+        *_obscurance(scene, loaded),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
         Recipe.of(stages.emission, **_varying(scene, "emission")),
         Recipe.of(stages.alpha),
@@ -203,6 +208,47 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
     return {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
 
 
+def _obscurance(scene: Scene, loaded: Any) -> list[Recipe]:
+    """w, by rays or from the files that its objects' meshes name."""
+    files = baked_files(scene, loaded)
+    settings = scene.obscurance or Obscurance()
+    more = {"horizon": "horizon"}
+    if any(file for _, file in files):
+        more["baked"] = "baked"
+    if settings.faces != "count":
+        more["facet_normals"] = "facet_normals"
+    if all_baked(scene) or (scene.obscurance is None and "baked" in more):
+        w = Recipe.of(stages.baked_or_open, "obscurance")
+    else:
+        w = Recipe.of(partial(stages.obscurance, settings, scene.seed), "obscurance", **more)
+    return [
+        Recipe.of(stages.horizon),
+        Recipe.of(stages.facet_normals),
+        Recipe.of(partial(stages.baked, files), "baked"),
+        w,
+    ]
+
+
+def baked_files(scene: Scene, loaded: Any) -> tuple[tuple[str, Content | None], ...]:
+    """Name of each object and the file of its baked obscurance."""
+    sources = [_source(scene, thing.mesh) for thing in scene.objects]
+    files = [source.obscurance if isinstance(source, MeshFile) else None for source in sources]
+    return tuple(
+        (name, None if file is None else Content(partial(resolve, loaded, file)))
+        for name, file in zip(scene.object_names(), files, strict=True)
+    )
+
+
+def is_baked(scene: Scene) -> list[bool]:
+    """Of each object: does its mesh name baked obscurance?"""
+    return [getattr(_source(scene, thing.mesh), "obscurance", None) is not None for thing in scene.objects]
+
+
+def all_baked(scene: Scene) -> bool:
+    """Is there no surface left to cast obscurance rays from?"""
+    return bool(scene.objects) and all(is_baked(scene))
+
+
 def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
     """Meshes, each source once, what is made of them all, and their normals."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
@@ -214,9 +260,10 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
     normals = tuple(source.normals if isinstance(source, MeshFile) else None for source in sources)
     how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
     methods = tuple("newell" if said is None else said.polygon for said in normals)
+    parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
     return [
         *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
-        Recipe("meshes", partial(stages.meshes, which), {f"mesh:{name}": f"mesh:{name}" for name in names}),
+        Recipe("meshes", partial(stages.meshes, which), parts),
         Recipe.of(partial(stages.world, tuple(thing.transform for thing in scene.objects)), "world"),
         Recipe.of(stages.frame),
         Recipe.of(stages.repairs),
@@ -330,7 +377,7 @@ def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) ->
 def _sums(scene: Scene) -> list[Recipe]:
     """The pictures that are sums over lights, and the beauty."""
     lights = list(active_lights(scene))
-    open_way = {"obscurance": "obscurance"} if scene.obscurance is not None else {}
+    open_way = {"obscurance": "obscurance"} if weighs_ambient(scene) else {}
     ambient = Recipe.of(partial(stages.ambient, scene.ambient.color), "ambient", **open_way)
 
     def total(makes: str, *parts: str) -> Recipe:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.errors import InputError
 from illumcli.files.content import Content
 from illumcli.frame import Frame
@@ -36,7 +36,11 @@ from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
 from illumcli.visibility.arriving import Lit, among
 from illumcli.visibility.arriving import lit as lit_lanes
-from illumcli.visibility.obscurance import obscurance as open_share
+from illumcli.visibility.horizon import Horizon
+from illumcli.visibility.obscurance import Method, estimates
+
+LARGEST_HORIZON = 1 << 17
+"""Vertices up to which it is worth to look for points with nothing above them."""
 
 # --- once: geometry ---------------------------------------------------------------------------------
 
@@ -93,6 +97,54 @@ def repairs(world: World) -> Repairs:
 def tracer_over(world: World) -> Tracer:
     """The ray core over the world's triangles."""
     return Tracer(world.vertices, world.triangles)
+
+
+def horizon(world: World) -> Horizon | None:
+    """What tells points with nothing above them; None for meshes so large that it does not pay."""
+    return Horizon(world.vertices, world.triangles) if len(world.vertices) <= LARGEST_HORIZON else None
+
+
+def facet_normals(world: World) -> Vectors:
+    """(T, 3) float32 unit normals of all triangles."""
+    v0, v1, v2 = (columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
+    return columns(unit(cross(v1 - v0, v2 - v0)), F)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BakedValues:
+    """Obscurance that was baked at the world's vertices."""
+
+    values: NDArray[np.float32]  # (V,) NaN on meshes that have none
+    repairs: Mapping[str, int]
+
+
+def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedValues:
+    """The values in each object's file.
+
+    Raises
+    ------
+    InputError
+        A file that holds values for another number of vertices.
+    """
+    from illumcli.files.vertex_data import mesh_hash, read_npz
+
+    values = np.full(len(world.vertices), np.nan, F)
+    repairs: dict[str, int] = {}
+    for (name, file), placed in zip(files, world.placed, strict=True):
+        if file is None:
+            continue
+        mesh, found = placed.mesh, read_npz(file.path)
+        own = found.of(name, len(mesh.vertices))
+        if own is None:
+            raise InputError(
+                f"{file.path}: holds {len(found.obscurance)} values, the mesh of {name} has "
+                f"{len(mesh.vertices)} vertices; bake it again"
+            )
+        if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in found.hashes():
+            what = f"{file.path}: was baked for another mesh of as many vertices"
+            repairs[what] = repairs.get(what, 0) + 1
+        values[placed.first_vertex : placed.first_vertex + len(own)] = own
+    return BakedValues(values, repairs)
 
 
 def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> CornerVectors:
@@ -465,15 +517,42 @@ def obscurance(
     hits: Hits,
     facets: Facets,
     obscurance_origins: Vectors,
+    horizon: Horizon | None = None,
+    baked: BakedValues | None = None,
+    facet_normals: Vectors | None = None,
 ) -> Lanes:
-    """(M,) w of every sample seen."""
+    """(M,) w of every sample seen; on meshes with baked values these, and rays for the others."""
     key = sampling.stream(seed, "obscurance")
     lane = hits.lane
     pixel, sample = np.divmod(lane, samples.per_pixel)
     draws = sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
-    return open_share(
-        tracer, obscurance_origins, facets.ng, draws, settings.samples, settings.falloff, world.frame.radius
+    method = Method(
+        settings.samples,
+        settings.falloff,
+        world.frame.radius,
+        settings.sampler,
+        settings.faces,
+        facet_normals,
     )
+    if baked is None:
+        return estimates(tracer, obscurance_origins, facets.ng, draws, method, horizon).w
+    w = baked_obscurance(world, baked, hits)
+    left = np.flatnonzero(np.isnan(w))
+    origins, ng = rows(obscurance_origins, left), rows(facets.ng, left)
+    w[left] = estimates(tracer, origins, ng, draws[:, left], method, horizon).w
+    return w
+
+
+def baked_obscurance(world: World, baked: BakedValues, hits: Hits) -> Lanes:
+    """(M,) baked values interpolated over triangles; NaN on meshes that have none."""
+    a, b, c = (baked.values.take(world.triangles[:, k].take(hits.triangle)) for k in range(3))
+    return ((1 - hits.u - hits.v) * a + hits.u * b + hits.v * c).astype(F)
+
+
+def baked_or_open(world: World, baked: BakedValues, hits: Hits) -> Lanes:
+    """(M,) the same; 1 on meshes that have none."""
+    w = baked_obscurance(world, baked, hits)
+    return np.where(np.isnan(w), F(1), w)
 
 
 def ambient_color(

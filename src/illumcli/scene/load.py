@@ -25,7 +25,7 @@ MAX_FILES = 64
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 STUDIO = Path(__file__).with_name("studio.yaml")
 CHOICES = ("model", "shape", "falloff", "law")  # keys that say what a mapping is
-PATHS = ("file", "texture")  # keys whose text is a path, besides an object's `mesh`
+PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides an object's `mesh`
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ asked about together. So on a convex surface of any fineness a group looks at so
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,19 +50,30 @@ class Groups:
 
 
 class Horizon:
-    """The vertices of occluders, asked what is above a plane. Read-only, safe to ask from threads."""
+    """The vertices of occluders, asked what is above a plane; safe to ask from threads.
+
+    The tree is built when a point is asked about that the vertices farthest out do not settle.
+    """
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
         used = np.zeros(len(vertices), bool)
         used[triangles.ravel()] = True
-        points = np.unique(np.asarray(vertices[used], np.float64), axis=0)
-        self._points = points[compact(points)]
-        self._levels: list[Slabs] = []
-        size = FAN
-        while len(self._points) > size:
-            self._levels.append(slabs(self._points, size))
-            size *= FAN
+        self._points = np.asarray(vertices[used], np.float64, order="C")
         self._probes = extremes(self._points)
+        self._levels: list[Slabs] | None = None
+        self._building = threading.Lock()
+
+    def _tree(self) -> list[Slabs]:
+        """Levels of clusters, from the finest; the points are put in their order."""
+        with self._building:
+            if self._levels is None:
+                self._points = self._points[compact(self._points)]
+                levels, size = [], FAN
+                while len(self._points) > size:
+                    levels.append(slabs(self._points, size))
+                    size *= FAN
+                self._levels = levels
+        return self._levels
 
     def clears(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
         """(M,) True where no occluder reaches above the plane through an origin with normal `n`.
@@ -81,9 +93,9 @@ class Horizon:
 
     def _below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(M,) True where all points are below, for points that no probe is above."""
-        out = np.zeros(len(o), bool)
         planes = groups(o, n)
         group, cluster = self._near(planes)
+        out = np.zeros(len(o), bool)
         if group is None:
             return out
         bounds = np.searchsorted(group, np.arange(len(planes.centre) + 1))
@@ -101,7 +113,7 @@ class Horizon:
         they are too many."""
         count = len(planes.centre)
         group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all
-        for level in reversed(self._levels):
+        for level in reversed(self._tree()):
             group = np.repeat(group, FAN)
             cluster = (cluster[:, None] * FAN + np.arange(FAN)).ravel()
             inside = cluster < len(level.centre)

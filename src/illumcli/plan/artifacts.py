@@ -57,17 +57,17 @@ class Kind:
 
     dtype: Any
     planes: int
-    pack: Callable[[Any], NDArray[Any] | None]
-    """Buffer -> (planes, M) at the samples seen; None where this one cannot be kept."""
+    pack: Callable[[Any, Mapping[str, Any]], NDArray[Any] | None]
+    """Buffer, all buffers of the tile -> (planes, M) at the samples seen; None where it cannot be kept."""
     unpack: Callable[[NDArray[Any], Hits], Any]
     """(planes, M) and the samples seen -> buffer."""
 
 
-def _pack_hits(hits: Hits) -> NDArray[np.int32]:
+def _pack_hits(hits: Hits, buffers: Mapping[str, Any]) -> NDArray[np.int32]:
     return np.stack([hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
 
 
-def _pack_points(points: Points) -> NDArray[np.float32] | None:
+def _pack_points(points: Points, buffers: Mapping[str, Any]) -> NDArray[np.float32] | None:
     if points.spread is not as_they_are:
         return None
     return np.concatenate([points.position.T, points.n.T])
@@ -77,8 +77,10 @@ def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> Points:
     return Points(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, as_they_are)
 
 
-def _pack_material(material: NDArray[np.int32]) -> NDArray[np.uint16] | None:
-    return material[None].astype(np.uint16) if material.max(initial=0) < 1 << 16 else None
+def _pack_material(material: NDArray[np.int32], buffers: Mapping[str, Any]) -> NDArray[np.uint16] | None:
+    if buffers["points"].spread is not as_they_are or material.max(initial=0) >= 1 << 16:
+        return None
+    return material[None].astype(np.uint16)
 
 
 def _first(planes: NDArray[Any], hits: Hits) -> Any:
@@ -89,8 +91,10 @@ KINDS = {
     "hits": Kind(np.int32, 3, _pack_hits, lambda planes, hits: hits),
     "points": Kind(np.float32, 6, _pack_points, _unpack_points),
     "material": Kind(np.uint16, 1, _pack_material, lambda planes, hits: planes[0].astype(np.int32)),
-    "obscurance": Kind(np.float32, 1, lambda w: w[None], _first),
-    "shadow": Kind(np.bool_, 1, lambda delta: delta[None] != 0, lambda planes, hits: planes[0].astype(F)),
+    "obscurance": Kind(np.float32, 1, lambda w, buffers: w[None], _first),
+    "shadow": Kind(
+        np.bool_, 1, lambda delta, buffers: delta[None] != 0, lambda planes, hits: planes[0].astype(F)
+    ),
 }
 """Buffers of a view that are kept: primary hits, where and how they lie, w, delta of each light."""
 
@@ -336,15 +340,17 @@ class Keeper:
         )
         """The buffers that every tile hands over."""
 
-    def take(self, name: str, buffer: Any, hits: Hits | None, tile: Tile) -> NDArray[Any] | None:
+    def take(self, name: str, buffers: Mapping[str, Any], tile: Tile) -> NDArray[Any] | None:
         """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread."""
         if self._memory is not None:
-            self._memory.add(self._keys[name], tile, buffer)
+            self._memory.add(self._keys[name], tile, buffers[name])
         kind = kind_of(name)
-        if name not in self._writers or kind is None or hits is None:
+        if name not in self._writers or kind is None:
             return None
-        packed = kind.pack(buffer)
-        return None if packed is None else spread_out(kind, packed, hits, tile, self._view.samples)
+        packed = kind.pack(buffers[name], buffers)
+        if packed is None:
+            return None
+        return spread_out(kind, packed, buffers["hits"], tile, self._view.samples)
 
     def write(self, row: Mapping[str, list[NDArray[Any] | None]]) -> None:
         """The next row of tiles, from left to right."""

@@ -202,7 +202,7 @@ def _tile(
         if isinstance(made, Lit):
             lanes[step.makes] = made.count - len(made.lane)
         if step.makes in keeper.names:
-            kept[step.makes] = keeper.take(step.makes, made, buffers.get("hits"), tile)
+            kept[step.makes] = keeper.take(step.makes, buffers, tile)
         for name in step.needs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)

@@ -116,8 +116,9 @@ def candidates(scene: Scene) -> list[IlluminationModel] | None:
 def reached_words(scene: Scene) -> frozenset[str]:
     """The words (`v`, `t`, ...) that some lobe of some candidate asks for."""
     models = candidates(scene)
-    if models is None:
-        return frozenset(("n", "l", "v"))
+    if models is None:  # libraries of meshes describe models that know of no tangent
+        models = [*scene.materials.values(), *filter(None, map(scene.material_of, scene.objects))]
+        return frozenset(("n", "l", "v")).union(*(words(model.lobes()) for model in models))
     return frozenset().union(*(words(model.lobes()) for model in models))
 
 

@@ -43,24 +43,9 @@ WEDGE = (
     "mtllib wedge.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 )
 ALL = [
-    "beauty",
-    "ambient",
-    "diffuse",
-    "specular",
-    "emission",
-    "lights",
-    "shadows",
-    "obscurance",
-    "alpha",
-    "depth",
-    "position",
-    "normal",
-    "geometric_normal",
-    "uv",
-    "object_id",
-    "material_id",
-    "triangle_id",
-]
+    "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha",
+    "depth", "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+]  # fmt: skip
 CHANGES = [
     "materials.red.diffuse=[0.1,0.2,0.9]", "materials.red.specular=0", "materials.red.exponent=3",
     "materials.steel={model: cook_torrance}", "materials.grey.emission=0.2", "materials.red.ambient=0",
@@ -180,7 +165,7 @@ def test_a_changed_byte_of_a_mesh_spoils_what_is_made_of_it_alone(scene, store):
     mesh = scene.parent / "wedge.obj"
     mesh.write_text(WEDGE.replace("v 0 0 1\n", "v 0 0 2\n"))
     cold = picture(scene)[0]
-    warm, made, rays, reused = picture(scene, store=store)
+    warm, made, _, reused = picture(scene, store=store)
     same(cold, warm)
     assert {"mesh:wedge.obj", "world", "tracer", "hits", "corner_normals"} <= made
     assert "mesh:ball" in reused

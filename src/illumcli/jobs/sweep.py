@@ -264,7 +264,7 @@ def at_frame(path: str, value: str, frame: int) -> str:
     """`value` with every formula of `frame` in it worked out."""
     inside = value.strip()
     if not re.search(r"\bframe\b", inside):
-        return value
+        return inside
     if inside.startswith("[") and inside.endswith("]"):
         return f"[{', '.join(at_frame(path, part, frame) for part in split(inside[1:-1]))}]"
     try:

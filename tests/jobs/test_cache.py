@@ -1,0 +1,106 @@
+"""`illum cache` and renders that share one: listed, verified, pruned; never in the way of a picture."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+SCENE = """
+version: 1
+film: {width: 96, height: 64, samples: 2}
+ambient: 0.2
+obscurance: {samples: 16}
+materials: {clay: {model: blinn_phong, diffuse: [0.6, 0.4, 0.3]}}
+objects: [{mesh: {shape: torus}, material: clay}, {mesh: {shape: plane, size: [8, 8]}}]
+lights: [{light: point, name: key, position: [3, 4, 5], intensity: 30}]
+outputs: {files: ["{scene}.png"]}
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A scene and a cache folder of its own."""
+    (tmp_path / "ring.yaml").write_text(SCENE)
+    monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
+    return tmp_path
+
+
+def test_list_verify_prune_clear(illum, own):
+    cold = illum("render", "ring.yaml", "--no-cache", "-o", "cold.png")
+    assert cold.returncode == 0, cold.stderr
+    assert not (own / "kept").exists()
+    illum("render", "ring.yaml")
+    listed = illum("cache", "list").stdout
+    assert "obscurance" in listed
+    entries = list((own / "kept").glob("*.illum"))
+    assert f"in {len(entries)} entries" in listed
+    bad = bytearray(entries[0].read_bytes())
+    bad[-1] ^= 1
+    entries[0].write_bytes(bad)
+    verified = illum("cache", "verify").stdout
+    assert "checksum differs; removed" in verified
+    assert f"{len(entries) - 1} sound, 1 removed" in verified
+    assert illum("cache", "prune").stdout.startswith("0 removed")
+    assert illum("cache", "prune", "--size", "many").returncode == 2
+    illum("cache", "clear")
+    assert list((own / "kept").iterdir()) == []
+    assert (own / "ring.png").read_bytes() == (own / "cold.png").read_bytes()
+
+
+def test_a_plan_says_what_is_at_hand(illum, own):
+    assert "reused" not in illum("plan", "ring.yaml").stdout
+    illum("render", "ring.yaml")
+    planned = illum("plan", "ring.yaml").stdout
+    assert "reused  " in planned
+    assert "all that needs it is at hand" in planned
+    assert "\nrays " not in planned
+    assert "reused" not in illum("plan", "ring.yaml", "--no-cache").stdout
+
+
+@pytest.mark.parametrize("state", ["a file", "read-only", "missing parent"])
+def test_no_folder_no_harm_one_warning(illum, own, state, monkeypatch):
+    if state == "a file":
+        (own / "kept").write_text("")
+    elif state == "read-only":
+        if os.geteuid() == 0:
+            monkeypatch.setenv("ILLUM_CACHE", "/proc/kept")  # nothing is forbidden to root but this
+        else:
+            (own / "kept").mkdir(mode=0o500)
+    else:
+        monkeypatch.setenv("ILLUM_CACHE", str(own / "a" / "b" / "kept"))
+    illum("render", "ring.yaml", "--no-cache", "-o", "cold.png")
+    done = illum("render", "ring.yaml")
+    assert done.returncode == 0, done.stderr
+    assert (own / "ring.png").read_bytes() == (own / "cold.png").read_bytes()
+    assert done.stderr.count("cache: ") == (0 if state == "missing parent" else 1)
+
+
+def test_a_size_that_is_none_is_refused(illum, own, monkeypatch):
+    monkeypatch.setenv("ILLUM_CACHE_SIZE", "a lot")
+    done = illum("render", "ring.yaml")
+    assert done.returncode == 2
+    assert "ILLUM_CACHE_SIZE" in done.stderr
+
+
+def test_processes_share_one_cache(own):
+    code = """
+import sys
+from pathlib import Path
+from illumcli.jobs.render import run
+for k in range(3):
+    (path,), report = run(Path("ring.yaml"), [f"materials.clay.exponent={8 + k}"], f"{sys.argv[1]}-{k}.png", force=True)
+    assert not report.warnings, report.warnings
+"""
+    runs = [
+        subprocess.Popen([sys.executable, "-c", code, str(n)], cwd=own, stderr=subprocess.PIPE, text=True)
+        for n in range(4)
+    ]
+    for run in runs:
+        assert run.wait() == 0, run.stderr.read()
+        run.stderr.close()
+    for k in range(3):
+        assert len({(own / f"{n}-{k}.png").read_bytes() for n in range(4)}) == 1
+    assert not list((own / "kept").glob("*.part"))

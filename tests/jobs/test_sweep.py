@@ -1,0 +1,171 @@
+"""`illum sweep` as a user meets it: which variants, their names, the same bytes as single renders, going on."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from illumcli.errors import InputError
+from illumcli.files.images import read_image
+from illumcli.jobs.sweep import at_frame, axis_of, split, variants_of
+
+SCENE = """
+version: 1
+film: {width: 32, height: 24, samples: 2}
+ambient: 0.2
+obscurance: {samples: 4}
+materials:
+  clay: {model: blinn_phong, diffuse: [0.6, 0.4, 0.3], specular: 0.3}
+objects:
+  - {mesh: {shape: sphere}, material: clay}
+  - {mesh: {shape: plane, size: [8, 8]}, transform: {translate: [0, -1, 0]}}
+lights:
+  - {light: point, name: key, position: [3, 4, 5], intensity: 30}
+outputs: {files: ["{scene}.png"]}
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "ball.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("a=1,2,3", ["1", "2", "3"]),
+        ("a=0:1:5", ["0", "0.25", "0.5", "0.75", "1"]),
+        ("a=1:100:3log", ["1", "10", "100"]),
+        ("a=0.1:0.3:3", ["0.1", "0.2", "0.3"]),
+        ("a=5:5:1", ["5"]),
+        ("a=[1,2,3],[4,5,6]", ["[1,2,3]", "[4,5,6]"]),
+        ("a={law: none, c: [1,2]},null", ["{law: none, c: [1,2]}", "null"]),
+        ("a='x,y',z", ["'x,y'", "z"]),
+    ],
+)
+def test_values_of_an_axis(text, values):
+    assert list(axis_of(text).values) == values
+
+
+@pytest.mark.parametrize("text", ["a", "=1", "a=1,,2", "a=0:1:3log", "a=0:1:0", "a=-1:1:4log"])
+def test_an_axis_that_says_nothing_is_refused(text):
+    with pytest.raises(InputError):
+        axis_of(text)
+
+
+def test_grid_zip_rows_and_frames(tmp_path):
+    def values(*args, **more):
+        return [dict(variant.values) for variant in variants_of(*args, **more)]
+
+    assert values(["a=1,2", "b=x,y"]) == [
+        {"a": "1", "b": "x"}, {"a": "1", "b": "y"}, {"a": "2", "b": "x"}, {"a": "2", "b": "y"}
+    ]  # fmt: skip
+    assert values(["a=1,2", "b=x,y", "c=5"], together=True) == [
+        {"a": "1", "b": "x", "c": "5"}, {"a": "2", "b": "y", "c": "5"}
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="--zip wants as many or one"):
+        variants_of(["a=1,2", "b=1,2,3"], together=True)
+    rows = tmp_path / "rows.csv"
+    rows.write_text('a,b\n1,"[1,2,3]"\n\n2,x\n')
+    assert values(["c=7"], rows=rows) == [
+        {"a": "1", "b": "[1,2,3]", "c": "7"},
+        {"a": "2", "b": "x", "c": "7"},
+    ]
+    rows.write_text("a,b\n1\n")
+    with pytest.raises(InputError, match="row 2 has 1 cells"):
+        variants_of([], rows=rows)
+    moving = variants_of(["a=[cos(frame*0), frame/2, 3]"], frames="2:6:2")
+    assert [(v.frame, v.values["a"]) for v in moving] == [
+        (2, "[1, 1, 3]"),
+        (4, "[1, 2, 3]"),
+        (6, "[1, 3, 3]"),
+    ]
+    for wrong in ("3:1", "1", "0:4:0", "a:b"):
+        with pytest.raises(InputError):
+            variants_of([], frames=wrong)
+
+
+def test_formulas_compute_and_do_nothing_else():
+    assert at_frame("a", "sqrt(frame)", 9) == "3"
+    assert at_frame("a", "[1, [frame, max(frame, 4)]]", 3) == "[1, [3, 4]]"
+    assert at_frame("a", "framework", 3) == "framework"
+    for wrong in ("frame.real", "__import__('os') + frame", "1/(frame-3)", "frame +"):
+        with pytest.raises(InputError, match="a="):
+            at_frame("a", wrong, 3)
+
+
+def test_commas_inside_brackets_and_quotes_part_nothing():
+    assert split("f(a,b),[c,d],'e,f',g") == ["f(a,b)", "[c,d]", "'e,f'", "g"]
+
+
+def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
+    done = illum("sweep", scene, "-D", "materials.clay.exponent=4:256:3log", "-D", "ambient=0.1,0.6",
+                 "--table", "t.csv", "--sheet", "s.png", "--reference", "1", "--report", "r.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    names = done.stdout.split()
+    assert names[:2] == ["ball-4-0.1.png", "ball-4-0.6.png"]
+    assert len(names) == 6
+    for exponent, ambient in ((4, 0.6), (256, 0.1)):
+        single = illum("render", scene, "--no-cache", "-D", f"materials.clay.exponent={exponent}",
+                       "-D", f"ambient={ambient}", "-o", "one.png", "--force")  # fmt: skip
+        assert single.returncode == 0, single.stderr
+        swept = tmp_path / f"ball-{exponent}-{ambient}.png"
+        assert swept.read_bytes() == (tmp_path / "one.png").read_bytes()
+    with (tmp_path / "t.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["state"] for row in rows] == ["rendered"] * 6
+    assert [row["rays"] != "0" for row in rows] == [True] + [False] * 5
+    assert float(rows[0]["rmse"]) == 0
+    assert float(rows[1]["rmse"]) > 0
+    assert read_image(tmp_path / "s.png").width > 256
+    assert [each["values"]["ambient"] for each in json.loads((tmp_path / "r.json").read_text())][:2] == [
+        "0.1",
+        "0.6",
+    ]
+
+
+def test_a_sweep_goes_on_where_it_stopped(illum, scene, tmp_path):
+    axis = "materials.clay.specular=0.1,0.2,0.3"
+    assert illum("sweep", scene, "-D", axis).returncode == 0
+    (tmp_path / "ball-0.2.png").unlink()
+    stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.png")}
+    again = illum("sweep", scene, "-D", axis, "--table", "t.csv")
+    assert again.stdout.split() == ["ball-0.1.png", "ball-0.2.png", "ball-0.3.png"]
+    assert again.stderr.count("kept") == 2
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in stamps} == stamps
+    assert [line.split(",")[4] for line in (tmp_path / "t.csv").read_text().split()] == [
+        "state", "kept", "rendered", "kept"
+    ]  # fmt: skip
+
+
+def test_a_moving_light_casts_its_own_rays_alone(illum, scene, tmp_path):
+    moving = "lights.key.position=[3*cos(frame), 4, 3*sin(frame)]"
+    done = illum("sweep", scene, "--frames", "0:3", "-D", moving, "--no-cache", "--report", "r.json")
+    assert done.stdout.split() == [f"ball.{k:04d}.png" for k in range(4)]
+    rays = [each["rays"] for each in json.loads((tmp_path / "r.json").read_text())]
+    assert set(rays[0]) == {"hits", "obscurance", "shadow:key"}
+    assert all(set(each) == {"shadow:key"} for each in rays[1:])
+
+
+def test_all_problems_are_said_before_anything_is_rendered(illum, scene, tmp_path):
+    done = illum("sweep", scene, "-D", "materials.clay.exponent=4,-1,x")
+    assert done.returncode == 2
+    assert "exponent=-1" in done.stderr
+    assert "exponent=x" in done.stderr
+    assert not list(tmp_path.glob("*.png"))
+    clash = illum("sweep", scene, "-D", "ambient=0.1,0.2", "-o", "same.png")
+    assert clash.returncode == 2
+    assert "same.png: the name of 2 images" in clash.stderr
+
+
+def test_a_variant_that_fails_is_told_and_the_others_go_on(illum, scene, tmp_path):
+    (tmp_path / "bad.obj").write_text("f 1 2 3\n")
+    done = illum("sweep", scene, "-D", "objects.0.mesh={shape: sphere},bad.obj,{shape: box}", "-o", "{frame}-"
+                 "{objects.0.mesh}.png")  # fmt: skip
+    assert done.returncode == 2
+    assert len(list(tmp_path.glob("*.png"))) == 2
+    assert "1 of 3 variants failed" in done.stderr

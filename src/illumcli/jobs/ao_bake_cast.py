@@ -27,7 +27,7 @@ from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
 RAYS = 1 << 20
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
 LANES = 1 << 14
-PAIRS_SHARE, FEWEST_PAIRS = 100, 256
+PAIRS_SHARE, FEWEST_PAIRS = 100, 512
 """The error is learnt from one point in so many, and from so many at least."""
 PILOT = 16
 AIM = 0.94
@@ -192,7 +192,7 @@ class Caster:
             ):
                 break
             # towards the middle of the band
-            scale *= float(np.clip((reached / (0.95 * aim)) ** (4 / 3), 0.05, 20.0))
+            scale *= float(np.clip((reached / (0.97 * aim)) ** (4 / 3), 0.05, 20.0))
         return samples
 
     def _pieces(self, lanes: NDArray[np.int64], samples: NDArray[np.int64]) -> Iterator[Piece]:

@@ -25,6 +25,8 @@ Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
 RAYS_AT_ONCE = 1 << 15
 """Directions, origins and answers of as many rays stay in a core's cache."""
+CLUSTERS_PER_RAY = 4
+"""To look at as many clusters of occluders takes a point half as long as a ray: for more, rays are cast."""
 MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
 
@@ -102,7 +104,7 @@ def estimates(
     mean = np.array(n, F, order="F") if bent else None
     lane = np.arange(count)
     if horizon is not None:
-        lane = np.flatnonzero(~horizon.clears(origins, n))
+        lane = np.flatnonzero(~horizon.clears(origins, n, CLUSTERS_PER_RAY * method.samples))
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, len(lane), at_once):
         part = lane[first : first + at_once]
@@ -253,7 +255,9 @@ class Errors:
         x = np.concatenate([a.unevenness, b.unevenness]).astype(np.float64)
         weight = 1 / np.square(1 + x)  # a variance is known in proportion to itself
         still, slope = _line(x, square, weight)
-        return cls(still, slope, float(np.sqrt(half.mean())), len(a.w))
+        # where no ray of any pair met anything, that is how little is known to be in the way
+        least = (3 / 1.96 / (2 * len(a.w))) ** 2
+        return cls(max(still, least), slope, float(np.sqrt(half.mean())), len(a.w))
 
     def at(self, unevenness: Lanes, samples: NDArray[Any] | int) -> NDArray[np.float32]:
         """(M,) standard error of each estimate."""

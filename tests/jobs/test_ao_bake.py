@@ -1,0 +1,303 @@
+"""`illum ao-bake`: values, errors, order, files, resumption."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from plyfile import PlyData, PlyElement
+
+from illumcli.cli import illum
+from illumcli.errors import InputError, OutputError
+from illumcli.files.vertex_data import read_npz
+from illumcli.geometry.readers import read_mesh
+from illumcli.jobs.ao_bake import Settings, run
+from illumcli.jobs.ao_bake_cast import Caster
+
+CUBE = """
+v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6
+"""
+STEP = """
+v -1 0 -3\nv 1 0 -3\nv 1 0 0\nv -1 0 0\nv 1 1 0\nv -1 1 0\nv 9 9 9
+f 4 3 2 1\nf 4 6 5 3
+"""
+
+
+def bake(path, *outs, **settings):
+    force = settings.pop("force", False)
+    return run(path, list(outs), Settings(**settings), threads=2, force=force)
+
+
+def wavy(tmp_path, side=24):
+    """A wavy sheet in a .ply with a property of its own, and one vertex that no face uses."""
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side)))
+    z = 0.3 * np.sin(5 * x) * np.cos(4 * y)
+    table = np.zeros(side * side + 1, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("mark", "i4")])
+    for name, values in zip("xyz", (x, y, z), strict=True):
+        table[name][:-1] = values
+    table["mark"] = np.arange(len(table))
+    i, j = (g.ravel() for g in np.meshgrid(np.arange(side - 1), np.arange(side - 1), indexing="ij"))
+    a = i * side + j
+    quads = np.stack([a, a + 1, a + side + 1, a + side], axis=1).astype(np.int32)
+    faces = np.empty(len(quads), [("vertex_indices", "i4", (4,))])
+    faces["vertex_indices"] = quads
+    path = tmp_path / "wavy.ply"
+    PlyData(
+        [PlyElement.describe(table, "vertex"), PlyElement.describe(faces, "face")], comments=["mine"]
+    ).write(str(path))
+    return path
+
+
+@pytest.fixture
+def text_mesh(tmp_path):
+    def make(text, name="mesh.obj"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return make
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("away", [0.0, 1.0, 1e3, 1e6])
+def test_a_convex_mesh_is_open_exactly_and_casts_no_ray(text_mesh, tmp_path, scale, away):
+    corners = np.array([line.split()[1:] for line in CUBE.split("\n") if line.startswith("v")], float)
+    moved = corners * scale + away * scale * 3**0.5 * np.array([1, -1, 0.5])
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
+    path = text_mesh("\n".join(lines + [line for line in CUBE.split("\n") if line.startswith("f")]))
+    _, report = bake(path, tmp_path / "out.npz")
+    baked = read_npz(tmp_path / "out.npz")
+    assert (baked.obscurance == 1).all()
+    assert (baked.standard_error == 0).all()
+    assert report.open == 8
+    assert sum(report.rays.values()) == 0
+
+
+def test_values_keep_the_order_and_unused_vertices_are_open(text_mesh, tmp_path):
+    _, report = bake(text_mesh(STEP), tmp_path / "out.npz", samples=1024)
+    w = read_npz(tmp_path / "out.npz").obscurance
+    assert len(w) == 7
+    assert report.unreferenced == 1
+    assert w[6] == 1
+    assert w[0] > 0.9  # far from the wall
+    assert (w[:2] > w[2:4]).all()  # at the foot of the wall
+
+
+def test_the_stated_error_is_true(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "truth.npz", samples=16384, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    covered = []
+    for seed in range(6):
+        _, report = bake(path, tmp_path / f"{seed}.npz", samples=64, seed=seed)
+        found = read_npz(tmp_path / f"{seed}.npz")
+        cast = found.standard_error > 0
+        off = found.obscurance - truth
+        covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
+        assert 0.8 < np.sqrt(np.mean(off**2)) / report.rmse < 1.25
+    assert 0.93 < np.mean(covered) < 0.97
+
+
+def test_a_target_error_is_reached_without_bias(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "truth.npz", samples=16384, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    off = []
+    for seed in range(4):
+        _, report = bake(path, tmp_path / f"{seed}.npz", target_error=0.01, seed=seed)
+        off.append(read_npz(tmp_path / f"{seed}.npz").obscurance - truth)
+        assert report.rmse <= 0.01
+        assert len(report.samples) > 1
+    off = np.concatenate(off)
+    assert 0.006 < np.sqrt(np.mean(off**2)) <= 0.0105
+    assert abs(off.mean()) < 3 * off.std() / len(off) ** 0.5
+
+
+def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "out.ply", channel="g")
+    old, new = PlyData.read(path), PlyData.read(tmp_path / "out.ply")
+    assert new.byte_order == old.byte_order
+    assert "mine" in new.comments
+    for name in ("x", "y", "z", "mark"):
+        assert np.array_equal(new["vertex"][name], old["vertex"][name])
+        assert new["vertex"][name].dtype == old["vertex"][name].dtype
+    assert np.array_equal(np.stack(new["face"]["vertex_indices"]), np.stack(old["face"]["vertex_indices"]))
+    w = new["vertex"]["obscurance"]
+    assert np.array_equal(w, new["vertex"]["quality"])
+    assert np.array_equal(new["vertex"]["green"], np.rint(w * 255).astype(np.uint8))
+    assert (new["vertex"]["red"] == 255).all()
+
+
+def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
+    path = text_mesh(CUBE.replace("v 1 1 1\n", "v 1 1 1 \n") + "v 0 3 0\nf 4 3 9\nf 8 9 7\n")
+    outs = [tmp_path / f"out.{kind}" for kind in ("npz", "ply", "glb")]
+    bake(path, *outs)
+    mesh, w = read_mesh(path), read_npz(outs[0]).obscurance
+    for out in outs[1:]:
+        made = read_mesh(out)
+        np.testing.assert_allclose(made.vertices, mesh.vertices, atol=1e-6)
+        name = "obscurance" if out.suffix == ".ply" else "_OBSCURANCE"
+        assert np.array_equal(np.asarray(made.attributes[name], np.float32), w)
+    assert np.array_equal(read_mesh(outs[1]).starts, mesh.starts)
+    assert np.array_equal(read_mesh(outs[1]).corners, mesh.corners)
+
+
+def test_a_glb_keeps_all_it_has(text_mesh, tmp_path):
+    bake(text_mesh(STEP), tmp_path / "first.glb", samples=16, channel="r")
+    bake(tmp_path / "first.glb", tmp_path / "second.glb", samples=64)
+    first, second = read_mesh(tmp_path / "first.glb"), read_mesh(tmp_path / "second.glb")
+    assert np.array_equal(first.attributes["color"], second.attributes["color"])
+    assert not np.array_equal(first.attributes["_OBSCURANCE"], second.attributes["_OBSCURANCE"])
+
+
+def test_copies_of_a_vertex_get_the_same_value(tmp_path):
+    path = wavy(tmp_path)
+    mesh = read_mesh(path)
+    points = mesh.vertices[mesh.corners.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]]].reshape(-1, 3)
+    lines = ["v {!r} {!r} {!r}".format(*p) for p in points.tolist()]
+    loose = tmp_path / "loose.obj"
+    loose.write_text("\n".join(lines + [f"f {i + 1} {i + 2} {i + 3}" for i in range(0, len(points), 3)]))
+    _, report = bake(loose, tmp_path / "loose.npz")
+    w = read_npz(tmp_path / "loose.npz").obscurance
+    _, place = np.unique(points, axis=0, return_inverse=True)
+    assert report.copies > 0.7 * len(points)
+    for k in range(place.max() + 1):
+        assert np.ptp(w[place.ravel() == k]) == 0
+
+
+def test_back_faces_do_as_told(text_mesh, tmp_path):
+    # a floor under a lid that shows its back
+    path = text_mesh("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -9 .5 -9\nv 9 .5 -9\nv 9 .5 9\nv -9 .5 9\n"
+                     "f 4 3 2 1\nf 8 7 6 5\n")  # fmt: skip
+    found = {}
+    for faces in ("count", "ignore", "one_sided"):
+        bake(path, tmp_path / f"{faces}.npz", faces=faces)
+        found[faces] = read_npz(tmp_path / f"{faces}.npz").obscurance[:4]
+    assert (found["count"] < 0.1).all()
+    assert (found["ignore"] == 1).all()
+    assert (found["one_sided"] == 1).all()
+
+
+def test_a_ground_closes_what_stands_on_it(text_mesh, tmp_path):
+    bake(text_mesh(CUBE), tmp_path / "out.npz", ground="y", samples=1024)
+    w = read_npz(tmp_path / "out.npz").obscurance
+    low = np.array([1, 1, 0, 0, 1, 1, 0, 0], bool)
+    assert (w[low] < 0.4).all()
+    assert (w[~low] > 0.75).all()
+
+
+def test_a_scene_hides_its_objects_from_each_other_or_not(text_mesh, tmp_path):
+    text_mesh(CUBE, "cube.obj")
+    scene = tmp_path / "two.yaml"
+    scene.write_text(
+        "version: 1\nobjects:\n- {name: a, mesh: cube.obj}\n"
+        "- {name: b, mesh: cube.obj, transform: {translate: [2.2, 0, 0]}}\n"
+    )
+    bake(scene, tmp_path / "all.npz")
+    bake(scene, tmp_path / "own.npz", occluders=("own",))
+    bake(scene, tmp_path / "named.npz", occluders=("a",))
+    both, own, named = (read_npz(tmp_path / f"{n}.npz").obscurance for n in ("all", "own", "named"))
+    assert len(both) == 16
+    assert both[:8].min() < 0.99
+    assert (own == 1).all()
+    assert (named[:8] == 1).all()
+    assert np.array_equal(named[8:], both[8:])
+    with pytest.raises(InputError, match="no object of that name"):
+        bake(scene, tmp_path / "none.npz", occluders=("c",))
+
+
+def test_a_fit_is_right_in_the_middle_of_large_triangles(text_mesh, tmp_path):
+    # a wide floor with a small lid over its middle: its vertices see nothing of the lid
+    lid = "v -9 0 -9\nv 9 0 -9\nv 9 0 9\nv -9 0 9\nv 0 0 0\nv -1 .2 -1\nv 1 .2 -1\nv 1 .2 1\nv -1 .2 1\n"
+    path = text_mesh(lid + "f 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\nf 6 7 8 9\n")
+    bake(path, tmp_path / "at.npz", samples=4096)
+    bake(path, tmp_path / "fit.npz", samples=65536, method="fit")
+    at, fit = (read_npz(tmp_path / f"{n}.npz") for n in ("at", "fit"))
+    assert at.obscurance[4] < 0.1
+    # the lid covers 1/81 of the floor; a value of 0.04 at the middle would darken a third of it
+    assert fit.obscurance[4] > 0.6
+    assert (fit.standard_error[:5] > 0).all()
+
+
+def test_smooth_falloffs_see_distance(text_mesh, tmp_path):
+    path = text_mesh(STEP)
+    bake(path, tmp_path / "step.npz")
+    falloff = {"falloff": "linear", "max_distance": "1r"}
+    bake(path, tmp_path / "soft.npz", falloff=falloff, bent_normal=True)
+    step, soft = (read_npz(tmp_path / f"{n}.npz") for n in ("step", "soft"))
+    assert (soft.obscurance[:4] > step.obscurance[:4]).all()
+    bent = soft.bent_normal
+    np.testing.assert_allclose(np.linalg.norm(bent[:6], axis=1), 1, rtol=1e-5)
+    assert bent[2, 2] < -0.1  # away from the wall
+
+
+def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
+    path, out = wavy(tmp_path), tmp_path / "out.npz"
+    monkeypatch.setattr("illumcli.jobs.ao_bake_cast.RAYS", 1 << 12)
+    run(path, [tmp_path / "one.npz"], Settings(), threads=1)
+    cast, rays = Caster._run, []
+
+    def breaks(self, what, pieces, ask):
+        for number, found in cast(self, what, pieces, ask):
+            rays.append(what)
+            if rays.count("values") == 12:
+                raise KeyboardInterrupt
+            yield number, found
+
+    monkeypatch.setattr(Caster, "_run", breaks)
+    with pytest.raises(KeyboardInterrupt):
+        run(path, [out], Settings(), threads=2)
+    assert not out.exists()
+    assert [p.name for p in tmp_path.glob(".*")] == [".out.npz.unfinished"]
+    monkeypatch.setattr(Caster, "_run", cast)
+    _, report = run(path, [out], Settings(), threads=2)
+    _, whole = run(path, [tmp_path / "two.npz"], Settings(), threads=2)
+    assert report.rays["values"] == whole.rays["values"] - 11 * (1 << 12)
+    assert np.array_equal(read_npz(out).obscurance, read_npz(tmp_path / "one.npz").obscurance)
+    assert np.array_equal(read_npz(out).standard_error, read_npz(tmp_path / "one.npz").standard_error)
+    assert list(tmp_path.glob(".*")) == []
+
+
+@pytest.mark.parametrize("kind", ["npz", "ply", "glb"])
+def test_the_same_is_kept_and_another_refused(text_mesh, tmp_path, kind):
+    path, out = text_mesh(STEP), tmp_path / f"out.{kind}"
+    _, first = bake(path, out, samples=16)
+    _, again = bake(path, out, samples=16)
+    assert (first.written, first.kept) == ([str(out)], [])
+    assert (again.written, again.kept) == ([], [str(out)])
+    with pytest.raises(OutputError, match="--force"):
+        bake(path, out, samples=32)
+    assert bake(path, out, samples=32, force=True)[1].written == [str(out)]
+
+
+def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
+    path = text_mesh(STEP)
+    for arguments, said in (
+        (["-o", "x.png"], "no writer"),
+        (["-o", "x.npz", "--tau", "2"], "--tau belongs to"),
+        (["-o", "x.npz", "--falloff", "linear"], "--max-distance"),
+        (["-o", "x.npz", "--samples", "4", "--target-error", "0.1"], "exclude each other"),
+        (["-o", "x.npz", "--max-distance", "2m"], "is no distance"),
+    ):
+        done = CliRunner().invoke(illum, ["ao-bake", str(path), *arguments])
+        assert done.exit_code != 0
+        assert said in done.output + str(done.exception)
+
+
+def test_the_command_prints_files_and_writes_a_report(text_mesh, tmp_path):
+    path, out = text_mesh(STEP), tmp_path / "deep" / "out.npz"
+    report = tmp_path / "report.json"
+    done = CliRunner().invoke(
+        illum, ["ao-bake", str(path), "-o", str(out), "--max-distance", "0.5r", "--report", str(report)]
+    )
+    assert done.exit_code == 0
+    assert done.stdout == f"{out}\n"
+    said = json.loads(report.read_text())
+    assert said["rmse"] > 0
+    assert said["unreferenced"] == 1
+    about = read_npz(out).about
+    assert about["parameters"]["falloff"] == {"falloff": "step", "max_distance": "0.5r"}

@@ -1,0 +1,68 @@
+"""Points with nothing above them, against a look at every vertex."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.geometry.order import compact
+from illumcli.rays.offsets import lifted
+from illumcli.visibility.horizon import Horizon
+
+F = np.float32
+
+
+def ball(count, seed=0):
+    """Points on the unit sphere; triangles only say that they are used."""
+    p = np.random.default_rng(seed).normal(size=(count, 3))
+    p = (p / np.linalg.norm(p, axis=1, keepdims=True)).astype(F)
+    return p, np.arange(count - count % 3, dtype=np.int32).reshape(-1, 3)
+
+
+def raised(p, n):
+    return lifted(np.asarray(p, float), n.astype(F), np.full(len(p), 0.01))
+
+
+def by_all(vertices, origins, n):
+    height = np.einsum("ij,ij->i", origins.astype(float), n.astype(float))
+    return (n.astype(float) @ vertices.astype(float).T).max(axis=1) <= height
+
+
+@pytest.mark.parametrize("count", [3, 9, 100, 3000, 20001])
+def test_every_point_of_a_ball_is_clear(count):
+    p, t = ball(count)
+    p = p[: t.size]
+    assert Horizon(p, t).clears(raised(p, p), p).all()
+
+
+def test_agrees_with_a_look_at_every_vertex():
+    p, t = ball(3000)
+    p = p * (1 + 0.05 * np.sin(9 * p[:, :1])).astype(F)
+    n = p / np.linalg.norm(p, axis=1, keepdims=True)
+    order = compact(p)
+    o, n = raised(p, n)[order], n[order]
+    cleared, truth = Horizon(p, t).clears(o, n), by_all(p, o, n)
+    assert 0.02 < truth.mean() < 0.98
+    assert np.array_equal(cleared, truth)
+
+
+def test_a_vertex_just_above_is_found_and_one_that_no_triangle_uses_is_not():
+    p, t = ball(3000)
+    p[-1] = p[0] * F(1.0001)
+    n = p[:1] / np.linalg.norm(p[:1])
+    assert not Horizon(p, t).clears(raised(p[:1], n), n)[0]
+    assert Horizon(p, t[:-1]).clears(raised(p[:1], n), n)[0]
+
+
+def test_nothing_at_all_hides_nothing():
+    empty = Horizon(np.zeros((0, 3), F), np.zeros((0, 3), np.int32))
+    assert empty.clears(np.zeros((2, 3), F), np.eye(3, dtype=F)[:2]).all()
+
+
+def test_an_order_holds_every_point_once_and_rows_are_near():
+    p = np.random.default_rng(3).random((10007, 3))
+    order = compact(p)
+    assert np.array_equal(np.sort(order), np.arange(len(p)))
+    rows = p[order[:8000]].reshape(-1, 8, 3)
+    assert np.ptp(rows, axis=1).max(axis=1).mean() < 0.15
+    assert compact(np.zeros((5, 3))).tolist() == [0, 1, 2, 3, 4]

@@ -20,7 +20,7 @@ FAN = 8
 GROUP = 64  # points asked about together
 GROUPS_AT_ONCE = 64
 MOST_CLUSTERS = 1 << 13
-"""Groups that look at more clusters than this, on average, cast rays instead."""
+"""Groups that look at more clusters than this cast rays instead."""
 PROBES = 64
 CLEARLY = 1e-5
 
@@ -75,11 +75,12 @@ class Horizon:
                 self._levels = levels
         return self._levels
 
-    def clears(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
+    def clears(self, origins: Vectors, n: Vectors, most: int = MOST_CLUSTERS) -> NDArray[np.bool_]:
         """(M,) True where no occluder reaches above the plane through an origin with normal `n`.
 
         Origins are those of rays, off the surface by more than the rounding of this test; points in a row
-        should lie close together. False may also mean that it was too much work to tell.
+        should lie close together. False may also mean that it was too much work to tell: that a group of
+        points would look at more than `most` clusters.
         """
         if not len(self._points):
             return np.ones(len(origins), bool)
@@ -88,18 +89,17 @@ class Horizon:
         left = np.flatnonzero(out)
         for first in range(0, len(left), GROUP * GROUPS_AT_ONCE):
             lane = left[first : first + GROUP * GROUPS_AT_ONCE]
-            out[lane] = self._below(np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64))
+            o, up = np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64)
+            out[lane] = self._below(o, up, most)
         return out
 
-    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
         """(M,) True where all points are below, for points that no probe is above."""
         planes = groups(o, n)
-        group, cluster = self._near(planes)
+        group, cluster, told = self._near(planes, most)
         out = np.zeros(len(o), bool)
-        if group is None:
-            return out
         bounds = np.searchsorted(group, np.arange(len(planes.centre) + 1))
-        for g in range(len(planes.centre)):
+        for g in np.flatnonzero(told):
             lane = slice(g * GROUP, (g + 1) * GROUP)
             first = cluster[bounds[g] : bounds[g + 1]] * FAN
             rows = (first[:, None] + np.arange(FAN)).ravel()
@@ -108,18 +108,22 @@ class Horizon:
             out[lane] = (n[lane] @ near.T).max(axis=1, initial=-np.inf) <= height
         return out
 
-    def _near(self, planes: Groups) -> tuple[NDArray[np.int64] | None, NDArray[np.int64]]:
-        """Pairs (group, cluster of `FAN` points), by group, that may have a point above a plane; None where
-        they are too many."""
+    def _near(
+        self, planes: Groups, most: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Pairs (group, cluster of `FAN` points), by group, that may have a point above a plane, and for each
+        group whether they are all there: groups with more than `most` are left out."""
         count = len(planes.centre)
+        told = np.ones(count, bool)
         group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all
         for level in reversed(self._tree()):
+            few = np.bincount(group, minlength=count) <= most // FAN
+            told &= few
+            group, cluster = group[few[group]], cluster[few[group]]
             group = np.repeat(group, FAN)
             cluster = (cluster[:, None] * FAN + np.arange(FAN)).ravel()
             inside = cluster < len(level.centre)
             group, cluster = group[inside], cluster[inside]
-            if len(group) > MOST_CLUSTERS * count:
-                return None, cluster
             axis = planes.axis[group]
             away = level.centre[cluster] - planes.centre[group]
             upright = np.einsum("ij,ij->i", axis, level.axis[cluster])
@@ -129,7 +133,7 @@ class Horizon:
             far = np.sqrt(np.einsum("ij,ij->i", away, away)) + width + np.maximum(high, -low)
             kept = reach + planes.spread[group] * far + planes.room[group] > 0
             group, cluster = group[kept], cluster[kept]
-        return group, cluster
+        return group, cluster, told
 
 
 def groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> Groups:

@@ -88,6 +88,14 @@ def main() -> None:
         _die_by(signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     except BrokenPipeError:
         _die_by(signal.SIGPIPE)
+    except OSError as error:  # an operating system that refuses what nobody expects it to
+        place = f"{error.filename}: " if error.filename else ""
+        click.echo(f"{place}{error.strerror or error}; check the disk and the permissions", err=True)
+        sys.exit(1)
+    except ImportError as error:  # most often too little memory to map a library
+        said = str(error).strip().splitlines()[-1:] or ["no reason given"]
+        click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
+        sys.exit(1)
     except MemoryError:
         click.echo("out of memory; make the film, the meshes or the samples smaller", err=True)
         sys.exit(4)

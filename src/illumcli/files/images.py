@@ -114,6 +114,8 @@ class ImageWriter:
         self._clamped = 0
         self._hash = hashlib.blake2b(digest_size=32)
         self._written: Written | None = None
+        if _no_utf8(os.path.realpath(path)):
+            raise InputError(f"{_shown(os.path.realpath(path))}: {_NO_UTF8}")
         output = oiio.ImageOutput.create(self._format)
         if output is None:
             raise OutputError(f"{self._named}: {oiio.geterror()}; install one that writes {suffix}")
@@ -215,6 +217,8 @@ class ImageWriter:
         message = self._output.geterror()
         if not success or message:
             self.discard()
+            if "OUT_OF_MEMORY" in message or "bad_alloc" in message:
+                raise MemoryError
             raise self._failure(message or "no reason given")
 
     def _failure(self, fact: str) -> OutputError:
@@ -389,6 +393,8 @@ class _Source:
         self._path = path
         if not path.is_file():
             raise InputError(f"{path}: no such file" if not path.exists() else f"{path}: not a file")
+        if _no_utf8(os.fspath(path)):
+            raise InputError(f"{_shown(os.fspath(path))}: {_NO_UTF8}")
         raw = oiio.ImageSpec()
         raw.attribute("oiio:UnassociatedAlpha", 1)  # values as the file has them
         opened = oiio.ImageInput.open(os.fspath(path), raw)
@@ -398,8 +404,13 @@ class _Source:
         self._format = opened.format_name()
         if self._format == "openexr" and self._spec.get_int_attribute("oiio:subimages", 1) > 1:
             raise InputError(f"{path}: an EXR of several parts; join them (oiiotool IN --siappendall -o OUT)")
-        if self._format == "png" and not _ends_with(path, _PNG_END):
-            raise self._refusal("its end is missing")
+        if self._format == "png":
+            try:
+                whole = _ends_with(path, _PNG_END)
+            except OSError as error:
+                raise self._refusal(error.strerror or str(error)) from error
+            if not whole:
+                raise self._refusal("its end is missing")
 
     def __enter__(self) -> Self:
         return self
@@ -459,6 +470,19 @@ class _Source:
     def _refusal(self, message: str) -> InputError:
         fact = " ".join(message.split()) or "no reason given"
         return InputError(f"{self._path}: cannot be read as an image: {fact}; make or fetch the file again")
+
+
+_NO_UTF8 = "the path is not UTF-8, which image files need; rename the file or its folder"
+
+
+def _no_utf8(path: str) -> bool:
+    """Does the path hold bytes that are not UTF-8?"""
+    return any("\udc80" <= c <= "\udcff" for c in path)
+
+
+def _shown(path: str) -> str:
+    """The path with such bytes as \\xNN."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
 def _ends_with(path: Path, tail: bytes) -> bool:

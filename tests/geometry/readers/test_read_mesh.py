@@ -119,3 +119,15 @@ def test_real_meshes_keep_their_counts(
         there = {edge for column in edges for edge in column.tolist()}
         assert len(there) == 3 * faces
         assert there == {edge % vertices * vertices + edge // vertices for edge in there}
+
+
+@pytest.mark.parametrize("name", ["../secret.mtl", "/proc/kcore", "/proc/self/mem", "out/secret.mtl"])
+def test_companions_outside_the_folder_are_not_looked_at(tmp_path, monkeypatch, name):
+    from illumcli.geometry.readers import companions
+
+    (tmp_path / "secret.mtl").write_text("map_Kd x.png\n")
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    (folder / "out").symlink_to(tmp_path)
+    (folder / "m.obj").write_text(f"mtllib {name}\nv 0 0 0\n")
+    assert companions(folder / "m.obj") == []

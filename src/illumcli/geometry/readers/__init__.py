@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 import re
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
@@ -64,10 +65,16 @@ def companions(path: Path) -> list[Path]:
 
 
 def _named(path: Path, pattern: bytes) -> list[Path]:
-    """The paths beside `path` that its text gives: each whole, and by the last of its words."""
+    """The paths that the text of `path` gives, each whole and word by word; none outside its folder, which no
+    reader follows."""
     from urllib.parse import unquote
 
-    data = path.read_bytes()
+    from illumcli.geometry.readers._files import beside, content
+
+    try:
+        data = content(path)
+    except InputError:  # whoever reads the file says what is wrong with it
+        return []
     word = b"mtllib" if b"mtllib" in pattern else b"map_" if b"map_" in pattern else b'"uri"'
     if word not in data:
         return []
@@ -77,5 +84,6 @@ def _named(path: Path, pattern: bytes) -> list[Path]:
         if "\0" in said or said.startswith("data:"):
             continue
         for name in (said, *said.split()):
-            found[path.parent / unquote(name.replace("\\", "/"))] = None
+            with suppress(InputError):
+                found[beside(path, unquote(name), str(path))] = None
     return list(found)

@@ -1,0 +1,47 @@
+"""Burley: a diffuse surface whose edges darken when smooth and brighten towards the light when rough.
+
+response = n_l * rho / pi * (1 + (f - 1) (1 - n_l)^5) * (1 + (f - 1) (1 - n_v)^5)
+f = 1/2 + 2 r (l.h)^2
+
+A fit to the measured materials of the MERL database, as a BRDF times the cosine; reciprocal. Smooth, it loses
+up to three quarters at grazing, as Fresnel's law takes light away from below a coat; rough, it gains up to
+6.25 times, and a white surface reflects more than arrives. Only the diffuse part of the paper's model.
+
+References
+----------
+Burley, B. (2012). Physically-based shading at Disney. SIGGRAPH '12 course notes, section 5.3.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, like
+from illumcli.models._base import IlluminationModel
+from illumcli.models._lobes import tint
+from illumcli.models._parameters import Albedo, Share
+
+
+class Burley(IlluminationModel):
+    model: Literal["burley"] = "burley"
+    diffuse: Albedo = (0.8, 0.8, 0.8)
+    """rho, the albedo seen and lit from the normal."""
+    roughness: Share = 0.5
+    """r: 0 smooth, edges dark; 1 rough, edges bright towards the light."""
+
+    reciprocal: ClassVar[bool] = True
+    physical: ClassVar[bool] = True
+
+    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes, s_s: Lanes) -> Vectors:
+        """(N, 3) n_l * rho / pi and both factors, of which (l.h)^2 = |l + v|^2 / 4."""
+        (r,) = like(n_l, self.roughness)
+        edge = 0.5 + r * s_s / 2
+        fall = (1 + (edge - 1) * _fifth(1 - n_l)) * (1 + (edge - 1) * _fifth(1 - n_v))
+        return tint(self.diffuse, fall * n_l / np.pi)
+
+
+def _fifth(x: Lanes) -> Lanes:
+    square = x * x
+    return square * square * x

@@ -1,4 +1,4 @@
-"""Locales, time zones, hash seeds, odd names, little memory, a thousand runs: the same bytes, and no debris."""
+"""Locales, time zones, odd names, little memory, a thousand runs: the same bytes, and no debris."""
 
 from __future__ import annotations
 

@@ -23,9 +23,9 @@ AT_ONCE = 1 << 18
 """Rays per call: an interrupt waits for one call at most."""
 FARTHEST = F(1e37)
 """A limit that stands for none."""
-TURN = F(2.0**-20)
+TURN = F(2.0**-19)
 """By how much [rad] a ray that missed is turned for its second shot: Embree's robust mode can miss at an
-exact vertex (0.2 to 1 % of rays aimed at one), never twice."""
+exact vertex (0.2 to 1 % of rays aimed at one); of the second shots 0 in 3.2 million rays, 2 at 2^-20."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class Tracer:
         return own
 
     def closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        """What each ray hits first; a ray that misses is shot a second time, turned by 2^-20 rad."""
+        """What each ray hits first; a ray that misses is shot a second time, turned by 2^-19 rad."""
         hits = self._closest(origins, directions)
         again = np.flatnonzero(hits.triangle < 0)
         if again.size and self.triangle_count:

@@ -10,6 +10,9 @@ from illumcli.jobs.stress.rays import icosphere
 from illumcli.jobs.stress.scenes import BALL, FLOOR, scene
 
 Faces = NDArray[np.int64]
+RAYS = 32
+"""Per pixel. Where a face runs the other way round the ray core rounds the place of a hit differently, by 1e-8
+radii, and now and then a ray passes an edge on the other side."""
 
 
 def rows(room: Room, quick: bool) -> list[Row]:
@@ -50,8 +53,14 @@ def _written(room: Room, film: dict[str, int]) -> list[Row]:
     for name, (v, f) in variants(vertices, faces).items():
         other = _w(room, v, f, film)
         different = int(np.count_nonzero(other != reference))
-        worst = f"{different} of {reference.size} pixels, by {float(np.abs(other - reference).max()):.2g}"
-        found.append(Row(f"mesh: {name}", "w is the same bits", worst, different == 0))
+        apart = float(np.abs(other - reference).max())
+        worst = f"{different} of {reference.size} pixels, by {apart:.2g}"
+        if "revers" in name:
+            check = f"w within 2/{RAYS} of all, the same bits in all but 0.1 %"
+            passed = different <= 1e-3 * reference.size and apart <= 2.01 / RAYS
+        else:
+            check, passed = "w is the same bits", different == 0
+        found.append(Row(f"mesh: {name}", check, worst, passed))
     return found
 
 
@@ -59,7 +68,7 @@ def _w(room: Room, vertices: NDArray[np.float64], faces: Faces, film: dict[str, 
     text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
     text += "".join(f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist())
     thing = {"mesh": room.file(f"mesh{room.pictures}.obj", text.encode())}
-    said = scene(thing, lights=[], film=film, obscurance={"samples": 32}, shading="constant")
+    said = scene(thing, lights=[], film=film, obscurance={"samples": RAYS}, shading="constant")
     return room.picture(said, ("obscurance",))[0]["obscurance.Y"]
 
 

@@ -1,4 +1,4 @@
-"""`illum sweep` as a user meets it: which variants, their names, the same bytes as single renders, going on."""
+"""`illum sweep` as a user meets it: which variants, their names, the bytes of single renders, going on."""
 
 from __future__ import annotations
 
@@ -104,7 +104,8 @@ def test_commas_inside_brackets_and_quotes_part_nothing():
 
 def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
     done = illum("sweep", scene, "-D", "materials.clay.exponent=4:256:3log", "-D", "ambient=0.1,0.6",
-                 "--table", "t.csv", "--sheet", "s.png", "--reference", "1", "--report", "r.json")  # fmt: skip
+                 "--table", "t.csv", "--sheet", "s.png", "--reference", "1",
+                 "--report", "r.json")  # fmt: skip
     assert done.returncode == 0, done.stderr
     names = done.stdout.split()
     assert names[:2] == ["ball-4-0.1.png", "ball-4-0.6.png"]

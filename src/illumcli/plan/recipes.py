@@ -156,9 +156,14 @@ def may_vary(scene: Scene, purpose: str) -> bool:
     return models is None or any(paths(model, purpose) for model in models)
 
 
+def sends(light: Light) -> bool:
+    """Does a light send anything?"""
+    return any(light.color())
+
+
 def active_lights(scene: Scene) -> dict[str, Light]:
     """The lights that send anything, by name."""
-    return {name: light for name, light in scene.named_lights().items() if any(light.color())}
+    return {name: light for name, light in scene.named_lights().items() if sends(light)}
 
 
 def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
@@ -346,7 +351,7 @@ def _varying(scene: Scene, purpose: str) -> dict[str, str]:
 def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) -> list[Recipe]:
     """What one light takes: where it arrives, its shadow, the response to it."""
     lit, reach, shadow = f"lit:{name}", f"reach:{name}", f"shadow:{name}"
-    if not any(light.color()):
+    if not sends(light):
         dark = partial(stages.black)
         return [Recipe.of(dark, f"light:{name}"), Recipe.of(partial(stages.no_shadow), shadow)]
     place = light.placed()

@@ -1,0 +1,152 @@
+"""What does each skip save? Rays and evaluations of a scene made for it, with the skip and without.
+
+A skip is turned off by putting a function in the place of the one that decides. Both pictures must agree in
+every value. `python benchmarks/skips.py [WIDTH]`; figures are counts and do not depend on the machine.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from illumcli.models._base import IlluminationModel
+from illumcli.plan import recipes, stages
+from illumcli.plan.execute import Tally, bands, run_once
+from illumcli.plan.plan import plan
+from illumcli.scene.load import load
+from illumcli.shading import direct
+from illumcli.visibility import arriving
+
+SCENE = """
+version: 1
+camera: {position: [1.5, 1.6, 3], target: [0, 0.4, 0], fov: 40}
+film: {width: WIDTH, height: WIDTH, samples: 2}
+ambient: 0.3
+obscurance: {samples: 16}
+materials:
+  clay: {model: blinn_phong, diffuse: [0.8, 0.2, 0.1], specular: 0.4, exponent: 20}
+  grey: {model: lambert, diffuse: 0.7}
+objects:
+  - {mesh: {shape: plane, size: [6, 6]}, material: grey}
+  - {name: ball, mesh: {shape: sphere, radius: 0.5}, material: clay, transform: {translate: [0, 0.5, 0]}}
+lights:
+  - {light: point, name: key, position: [2, 3, 2], intensity: 9}
+  - {light: spot, name: rim, position: [-2, 3, -1], target: [0, 0, 0], angle: 14, intensity: 20}
+"""
+
+
+@dataclass(frozen=True)
+class Skip:
+    """A skip, the scene that shows it, and how it is turned off."""
+
+    name: str
+    overrides: tuple[str, ...] = ()
+    off: tuple[tuple[object, str, object], ...] = ()
+    layers: tuple[str, ...] = ("beauty",)
+    layers_off: tuple[str, ...] | None = None
+
+
+def everywhere(light, frame, position, n=None):
+    """Every lane is asked about, those that get nothing with strength 0."""
+    got = light.arriving(position, frame)
+    reached = got.strength > 0
+    if n is not None:
+        reached &= arriving.dot(n, got.l) > 0
+    strength = np.where(reached, got.strength, 0).astype(np.float32)
+    lane = np.arange(len(position), dtype=np.int32)
+    return arriving.Lit(lane, len(position), got.l, got.distance, strength)
+
+
+def dimmed(lit, shadow):
+    """Every lit point is evaluated, those in shadow with strength 0."""
+    return replace(lit, strength=lit.strength * shadow.take(lit.lane))
+
+
+def yes(*_):
+    return True
+
+
+def no(*_):
+    return False
+
+
+def _directions(_):
+    return frozenset("nlvt")
+
+
+DARK = ((recipes, "sends", yes),)
+plan_module = import_module("illumcli.plan.plan")
+AMBIENT = ((recipes, "is_ambient", yes), (plan_module, "is_ambient", yes))
+SKIPS = (
+    Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
+    Skip("points a light does not reach", (), ((stages, "lit_lanes", everywhere),)),
+    Skip("points in shadow", (), ((stages, "free", dimmed),)),
+    Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
+    Skip("ambient light of 0", ("ambient=0",), AMBIENT),
+    Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),
+    Skip("emission of 0", (), ((recipes, "is_emissive", yes),)),
+    Skip(
+        "directions nobody reads", ("objects.ball.material=grey",), ((recipes, "reached_words", _directions),)
+    ),
+    Skip("layers nobody asks for", (), (), ("depth",), ("depth", "beauty")),
+    Skip("ids alone", (), (), ("object_id",), ("object_id", "beauty")),
+)
+
+
+def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict[str, int]]:
+    """The layers of the scene, and what making them took."""
+    counts = {"rays": 0, "responses": 0, "lobes": 0, "steps": 0}
+    response, evaluate = direct.response, direct.evaluate
+
+    def counted(models, lobes, material, lit, *rest):
+        counts["responses"] += len(lit.lane)
+        return response(models, lobes, material, lit, *rest)
+
+    def counted_lobes(lobes, given):
+        counts["lobes"] += len(lobes) * len(given["n"])
+        return evaluate(lobes, given)
+
+    loaded = load(path, skip.overrides)
+    made = plan(loaded.scene, loaded, layers)
+    tally = Tally()
+    with patch.object(direct, "response", counted), patch.object(direct, "evaluate", counted_lobes):
+        parts = list(bands(made, run_once(made, tally), made.views[0], 1, tally))
+    counts["rays"] = sum(tally.rays.values())
+    counts["steps"] = len(made.once) + len(made.tile)
+    return {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}, counts
+
+
+def compared(width: int, each: Callable[[Skip], bool] = yes) -> Iterator[tuple[str, dict, dict, bool]]:
+    """Per skip: its name, counts with it and without, and whether the pictures agree in every value."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "scene.yaml")
+        path.write_text(SCENE.replace("WIDTH", str(width)))
+        for skip in filter(each, SKIPS):
+            on, few = render(path, skip, skip.layers)
+            with ExitStack() as turned_off:
+                for owner, name, other in skip.off:
+                    put = patch.object(owner, name, other)
+                    turned_off.enter_context(put)
+                off, many = render(path, skip, skip.layers_off or skip.layers)
+            same = all(np.array_equal(on[name], off[name]) for name in skip.layers)
+            yield skip.name, few, many, same
+
+
+def main() -> None:
+    width = int(sys.argv[1]) if len(sys.argv) > 1 else 128
+    names = ("rays", "responses", "lobes", "steps")
+    print(f"{'skip':34}" + "".join(f"{f'{n} with':>16}{'without':>12}" for n in names) + "  same")
+    for name, few, many, same in compared(width):
+        print(f"{name:34}" + "".join(f"{few[n]:>16,}{many[n]:>12,}" for n in names) + f"  {same}")
+
+
+if __name__ == "__main__":
+    main()

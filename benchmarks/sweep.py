@@ -97,9 +97,8 @@ def shell(runs: int) -> None:
         value = f"materials.subject.specular={0.1 + k / 100}"
         command = [*python, "-m", "illumcli", "render", "scene.yaml", "-D", value, "-o", f"loop{k}.png"]
         takes.append(seconds(command))
-    print(
-        f"shell loop: best {min(takes):.3f} s, six imports {min(floors):.3f} s, ratio {min(takes) / min(floors):.2f}"
-    )
+    best, floor = min(takes), min(floors)
+    print(f"shell loop: best {best:.3f} s, six imports {floor:.3f} s, ratio {best / floor:.2f}")
     print(f"  median ratio {np.median(np.array(takes) / floors):.2f}")
 
 
@@ -139,9 +138,8 @@ def stored() -> None:
         load = time.perf_counter() - start
         name = described(entry.path)["about"]["buffer"]
         total += entry.bytes
-        print(
-            f"  {name:24}{entry.bytes:>12,} bytes, own step {cold.seconds.get(name, 0):8.4f} s, load {load:.4f} s"
-        )
+        made = cold.seconds.get(name, 0)
+        print(f"  {name:24}{entry.bytes:>12,} bytes, own step {made:8.4f} s, load {load:.4f} s")
     print(f"1920 x 1080, 1 sample: {total:,} bytes")
 
 

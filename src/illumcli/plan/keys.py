@@ -10,8 +10,11 @@ import hashlib
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+import numpy
 
 from illumcli.demand import Recipe
 
@@ -48,14 +51,20 @@ def identity(function: Callable[..., Any]) -> str:
     return f"{function.__module__}.{function.__qualname__}"
 
 
+def _installed(library: str) -> list[str]:
+    """The version of a library by the name of its metadata folder: nothing is imported for it, and
+    `importlib.metadata` takes longer than all the hashing."""
+    spec = find_spec(library)
+    places = spec.submodule_search_locations if spec else None
+    return sorted(found.name for place in places or () for found in Path(place).parent.glob(f"{library}-*"))
+
+
 @cache
 def code() -> str:
     """Hash of the sources that make what is kept, and of the numpy, ray core and processor they run on.
 
     Processors differ in the instructions they have, and with them the last bits of their results.
     """
-    from importlib.metadata import version
-
     features: dict[str, bool] = import_module("numpy._core._multiarray_umath").__cpu_features__
     digest = hashlib.blake2b(digest_size=16)
     root = Path(__file__).parents[1]
@@ -63,6 +72,6 @@ def code() -> str:
         place = root / name
         for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
             digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes())
-    libraries = {name: version(name) for name in ("numpy", "embreex")}
+    libraries = [numpy.__version__, *_installed("embreex")]
     digest.update(repr((libraries, sorted(name for name, has in features.items() if has))).encode())
     return digest.hexdigest()

@@ -24,7 +24,7 @@ from illumcli.rays.tracer import Tracer
 from illumcli.visibility.horizon import Horizon
 from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
 
-RAYS = 1 << 20
+RAYS = 1 << 18
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
 LANES = 1 << 14
 PAIRS_SHARE, FEWEST_PAIRS = 100, 512

@@ -23,7 +23,7 @@ from illumcli.visibility.horizon import Horizon
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
-RAYS_AT_ONCE = 1 << 15
+RAYS_AT_ONCE = 1 << 14
 """Directions, origins and answers of as many rays stay in a core's cache."""
 CLUSTERS_PER_RAY = 4
 """To look at as many clusters of occluders takes a point half as long as a ray: for more, rays are cast."""

@@ -45,6 +45,10 @@ allow_option = click.option(
     help="Let scenes read files below DIR too (also: ILLUM_ALLOW).",
 )
 
+strict_option = click.option(
+    "--strict", is_flag=True, help="Refuse meshes and textures that need repairs, instead of counting them."
+)
+
 no_cache_option = click.option(
     "--no-cache",
     "cache",

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from illumcli.cli._options import SCENE, overrides_option
+from illumcli.cli._options import SCENE, overrides_option, strict_option
 
 _EPILOG = """\b
 Examples:
@@ -104,6 +104,7 @@ class _Distance(click.ParamType):
     "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
 )
 @click.option("--force", is_flag=True, help="Replace files that differ.")
+@strict_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @click.option("-v", "--verbose", is_flag=True, help="Say what was skipped and where time went.")
 def ao_bake(
@@ -121,6 +122,7 @@ def ao_bake(
     overrides: tuple[str, ...],
     report: Path | None,
     force: bool,
+    strict: bool,
     quiet: bool,
     verbose: bool,
     **more: Any,
@@ -132,6 +134,7 @@ def ao_bake(
     """
     from illumcli.cli._progress import reporter
     from illumcli.jobs.ao_bake import Settings, run, write_report
+    from illumcli.jobs.render import told_repairs
 
     if samples is not None and target_error is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")
@@ -152,14 +155,14 @@ def ao_bake(
         occluders=occluders or ("scene",),
         **more,
     )
-    paths, done = run(source, outputs, settings, overrides, threads, force, reporter(quiet))
+    paths, done = run(source, outputs, settings, overrides, threads, force, reporter(quiet), strict)
     for path in paths:
         click.echo(path)
     if not quiet:
         for kept in done.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for what, count in done.repairs.items():
-            click.echo(f"{source}: {what}: {count}", err=True)
+        for line in told_repairs(done.repairs, done.repairs_first):
+            click.echo(f"{source}: {line}", err=True)
         for text in dict.fromkeys(done.left_out):
             click.echo(f"left out: {text}", err=True)
         for text in done.warnings:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import no_cache_option, overrides_option, scenes_argument
+from illumcli.cli._options import no_cache_option, overrides_option, scenes_argument, strict_option
 
 
 @click.command()
@@ -24,6 +24,7 @@ from illumcli.cli._options import no_cache_option, overrides_option, scenes_argu
     "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
 )
 @click.option("--force", is_flag=True, help="Replace files that differ.")
+@strict_option
 @no_cache_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @click.option(
@@ -38,6 +39,7 @@ def render(
     threads: int | None,
     report: Path | None,
     force: bool,
+    strict: bool,
     cache: bool,
     quiet: bool,
     verbose: bool,
@@ -53,18 +55,19 @@ def render(
       illum render bunny.obj
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs.render import run, write_report
+    from illumcli.jobs.render import run, told_repairs, write_report
 
     reports = []
     for scene in scenes:
-        paths, done = run(scene, overrides, pattern, only, seed, threads, force, reporter(quiet), cache)
+        progress = reporter(quiet)
+        paths, done = run(scene, overrides, pattern, only, seed, threads, force, progress, cache, strict)
         reports.append(done)
         for path in paths:
             click.echo(path)
         for kept in [] if quiet else done.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for what, count in {} if quiet else done.repairs.items():
-            click.echo(f"{scene}: {what}: {count}", err=True)
+        for line in [] if quiet else told_repairs(done.repairs, done.repairs_first):
+            click.echo(f"{scene}: {line}", err=True)
         for warning in done.warnings:
             click.echo(warning, err=True)
         if verbose:

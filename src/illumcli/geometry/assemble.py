@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, columns
 from illumcli.frame import Frame
+from illumcli.geometry.faults import Fault, faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.triangulate import triangulate
 
@@ -40,6 +41,9 @@ class World:
     polygons: NDArray[np.int32]  # (T,) polygon numbers
     objects: NDArray[np.int32]  # (T,) object numbers
     repairs: Mapping[str, int]
+    """What was wrong with the meshes: class -> count."""
+    first: Mapping[str, str]
+    """Where each class occurs first, as `face 3 of object 1`."""
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.triangles, self.corners, self.polygons, self.objects):
@@ -94,6 +98,8 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
     """
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
     repairs: dict[str, int] = {}
+    places: dict[str, str] = {}
+    known: dict[int, list[Fault]] = {}
     first = {"vertex": 0, "corner": 0, "polygon": 0, "triangle": 0}
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
@@ -119,11 +125,12 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
         first["corner"] += len(mesh.corners)
         first["polygon"] += mesh.polygon_count
         first["triangle"] += len(own)
-        for what, count in mesh.repairs.items():
-            repairs[what] = repairs.get(what, 0) + count
-        unused = len(in_use) - int(np.count_nonzero(in_use))
-        if unused:
-            repairs["unused vertices"] = repairs.get("unused vertices", 0) + unused
+        if id(mesh) not in known:
+            known[id(mesh)] = faults(mesh)
+        for fault in known[id(mesh)]:
+            repairs[fault.what] = repairs.get(fault.what, 0) + fault.count
+            if fault.first:
+                places.setdefault(fault.what, f"{fault.first} of object {number + 1}")
     if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
     centre = (low + high) / 2
@@ -138,6 +145,7 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
         polygons=_joined(polygons, np.zeros(0, np.int32)),
         objects=_joined(objects, np.zeros(0, np.int32)),
         repairs=repairs,
+        first=places,
     )
 
 

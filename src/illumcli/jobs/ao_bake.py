@@ -33,7 +33,7 @@ from illumcli.geometry.assemble import World, cofactors
 from illumcli.geometry.mesh import Mesh
 from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders, PartFile
 from illumcli.jobs.ao_bake_points import Vertices, vertex_points
-from illumcli.jobs.render import peak_memory
+from illumcli.jobs.render import peak_memory, refuse_repairs
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
 from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
@@ -96,6 +96,7 @@ class Report:
     rays: dict[str, int] = field(default_factory=dict)
     samples: dict[int, int] = field(default_factory=dict)  # rays a point -> points
     repairs: dict[str, int] = field(default_factory=dict)
+    repairs_first: dict[str, str] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -124,6 +125,7 @@ def run(
     threads: int | None = None,
     force: bool = False,
     progress: Progress = lambda what, done, of: None,
+    strict: bool = False,
 ) -> tuple[list[Path], Report]:
     """Bake a mesh file, or every mesh of a scene in its place; the files, written or kept, and the report.
 
@@ -143,7 +145,9 @@ def run(
     threads = threads or len(os.sched_getaffinity(0))
     report = Report(str(path), content, settings.seed, threads, target_error=settings.target_error)
     report.vertices, report.triangles = len(world.vertices), len(world.triangles)
-    report.repairs = dict(world.repairs)
+    report.repairs, report.repairs_first = dict(world.repairs), dict(world.first)
+    if strict:
+        refuse_repairs(str(path), report.repairs, report.repairs_first)
     due = [each for each in outputs if not is_kept(each, content, force)]
     report.kept = [str(each) for each in outputs if each not in due]
     clock.lap(report, "read")

@@ -57,6 +57,7 @@ class Report:
     kept: list[str] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
     repairs: dict[str, int] = field(default_factory=dict)
+    repairs_first: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
     spared: dict[str, int] = field(default_factory=dict)
@@ -93,10 +94,12 @@ def run(
     force: bool = False,
     progress: Progress = lambda what, done, of: None,
     cache: bool = True,
+    strict: bool = False,
 ) -> tuple[list[Path], Report]:
     """Render a scene; the paths of every image, written or kept, and the report.
 
     With `cache`, what earlier runs kept is used and what later runs may use is kept; the files are the same.
+    With `strict`, meshes and textures that need repairs are refused.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def run(
     start = time.perf_counter()
     work = prepared(load(path, overrides), pattern, only, seed)
     store = opened_store() if cache else None
-    report = rendered(work, store, Memory(), threads, force, progress)
+    report = rendered(work, store, Memory(), threads, force, progress, strict)
     if store is not None:
         store.finish()
         report.warnings += [store.warning] if store.warning else []
@@ -149,8 +152,9 @@ def rendered(
     threads: int | None = None,
     force: bool = False,
     progress: Progress = lambda what, done, of: None,
+    strict: bool = False,
 ) -> Report:
-    """Render what is due and say what happened."""
+    """Render what is due and say what happened; `strict` refuses what needs repairs."""
     start = time.perf_counter()
     steps = work.plan
     threads = threads or len(os.sched_getaffinity(0))
@@ -170,6 +174,9 @@ def rendered(
             report.skipped = dict(narrowed.skipped)
             shared = run_once(narrowed, tally, artifacts)
             report.repairs |= repairs(shared)
+            report.repairs_first |= shared["repairs"].first
+            if strict:
+                refuse_repairs(report.scene, report.repairs, report.repairs_first)
             report.clamped += _render_view(
                 work.scene, narrowed, shared, view, mine, threads, tally, progress, artifacts
             )
@@ -177,6 +184,21 @@ def rendered(
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
     return report
+
+
+def refuse_repairs(place: str, repairs: Mapping[str, int], first: Mapping[str, str]) -> None:
+    """Raise InputError where anything needs a repair: every class, its count and its first place."""
+    if repairs:
+        way = "mend it, or leave --strict out"
+        raise InputError([f"{place}: {line}; {way}" for line in told_repairs(repairs, first)])
+
+
+def told_repairs(repairs: Mapping[str, int], first: Mapping[str, str]) -> list[str]:
+    """A line per class of repairs."""
+    return [
+        f"{what}: {count}{f', the first is {first[what]}' if what in first else ''}"
+        for what, count in repairs.items()
+    ]
 
 
 def repairs(shared: Mapping[str, Any]) -> dict[str, int]:

@@ -87,11 +87,12 @@ class Repairs:
     """What was wrong with meshes and put right."""
 
     repairs: Mapping[str, int]
+    first: Mapping[str, str]
 
 
 def repairs(world: World) -> Repairs:
-    """Class of fault -> count, all meshes together."""
-    return Repairs(world.repairs)
+    """Class of fault -> count, all meshes together, and where it occurs first."""
+    return Repairs(world.repairs, world.first)
 
 
 def tracer_over(world: World) -> Tracer:

@@ -38,10 +38,10 @@ illum brdf ward ashikhmin_shirley --view sphere --view lobe -o out/streaks.png
 illum verify --only ward
 ```
 
-![Forty teapots: a row per model, a column per parameter](gallery.png)
+![Forty teapots: a column per model, a row per parameter](gallery.png)
 
-The rows, from the top: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as copper
-and as plastic; Cook-Torrance's distributions; Ward; Ashikhmin-Shirley; Kajiya-Kay, Poulin-Fournier and
+The columns, from the left: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as
+copper and as plastic; Cook-Torrance's distributions; Ward; Ashikhmin-Shirley; Kajiya-Kay, Poulin-Fournier,
 Lafortune. The values stand in [scenes/gallery.yaml](../scenes/gallery.yaml). One command renders it, on the
 teapot or on any mesh; other scenes show one thing each:
 

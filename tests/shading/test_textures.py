@@ -30,6 +30,13 @@ def test_v_grows_upwards_from_the_bottom_row():
     )
 
 
+def test_an_edge_belongs_to_the_texel_that_begins_there():
+    np.testing.assert_array_equal(
+        nearest(FOUR, at(0, 0, 0.5, 0, 0, 0.5, 0.5, 0.5), "repeat")[:, 0], [3, 4, 1, 2]
+    )
+    np.testing.assert_array_equal(nearest(FOUR, at(0, 0, 1, 1), "clamp")[:, 0], [3, 2])
+
+
 def test_bilinear_at_the_centres_is_the_texels_and_halfway_their_mean():
     np.testing.assert_array_equal(bilinear(FOUR, at(0.25, 0.25, 0.75, 0.75), "repeat")[:, 0], [3, 2])
     np.testing.assert_array_equal(bilinear(FOUR, at(0.5, 0.5), "repeat")[:, 0], [2.5])

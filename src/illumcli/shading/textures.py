@@ -36,13 +36,13 @@ def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
         What lies outside: the image again, or its border.
     """
     x, y = _texels(image, uv, wrap)
-    left, top = np.floor(x - F(0.5)), np.floor(y - F(0.5))
-    right_share, low_share = (x - F(0.5) - left)[:, None], (y - F(0.5) - top)[:, None]
+    left, low = np.floor(x - F(0.5)), np.floor(y - F(0.5))
+    right_share, upper_share = (x - F(0.5) - left)[:, None], (y - F(0.5) - low)[:, None]
     x0, x1 = _inside(left, image.shape[1], wrap), _inside(left + 1, image.shape[1], wrap)
-    y0, y1 = _inside(top, image.shape[0], wrap), _inside(top + 1, image.shape[0], wrap)
-    upper = _mixed(_at(image, y0, x0), _at(image, y0, x1), right_share)
-    lower = _mixed(_at(image, y1, x0), _at(image, y1, x1), right_share)
-    return _mixed(upper, lower, low_share)
+    y0, y1 = _inside(low, image.shape[0], wrap), _inside(low + 1, image.shape[0], wrap)
+    lower = _mixed(_at(image, y0, x0), _at(image, y0, x1), right_share)
+    upper = _mixed(_at(image, y1, x0), _at(image, y1, x1), right_share)
+    return _mixed(lower, upper, upper_share)
 
 
 def nearest(image: Floats, uv: Floats, wrap: str) -> Floats:
@@ -55,20 +55,24 @@ FILTERS: dict[str, Callable[[Floats, Floats, str], Floats]] = {"bilinear": bilin
 
 
 def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
-    """Distance from the left and from the top of the image, in texels."""
+    """Distance from the left and from the bottom of the image, in texels."""
     inside = uv - np.floor(uv) if wrap == "repeat" else np.clip(uv, 0, 1)
     height, width = image.shape[:2]
-    return inside[:, 0] * F(width), (1 - inside[:, 1]) * F(height)
+    return inside[:, 0] * F(width), inside[:, 1] * F(height)
 
 
 def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
-    """Column or row numbers within the image."""
+    """Column or row numbers within the image, of numbers at most one beyond it."""
     whole = number.astype(np.int64)
-    return whole % count if wrap == "repeat" else np.clip(whole, 0, count - 1)
+    if wrap == "clamp":
+        return np.clip(whole, 0, count - 1)
+    return whole + count * (whole < 0) - count * (whole >= count)
 
 
 def _at(image: Floats, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
-    return image.reshape(-1, image.shape[2]).take(y * image.shape[1] + x, axis=0)
+    """(N, C) texels of columns `x` from the left, rows `y` from the bottom."""
+    height, width, channels = image.shape
+    return columns(image.reshape(-1, channels).take((height - 1 - y) * width + x, axis=0))
 
 
 def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:

@@ -66,6 +66,8 @@ class Report:
     """Camera -> buffer -> where it was at hand: `memory` or `store`."""
     warnings: list[str] = field(default_factory=list)
     clamped: int = 0
+    error: dict[str, float] = field(default_factory=dict)
+    """Asked for, reached, and by which counts, where an error was asked for."""
     total_seconds: float = 0.0
 
     def as_data(self) -> dict[str, Any]:

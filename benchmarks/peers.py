@@ -3,9 +3,9 @@
 Ambient occlusion: the bunny of unit radius on a floor under a constant sky, white; Mitsuba 3 with its direct
 integrator (the surface alone sampled, multijittered, box filter), vectorised (llvm) and scalar. Phong with
 shadows: the same under two point lights, POV-Ray. Equal error decides: each renderer's error is measured
-against a reference of its own with other seeds, and the time at the error asked for is interpolated on log-log;
-the references' difference says whether the pictures are equal. Everything counts, from the start of the process
-to the written file; meshes are the same PLY, nothing is kept between runs but in the row `warm`.
+against a reference of its own with other seeds, and the time at the error asked for is interpolated on
+log-log; the references' difference says whether the pictures are equal. Everything counts, from the start of
+the process to the written file; meshes are the same PLY, nothing is kept between runs but in the row `warm`.
 
     PEERS=/path/to/venv/bin/python PYTHONPATH=src python benchmarks/peers.py [--small] [mitsuba povray]
 

@@ -1,0 +1,53 @@
+"""Benchmarks run, on something tiny, and print their question and their rows; their figures mean nothing here."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+SCRIPTS = {
+    "startup": "ratio tiny render / six libraries",
+    "stages": "beside the job",
+    "threads": "what the machine gives",
+    "scaling": "peak [MiB]",
+    "memory": "cpu per pixel",
+    "replay": "ratio whole / rays alone",
+}
+
+
+def printed(root, tmp_path, name, *words):
+    """What a script prints; it must end well."""
+    command = [sys.executable, str(root / "benchmarks" / f"{name}.py"), "--small", *words]
+    environment = {**os.environ, "PYTHONPATH": str(root / "src"), "ILLUM_CACHE": str(tmp_path / "cache")}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_tiny_version_runs(root, tmp_path, name):
+    text = printed(root, tmp_path, name)
+    assert text.startswith("# ")
+    assert text.partition("\n")[0].endswith("?")
+    assert "SMALL" in text
+    assert SCRIPTS[name] in text
+
+
+def test_pov_ray_draws_the_same_picture(root, tmp_path):
+    if shutil.which("povray") is None:
+        pytest.skip("needs POV-Ray: apt-get install povray")
+    text = printed(root, tmp_path, "peers", "povray")
+    assert float(text.partition("difference of the pictures: RMSE ")[2].split()[0]) < 0.02
+
+
+def test_mitsuba_draws_the_same_picture(root, tmp_path):
+    if not os.environ.get("PEERS"):
+        pytest.skip("needs PEERS, the python of an environment with mitsuba")
+    text = printed(root, tmp_path, "peers", "mitsuba")
+    assert float(text.partition("difference of the references: RMSE ")[2].split()[0]) < 0.06

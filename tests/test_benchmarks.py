@@ -1,4 +1,4 @@
-"""Benchmarks run, on something tiny, and print their question and their rows; their figures mean nothing here."""
+"""Benchmarks run, on something tiny, and print their question and rows; their figures mean nothing here."""
 
 from __future__ import annotations
 

@@ -137,6 +137,7 @@ def write_picture(path: Path, found: Convergence) -> None:
     """Draw error over samples and over seconds, both axes in logarithms."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     kind = path.suffix.lower()[1:]
     with rc_context({"svg.hashsalt": "illum", "font.size": 9}):
@@ -145,11 +146,12 @@ def write_picture(path: Path, found: Convergence) -> None:
         for curve in found.curves:
             shown = [p for p in curve.points if p.rmse > 0]
             errors = [p.rmse for p in shown]
-            name = f"{curve.sampler}, slope {curve.slope:.2f} ± {curve.slope_error:.2f}"
+            name = f"{curve.sampler}, slope {curve.slope:.3f} ± {curve.slope_error:.3f}"
             over_count.loglog([p.count for p in shown], errors, "o-", base=2, label=name)
             over_seconds.loglog([p.seconds for p in shown], errors, "o-", label=curve.sampler)
         for axes in (over_count, over_seconds):
             axes.axhline(found.reference.rmse, color="0.6", linewidth=0.8, linestyle=":")
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.grid(visible=True, which="both", linewidth=0.3)
         over_count.set_xlabel("samples per pixel" if found.vary == "pixels" else "obscurance rays per pixel")
         over_seconds.set_xlabel(f"seconds, {found.threads} threads")

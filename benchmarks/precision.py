@@ -1,7 +1,8 @@
 """How far are pictures in single precision from the same scenes in double precision, layer by layer?
 
-Reference: `tests/reference/float64.py`, a renderer of its own. Pixels whose every ray answered alike are compared; the
-others, whose ray passes an edge by less than a rounding, are counted. Differences are over the layer's largest value.
+Reference: `tests/reference/float64.py`, a renderer of its own. Pixels whose every ray answered alike are
+compared; the others, whose ray passes an edge by less than a rounding, are counted. Differences are over the
+layer's largest value.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""A slow renderer in double precision, written apart from the package: what single precision is compared with.
+"""A slow renderer in double precision, written apart from the package, to compare single precision with.
 
-Its rays come from the camera's definition, its hits and shadows from the intersection test of Möller and Trumbore
-(1997) with every triangle, its light from the lamps' definition, all in float64 on the mesh as given, not recentred,
-without offsets. Of the package it takes the formulas of the models, which 50-digit vectors check in double precision,
-and the directions of obscurance rays, so that both look the same way.
+Its rays come from the camera's definition, its hits and shadows from the intersection test of Möller and
+Trumbore (1997) with every triangle, its light from the lamps' definition, all in float64 on the mesh as
+given, not recentred, without offsets. Of the package it takes the formulas of the models, which 50-digit
+vectors check in double precision, and the directions of obscurance rays, so that both look the same way.
 """
 
 from __future__ import annotations

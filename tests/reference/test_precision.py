@@ -14,7 +14,14 @@ sys.modules[spec.name] = reference
 spec.loader.exec_module(reference)
 
 
-@pytest.mark.parametrize("setup", reference.setups(), ids=lambda setup: setup.name)
+OFTEN = ("metal", "far")
+SETUPS = [
+    pytest.param(setup, id=setup.name, marks=[] if setup.name in OFTEN else pytest.mark.slow)
+    for setup in reference.setups()
+]
+
+
+@pytest.mark.parametrize("setup", SETUPS)
 def test_single_precision_follows_double(setup, tmp_path):
     rows, counts = reference.compare(setup, tmp_path)
     assert counts["seen"] > 200

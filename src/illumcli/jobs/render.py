@@ -22,6 +22,7 @@ from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture
 from illumcli.film.film import Layer
 from illumcli.film.preview import viewable
+from illumcli.jobs.limits import refuse_disk, refuse_memory
 from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Band, Tally, bands, run_once
 from illumcli.plan.keys import digest
@@ -30,6 +31,9 @@ from illumcli.plan.recipes import View
 from illumcli.scene.load import Loaded, load
 from illumcli.scene.spec import Scene
 
+BAND_ROWS = 128
+"""No band of tiles is higher [pixels]."""
+BYTES = {"half": 2, "float": 4, "uint8": 1, "uint16": 2}
 Progress = Callable[[str, int, int], None]
 """Called with what is going on, how much is done and how much there is."""
 
@@ -164,6 +168,7 @@ def rendered(
     report = Report(str(work.loaded.path), identity, work.scene.seed, threads, skipped=dict(steps.skipped))
     due = [target for target in work.targets if not is_kept(target, force)]
     report.kept = [str(target.path) for target in work.targets if target not in due]
+    refuse_too_large(work, due)
     tally = Tally()
     for view in steps.views:
         mine = [target for target in due if target.view is view]
@@ -186,6 +191,28 @@ def rendered(
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
     return report
+
+
+def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
+    """Raise LimitError where memory or disk cannot hold what is due; nothing has been read or made yet."""
+    values = sum(len(layer.channels) for layer in work.plan.layers) + 1
+    files = mesh_files(work.loaded, work.scene)
+    for target in due:
+        view = target.view
+        refuse_memory(BAND_ROWS, view.width, values, files, str(work.loaded.path))
+        types = channels(work.scene, target).values()
+        refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
+
+
+def mesh_files(loaded: Loaded, scene: Scene) -> set[Path]:
+    """The mesh files of a scene's objects."""
+    found = set()
+    for thing in scene.objects:
+        source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
+        name = source if isinstance(source, str) else getattr(source, "file", None)
+        if name is not None:
+            found.add(loaded.path.parent / name)
+    return found
 
 
 def refuse_repairs(place: str, repairs: Mapping[str, int], first: Mapping[str, str]) -> None:

@@ -1,0 +1,137 @@
+"""What is too large is refused before anything is allocated; paths lead to regular files inside."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from illumcli.errors import LimitError
+from illumcli.jobs import limits
+
+TOO_LARGE = {
+    "film": "film: {width: 1000000, height: 1000000}",
+    "rays": "film: {width: 60000, height: 60000, samples: 1000}",
+    "obscurance rays": "film: {width: 10000, height: 10000}\nobscurance: {samples: 60000}\nambient: 1\n"
+    "objects: [{mesh: {shape: sphere}}]",
+}
+
+
+@pytest.mark.parametrize("what", TOO_LARGE)
+def test_too_large_is_exit_4_in_one_line_with_little_memory(tmp_path, what):
+    (tmp_path / "s.yaml").write_text(f"version: 1\n{TOO_LARGE[what]}\n")
+    words = [sys.executable, "-m", "illumcli", "render", "s.yaml"]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as run:
+        said = run.stderr.read()
+        _, status, used = os.wait4(run.pid, 0)
+        run.returncode = os.waitstatus_to_exitcode(status)
+    assert run.returncode == 4, said
+    assert len(said.splitlines()) == 1
+    assert used.ru_maxrss < 200 * 1024
+    assert os.listdir(tmp_path) == ["s.yaml"]
+
+
+def test_little_memory_and_little_disk_are_refused_before_anything_is_made(folder, monkeypatch):
+    from illumcli.jobs.render import run
+
+    monkeypatch.setattr(limits, "free_memory", lambda: 100_000)
+    with pytest.raises(LimitError, match="memory"):
+        run(folder / "scene.yaml", pattern=str(folder / "x.exr"), cache=False)
+    monkeypatch.undo()
+    monkeypatch.setattr(limits.shutil, "disk_usage", lambda path: type("Usage", (), {"free": 100}))
+    with pytest.raises(LimitError, match="disk"):
+        run(folder / "scene.yaml", pattern=str(folder / "x.exr"), cache=False)
+    assert not list(folder.glob("*.exr"))
+
+
+def test_what_the_machine_does_not_say_is_no_limit(monkeypatch, tmp_path):
+    monkeypatch.setattr(limits, "free_memory", lambda: None)
+    limits.refuse_memory(10**9, 10**9, 10**9, [tmp_path / "none.ply"], "here")
+    assert limits._size(1500 * 2**40) == "1.5e+03 TiB"
+
+
+@pytest.fixture
+def jail(tmp_path):
+    """A scene two folders down, and what lies around it."""
+    inner = tmp_path / "a" / "b"
+    inner.mkdir(parents=True)
+    (tmp_path / "secret.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (inner / "link.obj").symlink_to(tmp_path / "secret.obj")
+    (inner / "loop.obj").symlink_to(inner / "loop.obj")
+    (inner / "out").symlink_to(tmp_path)
+    os.mkfifo(inner / "pipe.obj")
+    (inner / "m.obj").write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n")
+    return inner
+
+
+TRAVERSALS = [
+    "../../secret.obj", "../../../../../../etc/passwd", "/etc/passwd", "/proc/self/mem", "/proc/kcore",
+    "/dev/zero", "/dev/stdin", "link.obj", "loop.obj", "out/secret.obj", "pipe.obj", "..", ".",
+    "a\0b.obj", "~/x.obj", "file:///etc/passwd", "//etc/passwd", "./../.././secret.obj",
+    "out/../secret.obj", "x" * 5000,
+]  # fmt: skip
+AUDITED = """
+import os, sys
+root, found = os.path.realpath(sys.argv[1]), []
+near, around = os.path.dirname(root), os.path.dirname(os.path.dirname(root))
+CALLS = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.system", "os.fork", "os.forkpty",
+         "socket.connect", "socket.bind", "socket.getaddrinfo")
+
+def hook(event, words):
+    if event in CALLS or event == "import" and root in str(words[1] or ""):
+        found.append((event, words))
+    if event == "open" and isinstance(words[0], (str, bytes)):
+        name = os.path.realpath(os.fsdecode(words[0]))
+        if name in sys.path:
+            return
+        if name.startswith(around) and not name.startswith(near) or name in ("/etc/passwd", "/proc/kcore"):
+            found.append(name)
+
+from pathlib import Path
+from illumcli.errors import IllumError
+from illumcli.jobs.render import run
+from illumcli.files import images
+import illumcli.jobs.check
+os.chdir(root)
+sys.addaudithook(hook)
+for number in range(int(sys.argv[2])):
+    try:
+        run(Path(f"{number}.yaml"), pattern=f"{number}.exr", cache=number % 2 == 0)
+        print(number, "rendered")
+    except IllumError as error:
+        print(number, error.exit_code, str(error).splitlines()[0][:200])
+print(found)
+"""
+
+
+def test_nothing_outside_is_opened_and_nothing_is_run(python, jail, tmp_path):
+    import json
+
+    scenes = []
+    box = {"mesh": {"shape": "box"}, "material": "m"}
+    for path in TRAVERSALS:
+        scenes += [
+            {"objects": [{"mesh": path if "." in path else {"file": path}}]},
+            {"materials": {"m": {"model": "merl", "file": path}}, "objects": [box]},
+            {"materials": {"m": {"model": "lambert", "diffuse": {"texture": path}}}, "objects": [box]},
+            {"extends": path},
+        ]  # fmt: skip
+    scenes.append({"objects": [{"mesh": {"file": "m.obj", "materials": True}}]})
+    sun = {"light": "directional", "direction": [-1, -2, -3]}
+    around = {"version": 1, "film": {"width": 4, "height": 4, "samples": 1}, "lights": [sun]}
+    for number, scene in enumerate(scenes):
+        (jail / f"{number}.yaml").write_text(json.dumps({**around, **scene}))
+    said = python(AUDITED, jail, len(scenes), ILLUM_CACHE=str(jail / "cache"))
+    *lines, found = said.splitlines()
+    assert found == "[]"
+    assert len(lines) == len(scenes)
+    for line, scene in zip(lines, scenes, strict=True):
+        assert line.split()[1] == "2", (line, scene)
+
+
+def test_a_run_forks_and_calls_nobody(python, folder):
+    (folder / "scene.yaml").rename(folder / "0.yaml")
+    said = python(AUDITED, folder, 1, ILLUM_CACHE=str(folder / "cache"))
+    assert said.splitlines() == ["0 rendered", "[]"]

@@ -30,7 +30,7 @@ TOKENS = (
 
 
 def mutated(data: bytes, draw: random.Random) -> bytes:
-    """`data` with one to four changes: bytes set, cut, repeated, tokens put in; now and then without its end."""
+    """`data` with one to four changes: bytes set, cut, repeated, tokens put in; now and then cut short."""
     out = bytearray(data)
     for _ in range(draw.randint(1, 4)):
         at = draw.randrange(len(out) + 1)

@@ -74,7 +74,7 @@ def illum() -> None:
 def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
     signal.signal(signal.SIGTERM, _interrupt)
-    # pydantic looks for plug-ins in every installed package, a tenth of a small render's start; there are none
+    # pydantic looks for plug-ins in every installed package, a tenth of a small start; there are none
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         status = illum.main(standalone_mode=False)

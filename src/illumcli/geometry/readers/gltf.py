@@ -308,7 +308,7 @@ def _parts(document: _Document) -> Iterator[_Part]:
 
 
 def primitives_of(path: Path) -> list[tuple[int, int, int]]:
-    """(mesh, number of the primitive in it, vertices) for each run of vertices that `read` gives, in its order."""
+    """(mesh, number of the primitive in it, vertices) for each run of vertices, in the order of `read`."""
     document = _document(path)
     found = []
     for index, _ in _nodes(document):

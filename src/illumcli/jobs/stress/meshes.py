@@ -11,7 +11,7 @@ from illumcli.jobs.stress.scenes import BALL, FLOOR, scene
 
 Faces = NDArray[np.int64]
 RAYS = 32
-"""Per pixel. Where a face runs the other way round the ray core rounds the place of a hit differently, by 1e-8
+"""Per pixel. Where a face runs the other way round the ray core rounds a hit differently, by 1e-8
 radii, and now and then a ray passes an edge on the other side."""
 
 

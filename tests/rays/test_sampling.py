@@ -51,6 +51,15 @@ def test_spiral_directions_are_unit_up_and_cosine_weighted(count):
     assert (np.sort(ring, axis=1) == np.arange(count)).all()
 
 
+def test_dither_spreads_the_samples_of_a_pixel():
+    for count in (64, 256, 1024):
+        here = np.zeros(count, np.int64)
+        turn, phase = sampling.dither(1, here + 5, here + 9, np.arange(count))
+        side = int(count**0.5)
+        cells = np.unique((turn * side).astype(int) * side + (phase * side).astype(int))
+        assert len(cells) > 0.7 * count  # independent points would fill 0.63 of them
+
+
 def test_dither_spreads_over_small_neighbourhoods():
     y, x = np.divmod(np.arange(64 * 64), 64)
     turn, phase = sampling.dither(1, x, y, np.zeros_like(x))

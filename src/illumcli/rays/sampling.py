@@ -124,10 +124,11 @@ def dither(
     """(2, N) in [0, 1): turn and phase of each pixel's spiral from the R2 sequence over the pixel grid.
 
     Neighbouring pixels then err in different directions, and a small blur removes more of the error than
-    it would of independent noise. Samples of one pixel are shifted by golden-ratio steps.
+    it would of independent noise. Samples of one pixel step by sqrt(3) and the golden ratio, which no
+    integers relate: together their spirals fill the disc too.
     """
     a, b = 1 / PLASTIC, 1 / PLASTIC**2
     start = unit_interval(hashed(key, np.array([0, 1], U32)))
-    turn = (a * x + b * y + GOLDEN * sample + start[0]) % 1.0
-    phase = (b * x + (a * b) * y + GOLDEN * GOLDEN * sample + start[1]) % 1.0
+    turn = (a * x + b * y + 3**0.5 * sample + start[0]) % 1.0
+    phase = (b * x + (a * b) * y + GOLDEN * sample + start[1]) % 1.0
     return np.stack([turn, phase])

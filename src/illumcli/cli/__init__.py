@@ -93,6 +93,9 @@ def main() -> None:
         click.echo(f"{place}{error.strerror or error}; check the disk and the permissions", err=True)
         sys.exit(1)
     except ImportError as error:  # most often too little memory to map a library
+        cause = error.__cause__ or error.__context__  # a signal during an import arrives as its failure
+        if isinstance(cause, KeyboardInterrupt | _Terminated):
+            _die_by(signal.SIGTERM if isinstance(cause, _Terminated) else signal.SIGINT)
         said = str(error).strip().splitlines()[-1:] or ["no reason given"]
         click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
         sys.exit(1)

@@ -118,7 +118,10 @@ class ImageWriter:
             raise InputError(f"{_shown(os.path.realpath(path))}: {_NO_UTF8}")
         output = oiio.ImageOutput.create(self._format)
         if output is None:
-            raise OutputError(f"{self._named}: {oiio.geterror()}; install one that writes {suffix}")
+            reason = oiio.geterror()
+            if not reason:  # a format that is built in
+                raise MemoryError
+            raise OutputError(f"{self._named}: {reason}; install one that writes {suffix}")
         self._output = output
         self._part = Part(path)
         try:

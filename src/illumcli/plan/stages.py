@@ -536,11 +536,11 @@ def obscurance(
         facet_normals,
     )
     if baked is None:
-        return estimates(tracer, obscurance_origins, facets.ng, draws, method, horizon).w
+        return estimates(tracer, obscurance_origins, facets.ng, draws, method, horizon, errors=False).w
     w = baked_obscurance(world, baked, hits)
     left = np.flatnonzero(np.isnan(w))
     origins, ng = rows(obscurance_origins, left), rows(facets.ng, left)
-    w[left] = estimates(tracer, origins, ng, draws[:, left], method, horizon).w
+    w[left] = estimates(tracer, origins, ng, draws[:, left], method, horizon, errors=False).w
     return w
 
 

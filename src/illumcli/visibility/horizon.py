@@ -19,6 +19,8 @@ from illumcli.geometry.order import compact
 FAN = 8
 GROUP = 64  # points asked about together
 GROUPS_AT_ONCE = 64
+TRY_FIRST = 8
+"""One group in so many is asked first; where none of their points is clear, the others cast rays."""
 MOST_CLUSTERS = 1 << 13
 """Groups that look at more clusters than this cast rays instead."""
 PROBES = 64
@@ -89,8 +91,13 @@ class Horizon:
         left = np.flatnonzero(out)
         for first in range(0, len(left), GROUP * GROUPS_AT_ONCE):
             lane = left[first : first + GROUP * GROUPS_AT_ONCE]
-            o, up = np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64)
-            out[lane] = self._below(o, up, most)
+            tried = np.arange(len(lane)) // GROUP % TRY_FIRST == 0
+            for part in (lane[tried], lane[~tried]):
+                o, up = np.asarray(origins[part], np.float64), np.asarray(n[part], np.float64)
+                out[part] = self._below(o, up, most)
+                if not out[part].any():
+                    out[lane[~tried]] = False
+                    break
         return out
 
     def _below(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:

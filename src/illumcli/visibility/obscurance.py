@@ -68,7 +68,7 @@ def obscurance(
     radius: float,
 ) -> NDArray[np.float32]:
     """(M,) w alone, with the default sampler; see `estimates`."""
-    return estimates(tracer, origins, ng, draws, Method(samples, falloff, radius)).w
+    return estimates(tracer, origins, ng, draws, Method(samples, falloff, radius), errors=False).w
 
 
 def estimates(
@@ -79,6 +79,7 @@ def estimates(
     method: Method,
     horizon: Horizon | None = None,
     bent: bool = False,
+    errors: bool = True,
 ) -> Estimates:
     """w = 1/pi * integral of mu(d) cos(theta) over the hemisphere about `n`: 1 where open.
 
@@ -98,6 +99,8 @@ def estimates(
         Points that it clears are open and cast no ray.
     bent : bool
         Also the mean direction of what is open.
+    errors : bool
+        Also the unevenness, which `Errors` asks for; 0 otherwise.
     """
     count = len(origins)
     w, uneven = np.ones(count, F), np.zeros(count, F)
@@ -111,7 +114,8 @@ def estimates(
         d = directions(n[part], draws[:, part], method)
         mu = seen(tracer, origins[part], d.reshape(-1, 3), method).reshape(len(part), -1)
         w[part] = shares(mu)
-        uneven[part] = unevenness(mu, method.sampler)
+        if errors:
+            uneven[part] = unevenness(mu, method.sampler)
         if mean is not None:
             towards = np.matmul(mu[:, None, :].astype(F), d)[:, 0]
             size = np.linalg.norm(towards, axis=1, keepdims=True)

@@ -146,7 +146,7 @@ def ambient(folder: Path, python: str) -> None:
     truths = {"illum": picture(folder / "truth-illum.exr"), "mitsuba": picture(folder / "truth-mitsuba.exr")}
     print(f"# difference of the references: RMSE {rmse(*truths.values()):.4f}")
 
-    counts = [(2, 4), (4, 8)] if SMALL else [(2, 8), (4, 8), (4, 16), (4, 32)]
+    counts = [(2, 4), (4, 8)] if SMALL else [(4, 8), (8, 8), (16, 8)]
     spps = [4, 16] if SMALL else [16, 64, 256]
     makers: dict[str, tuple[str, list[tuple[str, Callable[[int], None]]]]] = {
         "illum": (

@@ -21,7 +21,7 @@ GAPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Between floor and plate, in radii of the scene."""
 SLIVERS_PPM = 20
 """Of a needle turned out of its axes; its vertices in single precision leave it not quite convex."""
-EDGES_PPM = 3000
+EDGES_PPM = 1000
 """A ray that starts within 4e-7 radii of a sharp edge may pass it by less than the ray core's
 tolerance, which then takes the face beyond for hit. A longer offset would lose contact gaps of 1e-6 radii."""
 

@@ -43,7 +43,7 @@ def _wall(times: Sequence[Took]) -> str:
 def sphere_scene(folder: Path, triangles: int) -> Path:
     """A sphere of about so many triangles under one light, small on the film: the mesh is what costs."""
     path = folder / f"sphere-{triangles}.yaml"
-    across = round((triangles / 4) ** 0.5)
+    around = min(round(triangles**0.5), 3000)  # quads, of two triangles each
     path.write_text(f"""\
 version: 1
 film: {{width: 320, height: 180, samples: 1, background: 0}}
@@ -55,7 +55,7 @@ objects:
       z: sin(u) * cos(v)
       u: [0, 6.283185307179586]
       v: [-1.5, 1.5]
-      resolution: [{2 * across}, {across}]
+      resolution: [{around}, {triangles // (2 * around)}]
 lights: [{{light: point, position: [3, 4, 5], intensity: 30}}]
 outputs: {{files: ["{path.stem}.png"]}}
 """)

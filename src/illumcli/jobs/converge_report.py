@@ -57,6 +57,13 @@ def as_table(found: Convergence) -> str:
     return "\n".join(lines)
 
 
+def _slope(curve: Curve) -> str:
+    if math.isnan(curve.slope):
+        return "-"
+    error = "" if math.isnan(curve.slope_error) else f" +- {curve.slope_error:.3f}"
+    return f"{curve.slope:.3f}{error}"
+
+
 def advantage(found: Convergence, count: int, rmse: float) -> float:
     """How many times as many samples plain random sampling takes for this error, by its fitted line."""
     scale = [curve for curve in found.curves if curve.sampler == "random"]

@@ -117,7 +117,12 @@ CALLS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("call", CALLS)
+OFTEN = ("open", "fsync", "replace")
+
+
+@pytest.mark.parametrize(
+    "call", [call if call in OFTEN else pytest.param(call, marks=pytest.mark.slow) for call in CALLS]
+)
 def test_the_nth_system_call_that_fails_is_an_error_and_no_half_file(python, folder, call):
     tried, _ = map(int, python(FAILING, call, CALLS[call]).split())
     assert tried >= 1

@@ -132,7 +132,7 @@ print(resident() - before, handles() - opened)
 """
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.slow)])
 def test_many_runs_in_one_process_leak_nothing(python, folder, count):
     grown, opened = map(int, python(MANY, count).split())
     assert opened == 0

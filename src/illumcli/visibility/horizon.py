@@ -86,18 +86,24 @@ class Horizon:
         """
         if not len(self._points):
             return np.ones(len(origins), bool)
-        height = np.einsum("ij,ij->i", np.asarray(origins, np.float64), n)
-        out = (np.ascontiguousarray(n, F) @ self._probes.T).max(axis=1) <= height + CLEARLY
-        left = np.flatnonzero(out)
-        for first in range(0, len(left), GROUP * GROUPS_AT_ONCE):
-            lane = left[first : first + GROUP * GROUPS_AT_ONCE]
-            tried = np.arange(len(lane)) // GROUP % TRY_FIRST == 0
+        out = np.zeros(len(origins), bool)
+        for first in range(0, len(origins), GROUP * GROUPS_AT_ONCE):
+            lane = np.arange(first, min(first + GROUP * GROUPS_AT_ONCE, len(origins)))
+            tried = lane // GROUP % TRY_FIRST == 0
             for part in (lane[tried], lane[~tried]):
                 o, up = np.asarray(origins[part], np.float64), np.asarray(n[part], np.float64)
-                out[part] = self._below(o, up, most)
+                out[part] = self._cleared(o, up, most)
                 if not out[part].any():
-                    out[lane[~tried]] = False
                     break
+        return out
+
+    def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
+        """(M,) True where no occluder is above the plane, as far as probes and then clusters tell."""
+        height = np.einsum("ij,ij->i", o, n)
+        out = (n.astype(F) @ self._probes.T).max(axis=1) <= height + CLEARLY
+        left = np.flatnonzero(out)
+        if left.size:
+            out[left] = self._below(o[left], n[left], most)
         return out
 
     def _below(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:

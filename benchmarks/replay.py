@@ -1,8 +1,9 @@
 """What does a whole obscurance-bound render cost beside its own rays alone?
 
 Reference: the same rays, recorded where the renderer asks them, put to embreex's own scene in the same chunks
-by as many threads: no generation, no checks, no shading, no files. The rays are recorded a band at a time and
-replayed at once, so that they need not all fit in memory. Seeds 1, 2, ...: no kept hit is met again.
+by as many threads: no generation, no checks, no shading, no files. The rays are recorded a row of tiles at a
+time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2, ...: no kept
+hit is met again.
 
     PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
 """
@@ -23,6 +24,7 @@ from _bench import REPEATS, SMALL, Took, ambient_scene, header, ratio, table, to
 from illumcli.jobs.render import run
 from illumcli.plan import execute
 from illumcli.plan.plan import plan
+from illumcli.plan.stages import Tile
 from illumcli.rays.tracer import Tracer
 from illumcli.scene.load import load
 
@@ -32,14 +34,14 @@ Question = tuple[str, np.ndarray, np.ndarray, Any]
 def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     """The world and the questions of every band of tiles, as the renderer asks them."""
     loaded = load(path)
-    steps = plan(loaded.scene, loaded)
+    steps = plan(loaded.scene, loaded, ["obscurance"])
     shared = execute.run_once(steps, execute.Tally())
     asked: list[Question] = []
     own = {name: getattr(Tracer, name) for name in ("closest", "distance", "occluded")}
 
     def recording(name: str) -> Any:
         def question(self: Tracer, origins: np.ndarray, directions: np.ndarray, *more: Any) -> Any:
-            asked.append((name, np.ascontiguousarray(origins), np.ascontiguousarray(directions), more))
+            asked.append((name, np.array(origins, order="C"), np.array(directions, order="C"), more))
             return own[name](self, origins, directions, *more)
 
         return question
@@ -47,11 +49,17 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     try:
         for name in own:
             setattr(Tracer, name, recording(name))
-        for _ in execute.bands(steps, shared, steps.views[0], threads, execute.Tally()):
-            if len(asked) > 200:
-                yield shared["world"], asked[:]
-                asked.clear()
-        yield shared["world"], asked[:]
+        view = steps.views[0]
+        side = execute.tile_side(view.samples)
+        for y in range(0, view.height, side):
+            tiles = [
+                Tile(x, y, min(side, view.width - x), min(side, view.height - y))
+                for x in range(0, view.width, side)
+            ]
+            x, rows = (np.concatenate(part) for part in zip(*(tile.pixels() for tile in tiles), strict=True))
+            execute.at_pixels(steps, shared, view, x, rows, threads, execute.Tally())
+            yield shared["world"], asked[:]
+            asked.clear()
     finally:
         for name, function in own.items():
             setattr(Tracer, name, function)

@@ -2,8 +2,8 @@
 
 Reference: the same rays, recorded where the renderer asks them, put to embreex's own scene in the same chunks
 by as many threads: no generation, no checks, no shading, no files. The rays are recorded a row of tiles at a
-time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2, ...: no kept
-hit is met again.
+time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2, ...: no hit
+that was kept is met again.
 
     PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
 """

@@ -31,7 +31,12 @@ PIXELS, SHARE = 4000, 50
 SEEDS = 8
 """Pairs of seeds that share a pilot's pixels."""
 MOST = 4096
-"""Samples per pixel, and rays per sample, beyond which no error is aimed for."""
+"""Samples per pixel beyond which no error is aimed for."""
+RAYS = (4, 16)
+"""Rays per sample that pilots try; from half of the least to twice the most are chosen."""
+ATTEMPTS = 8
+MARGIN = 0.9
+"""Of the target, what pilots must stay below: they know the error to a tenth."""
 SAMPLE_COST = 8
 """A sample costs as much as so many obscurance rays, itself included."""
 STEEPEST, FLATTEST = 2.0, 1.0
@@ -46,23 +51,17 @@ class Law:
     power: float
 
     @classmethod
-    def through(cls, few: tuple[int, float], many: tuple[int, float]) -> Law:
+    def through(cls, few: tuple[int, float], many: tuple[int, float], flattest: float = FLATTEST) -> Law:
         """The law through the variances at two counts; 0 where neither has any."""
         (n, v), (m, w) = few, many
         if v <= 0 or w <= 0:
-            return cls(max(v * n, w * m, 0.0), FLATTEST)
-        power = min(max(math.log(v / w) / math.log(m / n), FLATTEST), STEEPEST)
+            return cls(max(v * n**flattest, w * m**flattest), flattest)
+        power = min(max(math.log(v / w) / math.log(m / n), flattest), STEEPEST)
         return cls(w * m**power, power)
 
     def at(self, count: float) -> float:
         """The variance at a count."""
         return float(self.at_one * count**-self.power)
-
-    def count_for(self, variance: float) -> int:
-        """The least count of at most this variance."""
-        if self.at_one <= 0:
-            return 1
-        return max(1, math.ceil((self.at_one / variance) ** (1 / self.power))) if variance > 0 else MOST + 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,8 +140,9 @@ def chosen(
     subjects = tuple(replace(first, view=view) for view in views(loaded.scene))
     has_rays = "obscurance" in {step.makes for step in steps.tile} and loaded.scene.obscurance is not None
     pilots = [Pilot(each, has_rays) for each in subjects]
-    aim, rays = target**2, 0
-    for attempt in range(4):
+    goal = (MARGIN * target) ** 2
+    aim, rays = goal, 0
+    for attempt in range(ATTEMPTS):
         counts = [pilot.counts(aim, target) for pilot in pilots]
         sampling = replace(
             pilots[0].sampling,
@@ -152,59 +152,62 @@ def chosen(
         checks = [pair(each, sampling, f"check {attempt}") for each in subjects]
         rays += sum(count for _, count in checks)
         variance = max(found for found, _ in checks)
-        if variance <= target**2:
+        if variance <= goal:
             break
-        aim *= 0.95 * target**2 / variance
+        aim *= MARGIN * goal / variance
     total = rays + sum(pilot.rays for pilot in pilots)
     return Choice(target, sampling, math.sqrt(variance), subjects, total)
 
 
 class Pilot:
-    """What some pixels of a view, rendered twice at four counts, tell of its variance."""
+    """What some pixels of a view, rendered twice at a few counts, tell of its variance."""
 
     def __init__(self, own: Subject, has_rays: bool) -> None:
         scene = own.scene
         sampler = scene.obscurance.sampler if scene.obscurance is not None else "spiral"
         self.sampling = Sampling(1, 0, sampler, scene.seed)
         self.rays = 0
-        # through the centre of its pixel a sample errs by its rays alone
-        self.open = self._law(own, ((1, 8), (1, 32))) if has_rays else None
-        each = 8 if has_rays else 0
-        self.edges = self._law(own, ((4, each), (16, each)))
+        self.laws = {each: self._law(own, each) for each in (RAYS if has_rays else (0,))}
 
-    def _law(self, own: Subject, counts: Sequence[tuple[int, int]]) -> Law:
+    def _law(self, own: Subject, each: int) -> Law:
+        """How the variance falls with samples per pixel, of so many rays each. One sample per pixel is never
+        looked at: what it errs at edges no pair can see."""
         found = []
-        for pixel, each in counts:
+        for pixel in (2, 8):
             sampling = replace(self.sampling, pixel=pixel, obscurance=each)
             variance, rays = pair(own, sampling, f"pilot {pixel} {each}")
             self.rays += rays
-            if pixel > 1 and self.open is not None:
-                variance -= self.open.at(each) / pixel
-            found.append((pixel if pixel > 1 else each, variance))
-        return Law.through(*found)
+            found.append((pixel, variance))
+        few, many = found
+        return Law.through(few, many)
+
+    def variance(self, pixel: int, each: int) -> float:
+        """The variance at counts, by a power of the rays between the laws, and a little beyond."""
+        if len(self.laws) == 1:
+            return self.laws[0].at(pixel)
+        few, many = ((rays, law.at(pixel)) for rays, law in self.laws.items())
+        return Law.through(few, many, flattest=0.0).at(each)
 
     def counts(self, aim: float, target: float) -> tuple[int, int]:
         """Samples per pixel, a power of two, and rays per sample of least cost for a variance of `aim`.
-
-        The rays of a pixel's samples err independently, at worst. One sample per pixel is never enough: what
-        it errs at edges no pair can see.
 
         Raises
         ------
         LimitError
         """
-        best: tuple[float, int, int] | None = None
-        for pixel in (1 << k for k in range(1, MOST.bit_length())):
-            left = aim - self.edges.at(pixel)
-            each = self.open.count_for(pixel * left) if self.open is not None else 0
-            cost = pixel * (SAMPLE_COST + each)
-            if left > 0 and each <= MOST and (best is None or cost < best[0]):
-                best = cost, pixel, each
-        if best is None:
+        rays = range(RAYS[0] // 2, 2 * RAYS[-1] + 1) if len(self.laws) > 1 else (0,)
+        enough = [
+            (pixel * (SAMPLE_COST + each), pixel, each)
+            for pixel in (1 << k for k in range(1, MOST.bit_length()))
+            for each in rays
+            if self.variance(pixel, each) <= aim
+        ]
+        if not enough:
             raise LimitError(
                 f"an error of {target:g} takes more than {MOST} samples per pixel; aim for a larger one"
             )
-        return best[1:]
+        _, pixel, each = min(enough)
+        return pixel, each
 
 
 def pair(own: Subject, sampling: Sampling, purpose: str, seed: int | None = None) -> tuple[float, int]:

@@ -12,16 +12,16 @@ ENDS = {
     "OSError(28, 'No space left on device', 'x.exr')": (1, "x.exr: No space left on device"),
     "ImportError('a\\n\\nOriginal error was: failed to map segment')": (1, "failed to map segment"),
     "MemoryError()": (4, "out of memory"),
-    "KeyboardInterrupt()": (-signal.SIGINT, ""),
+    "cli._Stopped(signal.SIGTERM)": (-signal.SIGTERM, ""),
     "interrupted_import()": (-signal.SIGINT, ""),
 }
 SCRIPT = """
-import sys
+import signal
 import illumcli.cli as cli
 
 def interrupted_import():
     error = ImportError("initialization failed")
-    error.__cause__ = KeyboardInterrupt()
+    error.__cause__ = cli._Stopped(signal.SIGINT)
     return error
 
 def end(*words, **more):
@@ -41,3 +41,35 @@ def test_no_end_is_a_traceback(error):
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) == bool(said)
+
+
+LINGERING = """
+import time
+import illumcli.cli as cli
+from illumcli.files.atomic import Part
+
+def lingers(*words, **more):
+    part = Part("picture.exr")
+    try:
+        print("open", flush=True)
+        time.sleep(60)
+    finally:
+        print("unwinding", flush=True)
+        time.sleep(60)
+
+cli.illum.main = lingers
+cli.main()
+"""
+
+
+def test_a_second_signal_ends_at_once_and_leaves_no_file(tmp_path):
+    words = [sys.executable, "-c", LINGERING]
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        for expected in ("open\n", "unwinding\n"):
+            assert run.stdout.readline() == expected
+            run.send_signal(signal.SIGINT)
+        assert run.wait(timeout=30) == -signal.SIGINT
+        assert run.stderr.read() == ""
+    assert list(tmp_path.iterdir()) == []

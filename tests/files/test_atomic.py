@@ -166,3 +166,19 @@ with Part({str(tmp_path / "a.txt")!r}) as part:
     assert len(parts(tmp_path)) == 1
     write_text(tmp_path / "a.txt", "whole")
     assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_signal_that_falls_before_the_block_leaves_no_file_either(tmp_path, monkeypatch):
+    stop = KeyboardInterrupt()
+    create = os.open
+
+    def created_then_stopped(*words):
+        os.close(create(*words))
+        raise stop
+
+    monkeypatch.setattr(os, "open", created_then_stopped)
+    with pytest.raises(KeyboardInterrupt):
+        atomic.Part(tmp_path / "a.txt")
+    assert len(os.listdir(tmp_path)) == 1
+    atomic.discard_open()
+    assert os.listdir(tmp_path) == []

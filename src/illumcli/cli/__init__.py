@@ -14,6 +14,8 @@ import click
 from illumcli import __version__
 from illumcli.errors import IllumError
 
+STOPS = (signal.SIGINT, signal.SIGTERM)
+
 COMMANDS = {
     "render": "Render scenes; print the path of every image.",
     "sweep": "Render the variants of a scene; share what they have in common.",
@@ -73,7 +75,8 @@ def illum() -> None:
 
 def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in STOPS:
+        signal.signal(number, _unwind)
     # pydantic looks for plug-ins in every installed package, a tenth of a small start; there are none
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
@@ -84,8 +87,8 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt, _Terminated) as stop:
-        _die_by(signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
+    except _Stopped as stop:
+        _die_by(stop.number)
     except BrokenPipeError:
         _die_by(signal.SIGPIPE)
     except OSError as error:  # an operating system that refuses what nobody expects it to
@@ -94,8 +97,8 @@ def main() -> None:
         sys.exit(1)
     except ImportError as error:  # most often too little memory to map a library
         cause = error.__cause__ or error.__context__  # a signal during an import arrives as its failure
-        if isinstance(cause, KeyboardInterrupt | _Terminated):
-            _die_by(signal.SIGTERM if isinstance(cause, _Terminated) else signal.SIGINT)
+        if isinstance(cause, _Stopped):
+            _die_by(cause.number)
         said = str(error).strip().splitlines()[-1:] or ["no reason given"]
         click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
         sys.exit(1)
@@ -105,15 +108,29 @@ def main() -> None:
     sys.exit(status if isinstance(status, int) else 0)
 
 
-class _Terminated(BaseException):
-    """SIGTERM arrived."""
+class _Stopped(BaseException):
+    """A signal asked for the end."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise _Terminated
+def _unwind(number: int, frame: FrameType | None) -> None:
+    """The first signal leaves by way of all that is open; a second one ends at once."""
+    for each in STOPS:
+        signal.signal(each, _end)
+    raise _Stopped(number)
 
 
-def _die_by(number: signal.Signals) -> None:
-    """End by the signal itself, so that the caller sees what happened."""
+def _end(number: int, frame: FrameType | None) -> None:
+    _die_by(number)
+
+
+def _die_by(number: int) -> None:
+    """End by the signal itself, so that the caller sees what happened; no half file stays behind."""
+    for each in STOPS:
+        signal.signal(each, signal.SIG_IGN)  # the tidying is short
+    if atomic := sys.modules.get("illumcli.files.atomic"):
+        atomic.discard_open()
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)

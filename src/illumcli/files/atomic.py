@@ -32,6 +32,10 @@ _WAYS_OUT = {
 }
 
 
+_open: set[Path] = set()
+"""Parts of this process that are neither committed nor discarded."""
+
+
 class Part:
     """A file in the making: write to `path`, then `commit`; `discard` leaves no trace.
 
@@ -58,6 +62,7 @@ class Part:
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
             folder.mkdir(parents=True, exist_ok=True)
             _remove_left_over(folder, name)
+            _open.add(self.path)  # before it exists: a signal may end this call anywhere
             os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
 
     def commit(self) -> None:
@@ -66,6 +71,7 @@ class Part:
             with _refusals(self._named):
                 _force(self.path)
                 os.replace(self.path, self.target)
+            _open.discard(self.path)
         except BaseException:
             self.discard()
             raise
@@ -76,6 +82,7 @@ class Part:
         """Remove what was written so far; nothing happens after `commit`."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
+            _open.discard(self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -89,6 +96,13 @@ class Part:
         self.discard()
         if isinstance(error, OSError) and error.filename in (None, os.fspath(self.path)):
             raise refused(self._named, error) from error
+
+
+def discard_open() -> None:
+    """Remove every part of this process; for the end by a signal, which may fall between any two steps."""
+    for path in tuple(_open):
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:

@@ -50,7 +50,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
         for name in own:
             setattr(Tracer, name, recording(name))
         view = steps.views[0]
-        side = execute.tile_side(view.samples)
+        side = steps.tile_side(view)
         for y in range(0, view.height, side):
             tiles = [
                 Tile(x, y, min(side, view.width - x), min(side, view.height - y))

@@ -18,6 +18,7 @@ class Layer:
     buffer: str  # what fills it
     channels: tuple[str, ...]  # full channel names, in order
     data: bool = False  # never filtered: the sample nearest to the pixel's centre, in 32 bits
+    per_pixel: bool = False  # made pixel by pixel from whole blocks of pixels
 
 
 def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: int) -> NDArray[np.float32]:

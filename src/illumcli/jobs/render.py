@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import time
@@ -72,12 +73,34 @@ class Report:
     clamped: int = 0
     error: dict[str, float] = field(default_factory=dict)
     """Asked for, reached, and by which counts, where an error was asked for."""
+    standard_error: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Camera -> mean and root mean square of its layer `error`, where that was rendered."""
     total_seconds: float = 0.0
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it, with versions and the peak of memory."""
         data = {name: getattr(self, name) for name in self.__slots__}
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
+
+
+@dataclass(slots=True)
+class ErrorSums:
+    """Mean and root mean square of the layer `error`, band by band."""
+
+    pixels: int = 0
+    total: float = 0.0
+    square: float = 0.0
+
+    def add(self, band: NDArray[np.float32]) -> None:
+        """Add the rows of a band."""
+        values = band.astype(np.float64)
+        self.pixels += values.size
+        self.total += float(values.sum())
+        self.square += float(np.square(values).sum())
+
+    def as_data(self) -> dict[str, float]:
+        """What the report says."""
+        return {"mean": self.total / self.pixels, "rms": math.sqrt(self.square / self.pixels)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,9 +207,12 @@ def rendered(
             report.repairs_first |= shared["repairs"].first
             if strict:
                 refuse_repairs(report.scene, report.repairs, report.repairs_first)
+            sums = ErrorSums()
             report.clamped += _render_view(
-                work.scene, narrowed, shared, view, mine, threads, tally, progress, artifacts
+                work.scene, narrowed, shared, view, mine, threads, tally, progress, artifacts, sums
             )
+            if sums.pixels:
+                report.standard_error[view.name] = sums.as_data()
     report.seconds, report.rays, report.spared = dict(tally.seconds), dict(tally.rays), dict(tally.spared)
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
@@ -303,6 +329,7 @@ def _render_view(
     tally: Tally,
     progress: Progress,
     artifacts: Artifacts,
+    sums: ErrorSums,
 ) -> int:
     """Write one view's files band by band; how many values were beyond half's range."""
     from illumcli.files.images import ImageWriter
@@ -325,6 +352,8 @@ def _render_view(
         ]
         for band in bands(steps, shared, view, threads, tally, advance, artifacts=artifacts):
             start = time.perf_counter()
+            if "error" in band.layers:
+                sums.add(band.layers["error"])
             for target, writer in zip(targets, writers, strict=True):
                 writer.write_band(band.y, pixels_of(scene, target, band, shared["frame"]))
             tally.add({"write": time.perf_counter() - start}, {})

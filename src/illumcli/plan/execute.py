@@ -19,7 +19,7 @@ from illumcli.memory import keep_freed_memory
 from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import View
-from illumcli.plan.stages import LANES, Scattered, Tile, tile_side
+from illumcli.plan.stages import LANES, Scattered, Tile
 from illumcli.rays.tracer import Interrupted
 from illumcli.visibility.arriving import Lit
 
@@ -91,7 +91,7 @@ def bands(
     The pixels do not depend on `threads`, `side` or `artifacts`, where what is worth it is kept. When the
     consumer stops or is interrupted, tiles in flight end at their next step.
     """
-    side = side or tile_side(view.samples)
+    side = plan.tile_side(view, side)
     stop = threading.Event()
     tiles = [
         [
@@ -219,7 +219,9 @@ def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> P
     out = {}
     for layer in plan.layers:
         values = buffers[layer.buffer]
-        if layer.data:
+        if layer.per_pixel:
+            made = values
+        elif layer.data:
             made = pixel_nearest(values, lane, buffers["samples"].nearest(), pixels)
         else:
             made = pixel_means(values, lane, pixels, view.samples)

@@ -14,8 +14,10 @@ from illumcli.demand import Recipe, order
 from illumcli.errors import LimitError
 from illumcli.film.film import Layer
 from illumcli.plan.artifacts import Artifacts, Book, Picture, kind_of
+from illumcli.plan.doubled import AGAIN, BLOCK, doubled_count
 from illumcli.plan.keys import Keys, code, digest
 from illumcli.plan.recipes import (
+    GIVEN,
     View,
     active_lights,
     is_ambient,
@@ -28,7 +30,6 @@ from illumcli.plan.recipes import (
 from illumcli.plan.stages import tile_side
 from illumcli.scene.spec import Scene
 
-GIVEN = ("view", "tile")
 LARGEST_SIDE = 1 << 16
 MOST_RAYS = 10**11
 
@@ -79,12 +80,17 @@ class Plan:
             "expected_bytes": self.expected_bytes(),
         }
 
+    def tile_side(self, view: View, side: int | None = None) -> int:
+        """Pixels along a tile's side: `side` or the default, in whole blocks where these have one error."""
+        side = side or tile_side(view.samples)
+        return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.layers) else side
+
     def expected_bytes(self) -> dict[str, int]:
         """What the run takes beyond its meshes: a band of tiles, and each artifact that may be written, whose
         pages the system may drop. Upper bounds."""
         sizes = {}
         for view in self.views:
-            lanes = min(view.height, tile_side(view.samples)) * view.width * view.samples
+            lanes = min(view.height, self.tile_side(view)) * view.width * view.samples
             sizes["band"] = lanes * 4 * sum(len(layer.channels) for layer in self.layers) // view.samples
             for name in self.keeps:
                 if kind := kind_of(name):
@@ -123,6 +129,8 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
     rays = _expected_rays(scene, all_views, made)
     _refuse(all_views, rays)
     reasons = _why_not(scene, book, made)
+    if "error" in made and f"{AGAIN}samples" not in made:
+        reasons[f"{AGAIN}beauty"] = "nothing in the picture is random: its error is 0"
     return Plan(all_views, wanted, once, tile, reasons, rays, scene=scene, book=book)
 
 
@@ -187,6 +195,14 @@ def _steps(
 
 def _expected_rays(scene: Any, all_views: Sequence[View], made: set[str]) -> dict[str, int]:
     samples = sum(view.width * view.height * view.samples for view in all_views)
+    doubled = sum(doubled_count(view.width, view.height) * view.samples for view in all_views)
+    again = {name.removeprefix(AGAIN) for name in made if name.startswith(AGAIN)}
+    more = _rays_of(scene, doubled, again)
+    return _rays_of(scene, samples, made) | {f"{AGAIN}{name}": count for name, count in more.items()}
+
+
+def _rays_of(scene: Any, samples: int, made: set[str]) -> dict[str, int]:
+    """Rays of so many samples by purpose, where these buffers are made."""
     rays = {"primary": samples} if "hits" in made else {}
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in made and light.shadows and any(light.color()):
@@ -215,7 +231,7 @@ def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[s
     reasons = {}
     active = active_lights(scene)
     for name in book:
-        if name in made:
+        if name in made or name.startswith(AGAIN):
             continue
         kind, _, light = name.partition(":")
         if light and light not in active:

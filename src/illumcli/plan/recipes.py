@@ -16,6 +16,7 @@ from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
 from illumcli.plan import stages
+from illumcli.plan.doubled import error_recipes
 from illumcli.scene.load import resolve
 from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
 from illumcli.shading.materials import DEFAULT, Token
@@ -23,6 +24,8 @@ from illumcli.shading.terms import words
 from illumcli.shading.textures import paths
 from illumcli.variants import suggestion
 
+GIVEN = ("view", "tile")
+"""Buffers that need no recipe."""
 SMOOTH = ("gouraud", "phong", "quadratic")
 
 
@@ -94,6 +97,7 @@ _LAYERS = {
         Layer("object_id", "object_id", ("objectId.Y",), data=True),
         Layer("material_id", "material_id", ("materialId.Y",), data=True),
         Layer("triangle_id", "triangle_id", ("triangleId.Y",), data=True),
+        Layer("error", "error", ("error.Y",), data=True, per_pixel=True),
     )
 }
 
@@ -194,6 +198,7 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
         Recipe.of(stages.shadow_origins, **smooth),
         Recipe.of(stages.obscurance_origins),
+        Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         *_obscurance(scene, loaded),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
         Recipe.of(stages.emission, **_varying(scene, "emission")),
@@ -211,7 +216,9 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
     eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
     for name, light in scene.named_lights().items():
         book += _light(name, light, eye, at_samples)
-    return {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+    made = {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+    counts = [view.samples for view in views(scene)]
+    return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
 
 
 def _obscurance(scene: Scene, loaded: Any) -> list[Recipe]:
@@ -226,7 +233,7 @@ def _obscurance(scene: Scene, loaded: Any) -> list[Recipe]:
     if all_baked(scene) or (scene.obscurance is None and "baked" in more):
         w = Recipe.of(stages.baked_or_open, "obscurance")
     else:
-        w = Recipe.of(partial(stages.obscurance, settings, scene.seed), "obscurance", **more)
+        w = Recipe.of(partial(stages.obscurance, settings), "obscurance", **more)
     return [
         Recipe.of(stages.horizon),
         Recipe.of(stages.facet_normals),

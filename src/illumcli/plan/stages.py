@@ -509,24 +509,26 @@ def obscurance_origins(facets: Facets) -> Vectors:
     return lifted(facets.position, facets.ng, facets.edge)
 
 
+def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
+    """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
+    key = sampling.stream(seed, "obscurance")
+    pixel, sample = np.divmod(hits.lane, samples.per_pixel)
+    return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
+
+
 def obscurance(
     settings: Obscurance,
-    seed: int,
     tracer: Tracer,
     world: World,
-    samples: Samples,
     hits: Hits,
     facets: Facets,
     obscurance_origins: Vectors,
+    obscurance_draws: NDArray[np.float64],
     horizon: Horizon | None = None,
     baked: BakedValues | None = None,
     facet_normals: Vectors | None = None,
 ) -> Lanes:
     """(M,) w of every sample seen; on meshes with baked values these, and rays for the others."""
-    key = sampling.stream(seed, "obscurance")
-    lane = hits.lane
-    pixel, sample = np.divmod(lane, samples.per_pixel)
-    draws = sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
     method = Method(
         settings.samples,
         settings.falloff,
@@ -536,11 +538,13 @@ def obscurance(
         facet_normals,
     )
     if baked is None:
-        return estimates(tracer, obscurance_origins, facets.ng, draws, method, horizon, errors=False).w
+        return estimates(
+            tracer, obscurance_origins, facets.ng, obscurance_draws, method, horizon, errors=False
+        ).w
     w = baked_obscurance(world, baked, hits)
     left = np.flatnonzero(np.isnan(w))
     origins, ng = rows(obscurance_origins, left), rows(facets.ng, left)
-    w[left] = estimates(tracer, origins, ng, draws[:, left], method, horizon, errors=False).w
+    w[left] = estimates(tracer, origins, ng, obscurance_draws[:, left], method, horizon, errors=False).w
     return w
 
 

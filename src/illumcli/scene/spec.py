@@ -289,10 +289,12 @@ LAYERS = (
     "object_id",
     "material_id",
     "triangle_id",
+    "error",
 )
 Layer: TypeAlias = Literal[
     "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha",
     "depth", "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+    "error",
 ]  # fmt: skip
 
 

@@ -519,3 +519,74 @@ def mutated(text: bytes, rng: random.Random) -> bytes:
             case _:
                 text = text[:i] + rng.choice(pieces) + text[j:]
     return text
+
+
+def test_bases_count_towards_the_limit_of_parts(problems, write, monkeypatch):
+    from illumcli.scene import load as module
+
+    monkeypatch.setattr(module, "MAX_NODES", 12)
+    write("version: 1\nfilm: {width: 4, height: 3, samples: 1}\n", "scenes/base.yaml")
+    assert load(write("extends: base.yaml\nseed: 1\n")).scene.film.width == 4
+    (line,) = problems("extends: base.yaml\nambient: [1, 2, 3]\nseed: 1\n")
+    assert line == "base.yaml:1:1: more than 12 parts with all it extends"
+
+
+@pytest.mark.parametrize("group", ["objects", "lights"])
+def test_an_override_of_a_list_that_is_not_there_is_refused(problems, group):
+    (line,) = problems("version: 1\n", f"{group}.0.name=a")
+    assert line == f"-D {group}.0.name=a: the scene has no {group}"
+
+
+def test_a_camera_must_look_somewhere(problems):
+    (line,) = problems("version: 1\ncamera: {position: [1, 2, 3], target: [1, 2, 3]}\n")
+    assert line == "s.yaml:2:1: camera: position and target must differ"
+
+
+def test_a_fault_of_a_material_is_said_where_it_stands_and_not_at_its_uses(problems):
+    lines = problems(
+        "version: 1\nmaterials:\n  clay: {model: phong, diffuse: text}\n"
+        "objects:\n  - {mesh: a.obj, material: clay, override: {exponent: 3}}\n"
+        "  - {mesh: a.obj, material: clay, override: {exponent: -3}}\n"
+    )
+    assert [line.partition(": ")[0] for line in lines] == ["s.yaml:3:24", "s.yaml:6:46"]
+
+
+@pytest.mark.parametrize("character", ["\ufffe", "\uffff"])
+def test_what_yaml_takes_for_no_text_is_refused(problems, character):
+    (line,) = problems(f"version: 1\nmaterials: {{a: {character}}}\n")
+    assert line.startswith("s.yaml:1:1: not YAML: ")
+
+
+def test_a_pattern_of_a_plug_in_is_said_as_it_stands():
+    from illumcli.scene.faults import fact
+
+    assert (
+        fact("string_pattern_mismatch", "a", {"pattern": "^[0-9]$"}, "") == "must match ^[0-9]$, is text 'a'"
+    )
+
+
+@pytest.mark.parametrize("group", ["lights", "objects"])
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_name_that_another_has_by_default_is_taken(problems, group, order):
+    """It would hide the other: one light less, and no word of it."""
+    kind = {"lights": "{light: point, position: [1, 2, 3]", "objects": "{mesh: {shape: box}"}[group]
+    default = {"lights": "point", "objects": "object"}[group]
+    parts = [f"{kind}, name: {default}{2 if order > 0 else 1}}}", f"{kind}}}"][::order]
+    text = f"version: 1\n{group}:\n" + "".join(f"  - {part}\n" for part in parts)
+    (line,) = problems(text)
+    assert "is taken" in line
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("camera: {position: [0]}", "camera.position: must be a list of 3 numbers, has 1"),
+        ("camera: {position: []}", "camera.position: must be a list of 3, has 0"),
+        ("shading: 3", "shading: must be 'constant', 'gouraud', 'phong' or 'quadratic', is 3"),
+        ("shading: fong", "shading: no choice 'fong'; did you mean 'phong'?"),
+        ("shading:", "shading: must be 'constant', 'gouraud', 'phong' or 'quadratic', is empty"),
+    ],
+)
+def test_one_fault_is_one_line(problems, text, fact):
+    (line,) = problems(f"version: 1\n{text}\n")
+    assert line.partition(": ")[2] == fact

@@ -193,3 +193,20 @@ def test_planning_a_scene_loads_no_ray_tracer_and_no_image_library():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_materials_in_place_take_overrides_too():
+    made = scene(
+        objects=[
+            {"mesh": "a.obj", "material": {"model": "phong", "exponent": 7}, "override": {"diffuse": 0.2}}
+        ]
+    )
+    found = made.material_of(made.objects[0])
+    assert (found.exponent, found.diffuse) == (7, (0.2, 0.2, 0.2))
+
+
+@pytest.mark.parametrize("far", [1, 2])
+def test_depth_cueing_needs_some_depth(far):
+    with pytest.raises(ValidationError, match=f"near must be below far, is 2 with far {far}"):
+        scene(depth_cue={"near": 2, "far": far})
+    assert scene(depth_cue={"near": 2, "far": 2.5}).depth_cue.far == 2.5

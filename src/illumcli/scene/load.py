@@ -206,17 +206,10 @@ def _validated(tree: Node, problems: list[Problem]) -> Scene | None:
         found = [*faults(error, plain, classes), *reference_faults(plain)]
     known = {problem.place for problem in problems}
     for path, fact in dict.fromkeys(found):
-        place = _nearest(tree, path).at
+        place = (tree.find(path) or tree).at
         if place not in known:
             problems.append(_problem(place, path, fact))
     return scene
-
-
-def _nearest(tree: Node, path: source.Path) -> Node:
-    """The node at `path`, or the innermost one above it that is written."""
-    while (node := tree.find(path)) is None:
-        path = path[:-1]
-    return node
 
 
 def _problem(place: Place, path: source.Path, fact: str) -> Problem:

@@ -34,13 +34,21 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
             for path, fact in _override_faults(own, override):
                 yield ("objects", i, "override", *path), fact
     for kind in ("objects", "lights"):
-        seen: set[str] = set()
-        for i, thing in enumerate(_parts(_get(scene, kind))):
+        things = _parts(_get(scene, kind))
+        taken = {
+            _default_name(kind, thing, i + 1) for i, thing in enumerate(things) if not _get(thing, "name")
+        }
+        for i, thing in enumerate(things):
             name = _get(thing, "name")
-            if isinstance(name, str) and name in seen:
+            if isinstance(name, str) and name in taken:
                 yield (kind, i, "name"), f"the name '{name}' is taken"
             elif isinstance(name, str):
-                seen.add(name)
+                taken.add(name)
+
+
+def _default_name(kind: str, thing: Any, number: int) -> str:
+    """What the part of this number is called where its author does not say."""
+    return f"{'object' if kind == 'objects' else _get(thing, 'light')}{number}"
 
 
 def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:

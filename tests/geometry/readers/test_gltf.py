@@ -313,3 +313,84 @@ def test_meshes_placed_too_often_are_refused(tmp_path: Path, monkeypatch: pytest
     scene.json["scenes"][0]["nodes"] = list(range(20))
     with pytest.raises(LimitError, match="more than 100"):
         read_mesh(scene.write(tmp_path / "a.glb"))
+
+
+def test_a_drawing_of_points_and_skins_is_counted_and_the_rest_read(tmp_path: Path) -> None:
+    scene = square()
+    scene.primitive([0, 1, 2])["targets"] = [{"POSITION": 0}]
+    scene.primitive([0, 1], mode=1)
+    scene.json["nodes"] = [{"mesh": 0, "skin": 0}, {"mesh": 0}, {"name": "empty"}]
+    scene.json["scenes"][0]["nodes"] = [2, 0, 1]
+    scene.json["extensionsRequired"] = ["KHR_materials_unlit"]
+    path = scene.write(tmp_path / "a.glb")
+    mesh = read_mesh(path)
+    assert mesh.polygon_count == 6
+    assert mesh.repairs == {
+        "skins left out": 1,
+        "morph targets left out": 2,
+        "primitives of points or lines left out": 2,
+    }
+    assert gltf.primitives_of(path) == [(0, 0, 4), (0, 1, 4)] * 2
+
+
+def test_colours_with_and_without_alpha(tmp_path: Path) -> None:
+    for width in (3, 4):
+        scene = Scene()
+        scene.primitive([0, 1, 2], COLOR_0=scene.table(np.full((4, width), 0.5)))
+        attributes = read_mesh(scene.write(tmp_path / "a.glb")).attributes
+        assert attributes["color"].tolist() == [[0.5] * 3] * 4
+        assert ("alpha" in attributes) == (width == 4)
+
+
+def test_joints_of_strips_are_counted(tmp_path: Path) -> None:
+    scene = Scene()
+    scene.primitive([0, 1, 2, 2, 3, 3, 0, 2], mode=5)
+    mesh = read_mesh(scene.write(tmp_path / "a.glb"))
+    assert mesh.repairs == {"triangles that only join strips": 4}
+    assert triangles(mesh) == [[0, 1, 2], [0, 3, 2]]
+
+
+def test_a_primitive_of_no_vertices_has_no_triangles(tmp_path: Path) -> None:
+    scene = square()
+    empty = scene.primitive()
+    empty["attributes"]["POSITION"] = scene.table(np.empty((0, 3)))
+    assert read_mesh(scene.write(tmp_path / "a.glb")).polygon_count == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda j: j["meshes"].__setitem__(0, 7), r"meshes\[0\] is no object"),
+        (lambda j: j["scenes"][0].update(nodes=0), "the scene has no list of nodes"),
+        (
+            lambda j: j["meshes"][0]["primitives"][0]["attributes"].update(NORMAL=1),
+            "NORMAL has 6 rows for 4 vertices|which is not fit",
+        ),
+        (
+            lambda j: (
+                j["meshes"][0]["primitives"][0].update(indices=2),
+                j["accessors"].append({"bufferView": 0, "componentType": 5126, "count": 3, "type": "SCALAR"}),
+            ),
+            "are no whole numbers",
+        ),
+        (
+            lambda j: (
+                j["meshes"][0]["primitives"][0]["attributes"].update(NORMAL=2),
+                j["accessors"].append({"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}),
+            ),
+            "NORMAL has 3 rows for 4 vertices",
+        ),
+    ],
+)
+def test_what_else_is_wrong_is_named(tmp_path: Path, change: Change, message: str) -> None:
+    scene = square()
+    change(scene.json)
+    with pytest.raises(InputError, match=message):
+        read_mesh(scene.write(tmp_path / "a.glb"))
+
+
+def test_an_address_of_a_buffer_must_be_text(tmp_path: Path) -> None:
+    path = square().write(tmp_path / "a.gltf")
+    path.write_text(json.dumps({**json.loads(path.read_text()), "buffers": [{"byteLength": 9, "uri": 5}]}))
+    with pytest.raises(InputError, match=r"buffers\[0\].uri is no text"):
+        read_mesh(path)

@@ -188,3 +188,9 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, message
     with pytest.raises(InputError, match=message.replace("a.obj", r"a\.obj")) as caught:
         mesh_of(tmp_path, text)
     assert "; " in str(caught.value)  # the way out
+
+
+def test_colours_on_every_vertex_need_no_repair(tmp_path: Path) -> None:
+    mesh = mesh_of(tmp_path, "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n")
+    assert mesh.attributes["color"].tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert mesh.repairs == {}

@@ -237,3 +237,31 @@ def test_strips_with_an_index_out_of_range_are_refused(tmp_path: Path) -> None:
         path = written(tmp_path / "a.ply", np.zeros(3, XYZ), lists, False, "<")
         with pytest.raises(InputError, match=f"tristrips 1 has the index {index}, there are 3"):
             read_mesh(path)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_an_element_of_no_rows_is_as_good_as_none(tmp_path: Path, kind: str) -> None:
+    header = (
+        f"ply\nformat {kind} 1.0\nelement edge 0\nproperty int a\nproperty list uchar int b\n"
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    order = ">" if kind.endswith("big_endian") else "<"
+    body = np.array([0, 0, 0, 1, 0, 0, 0, 1, 0], f"{order}f4").tobytes() + b"\3"
+    body += np.array([0, 1, 2], f"{order}i4").tobytes()
+    text = b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    assert mesh_of(tmp_path, header.encode() + (text if kind == "ascii" else body)).polygon_count == 1
+
+
+def test_a_list_whose_length_is_cut_off_is_refused(tmp_path: Path) -> None:
+    header = head(vertices=3, kind="binary_little_endian").replace("list uchar", "list uint")
+    header = header.replace("element face 1", "element face 1\nproperty list uchar uchar flags")
+    body = np.zeros(9, "<f4").tobytes() + b"\4" + b"\0" * 4
+    with pytest.raises(InputError, match="ends before number 1; the file is cut off"):
+        mesh_of(tmp_path, header.encode() + body)
+
+
+def test_colours_in_floats_are_linear(tmp_path: Path) -> None:
+    more = "property float red\nproperty float green\nproperty float blue\n"
+    content = head(vertices=3, more=more) + "0 0 0 .5 0 1\n1 0 0 .5 0 1\n0 1 0 .5 0 1\n3 0 1 2\n"
+    assert mesh_of(tmp_path, content).attributes["color"].tolist() == [[0.5, 0, 1]] * 3

@@ -131,3 +131,66 @@ def test_companions_outside_the_folder_are_not_looked_at(tmp_path, monkeypatch, 
     (folder / "out").symlink_to(tmp_path)
     (folder / "m.obj").write_text(f"mtllib {name}\nv 0 0 0\n")
     assert companions(folder / "m.obj") == []
+
+
+def test_companions_are_all_that_a_mesh_may_name(tmp_path: Path) -> None:
+    from illumcli.geometry.readers import companions
+
+    (tmp_path / "m.obj").write_text("# a\n mtllib my stuff.mtl\nmtllib \0.mtl\nv 0 0 0\n")
+    (tmp_path / "my stuff.mtl").write_text("newmtl a\nmap_Kd -clamp on wood%20.png\n  map_Ks s.png\n")
+    names = {path.relative_to(tmp_path).as_posix() for path in companions(tmp_path / "m.obj")}
+    assert {"my stuff.mtl", "wood .png", "s.png"} <= names
+    assert not any("\0" in name for name in names)
+    (tmp_path / "m.GLTF").write_text('{"uri": "data:abc", "uri" : "a%20b.bin", "uri": "http://x/y.bin"}')
+    assert tmp_path / "a b.bin" in companions(tmp_path / "m.GLTF")
+    assert not any("data:" in str(path) for path in companions(tmp_path / "m.GLTF"))
+    (tmp_path / "m.stl").write_text("mtllib a.mtl\n")
+    assert companions(tmp_path / "m.stl") == []
+    (tmp_path / "none.mtl").unlink(missing_ok=True)
+    (tmp_path / "plain.obj").write_text("v 0 0 0\n")
+    assert companions(tmp_path / "plain.obj") == []
+    assert companions(tmp_path / "missing.obj") == []
+
+
+def test_a_mesh_that_does_not_fit_into_memory_is_refused_by_name(tmp_path, monkeypatch) -> None:
+    from illumcli.geometry.readers import stl
+
+    def starving(path: Path) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(stl, "read", starving)
+    with pytest.raises(LimitError, match=r"a\.stl: does not fit into memory; use a smaller mesh"):
+        read_mesh(tmp_path / "a.stl")
+
+
+def test_more_corners_than_can_be_counted_are_refused(tmp_path, monkeypatch) -> None:
+    from illumcli.geometry.readers import _polygons
+
+    monkeypatch.setattr(_polygons, "MOST_CORNERS", 5)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n")
+    with pytest.raises(LimitError, match="has 6 corners, the limit is 5"):
+        read_mesh(tmp_path / "a.obj")
+
+
+def test_a_bad_number_at_the_end_is_seen_though_numpy_only_warns(tmp_path, monkeypatch) -> None:
+    """As numpy before 2.3 does: it stops there, and no program shows that warning."""
+    import re
+
+    import numpy as np
+
+    def lenient(data: bytes, kind: type, sep: str):
+        found = []
+        for word in data.split():
+            number = re.match(rb"[-+]?\d+", word)
+            found += [int(number[0])] if number else []
+            if not number or number[0] != word:
+                break
+        return np.array(found, kind)
+
+    monkeypatch.setattr(np, "fromstring", lenient)
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert read_mesh(path).polygon_count == 1
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3x\n")
+    with pytest.raises(InputError, match=r"a\.obj:4: '3x' is no whole number"):
+        read_mesh(path)

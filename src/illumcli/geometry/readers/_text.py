@@ -126,30 +126,21 @@ class Block:
 
     def floats(self) -> NDArray[np.float64]:
         """Every word as a number in full precision, line after line."""
-        total = int(self.counts.sum())
         words = chain.from_iterable(map(bytes.split, self._pieces()))
         try:
             if np.any(self.data == ord("_")):  # `float` would skip it
                 raise ValueError
-            values = np.fromiter(map(float, words), np.float64)
+            return np.fromiter(map(float, words), np.float64)
         except ValueError:
             raise self._bad_number(float) from None
-        if len(values) != total:
-            raise self._bad_number(float)
-        return values
 
     def integers(self) -> Ints:
         """Every word as an integer, line after line; one too large for int64 becomes its largest."""
         total = int(self.counts.sum())
-        if not total:
-            return np.empty(0, np.int64)
-        try:
-            values = np.fromstring(self.data.tobytes(), np.int64, sep=" ")
+        try:  # older numpy stops at a bad word with a warning alone: the 0 behind all is missing then
+            return np.fromstring(self.data.tobytes() + b" 0", np.int64, sep=" ")[:-1].reshape(total)
         except (ValueError, DeprecationWarning):
             raise self._bad_number(int) from None
-        if len(values) != total:
-            raise self._bad_number(int)
-        return values
 
     def place(self, index: int) -> str:
         """``path:line`` of one of the lines."""
@@ -164,13 +155,13 @@ class Block:
 
     def _bad_number(self, kind: type[int] | type[float]) -> InputError:
         """The error that names the first word that is no number."""
-        edges = [*self.starts.tolist(), len(self.data)]
-        for i, (start, end) in enumerate(pairwise(edges)):
-            for word in self.data[start:end].tobytes().split():
-                if not _is_number(word, kind):
-                    text = word.decode("utf-8", "replace")
-                    return InputError(f"{self.place(i)}: '{text:.40}' is no {_name(kind)}; {_way(word)}")
-        return InputError(f"{self.text.path}: holds words that are no {_name(kind)}; export the mesh again")
+        edges = pairwise([*self.starts.tolist(), len(self.data)])
+        lines = (self.data[start:end].tobytes().split() for start, end in edges)
+        i, bad = next(
+            (i, word) for i, words in enumerate(lines) for word in words if not _is_number(word, kind)
+        )
+        text = bad.decode("utf-8", "replace")
+        return InputError(f"{self.place(i)}: '{text:.40}' is no {_name(kind)}; {_way(bad)}")
 
 
 def _blank_comment(found: re.Match[bytes]) -> bytes:

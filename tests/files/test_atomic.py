@@ -182,3 +182,14 @@ def test_a_signal_that_falls_before_the_block_leaves_no_file_either(tmp_path, mo
     assert len(os.listdir(tmp_path)) == 1
     atomic.discard_open()
     assert os.listdir(tmp_path) == []
+
+
+def test_a_part_of_somebody_elses_process_is_kept(tmp_path, monkeypatch):
+    def theirs(pid: int, number: int) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(atomic.os, "kill", theirs)
+    part = tmp_path / f".a.txt.{atomic._host()}.1.0123abcd.part"
+    part.write_text("half")
+    write_text(tmp_path / "a.txt", "whole")
+    assert part.exists()

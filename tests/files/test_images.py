@@ -23,6 +23,7 @@ from illumcli.files.images import (
     read_image,
     read_metadata,
     read_texture,
+    write_sheet,
 )
 
 LAYERED = ("R", "G", "B", "A", "Z", "P.X", "P.Y", "P.Z", "N.X", "key.R", "objectId")
@@ -294,6 +295,54 @@ def test_complaint_of_the_library_is_a_failure_whatever_it_returns(tmp_path, mon
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.parametrize("message", ["EXR OUT_OF_MEMORY", "std::bad_alloc"])
+def test_too_little_memory_in_the_library_is_said_as_such(tmp_path, monkeypatch, message):
+    create = oiio.ImageOutput.create
+
+    class Starving:
+        def __init__(self, output):
+            self.open, self.close, self.geterror = output.open, output.close, lambda: message
+            self.write_scanlines = lambda *words: False
+
+    monkeypatch.setattr(images.oiio.ImageOutput, "create", lambda kind: Starving(create(kind)))
+    with pytest.raises(MemoryError):
+        write(tmp_path / "a.exr", noise(8, 8, 3), channel_types("RGB"))
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(("reason", "error"), [("", MemoryError), ("no plug-in", OutputError)])
+def test_a_library_without_the_format_is_said(tmp_path, monkeypatch, reason, error):
+    monkeypatch.setattr(images.oiio.ImageOutput, "create", lambda kind: None)
+    monkeypatch.setattr(images.oiio, "geterror", lambda: reason)
+    with pytest.raises(error, match="no plug-in; install one that writes .exr" if reason else None):
+        ImageWriter(tmp_path / "a.exr", 4, 4, channel_types("RGB"))
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "types"),
+    [("a.exr", 4, {"Y": "uint8"}), ("a.png", 4, {"Y": "half"}), ("a.exr", 0, {"Y": "half"})],
+)
+def test_what_a_format_does_not_hold_is_a_programming_error(tmp_path, name, size, types):
+    with pytest.raises(ValueError, match=rf"no {size} x {size} (openexr|png) image"):
+        ImageWriter(tmp_path / name, size, size, types)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_channel_name_that_the_format_cuts_is_an_error_and_no_file(tmp_path):
+    with pytest.raises(OutputError, match=r"cannot be read back .*it holds the channels"):
+        write(tmp_path / "a.exr", noise(4, 4, 2), {"Z": "float", "x" * 300: "float"})
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_path_that_is_not_utf_8_is_refused_by_name(tmp_path):
+    path = os.fsencode(tmp_path) + b"/\xff.exr"
+    with pytest.raises(InputError, match=r"\\xff\.exr: the path is not UTF-8"):
+        ImageWriter(os.fsdecode(path), 4, 4, channel_types("RGB"))
+    with open(path, "wb"), pytest.raises(InputError, match=r"\\xff\.exr: the path is not UTF-8"):
+        read_image(os.fsdecode(path))
+
+
 FULL_DISK = """
     import os, resource, sys
     import numpy as np
@@ -350,6 +399,17 @@ def test_files_cut_short_are_refused(tmp_path, suffix):
         path.write_bytes(whole[:size])
         with pytest.raises(InputError, match=rf"a\.{suffix}: cannot be read"):
             read_image(path)
+
+
+def test_a_picture_that_vanishes_while_it_is_opened_is_refused(tmp_path, monkeypatch):
+    write(tmp_path / "a.png", np.zeros((4, 4, 1), np.uint8), {"Y": "uint8"})
+
+    def gone(path, tail):
+        raise FileNotFoundError(2, "No such file or directory")
+
+    monkeypatch.setattr(images, "_ends_with", gone)
+    with pytest.raises(InputError, match=r"a\.png: cannot be read as an image: No such file"):
+        read_image(tmp_path / "a.png")
 
 
 def test_missing_and_foreign_files_are_refused(tmp_path):
@@ -419,6 +479,12 @@ def test_deep_textures_are_decoded_alike(tmp_path):
     )
 
 
+def test_linear_textures_in_single_precision_are_as_they_are(tmp_path):
+    texels = np.abs(noise(6, 5, 3))
+    write(tmp_path / "a.exr", texels, dict.fromkeys("RGB", "float"))
+    np.testing.assert_array_equal(read_texture(tmp_path / "a.exr", "linear"), texels)
+
+
 def test_textures_that_are_not_finite_are_refused(tmp_path):
     texels = noise(4, 4, 3)
     texels[1, 1, 0] = np.nan
@@ -446,3 +512,44 @@ def test_flip_is_the_published_measure():
     grey = np.indices((20, 30)).sum(axis=0)[..., None].repeat(3, -1).astype(np.float32) / 50
     mean, _ = flip(grey, np.clip(grey * np.array([1, 0.8, 0.9], np.float32), 0, 1), encoded=True)
     assert mean == pytest.approx(0.40743646, rel=1e-5)
+
+
+def test_flip_that_the_library_refuses_is_no_number(monkeypatch):
+    class Refusal:
+        has_error, geterror = True, staticmethod(lambda: "out of sorts")
+
+    monkeypatch.setattr(images.oiio.ImageBufAlgo, "FLIP_diff", lambda *words, **more: Refusal())
+    black = np.zeros((8, 8, 3), np.float32)
+    with pytest.raises(RuntimeError, match="out of sorts"):
+        flip(black, black)
+
+
+# ------------------------------------------------------------------ contact sheets
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_a_sheet_shows_every_picture_in_a_cell_with_its_label(tmp_path, count):
+    shades = np.linspace(40, 240, count).astype(int).tolist()
+    pictures = [np.full((20 + 10 * k, 40, 3 if k % 2 else 1), shades[k], np.uint8) for k in range(count)]
+    write_sheet(tmp_path / "s.png", iter(pictures), [f"{'a long label ' * 9}{k}" for k in range(count)])
+    sheet = read_image(tmp_path / "s.png")
+    assert sheet.width % (images.SHEET_CELL + 8) == 0
+    columns = sheet.width // (images.SHEET_CELL + 8)
+    tall = sheet.height // -(-count // columns)
+    red = np.rint(sheet.channels["R"] * 255).astype(int)
+    for k in range(count):
+        y, x = k // columns * tall, k % columns * (images.SHEET_CELL + 8)
+        height = round(images.SHEET_CELL * len(pictures[k]) / 40)
+        cell = red[y : y + tall, x : x + images.SHEET_CELL + 8]
+        assert (cell[10 : height - 10, 10:-10] == shades[k]).all()
+        assert (cell[:, :4] == 255).all()
+        assert cell[height + 8 : height + 28].min() < 100  # letters
+    assert (
+        red[(count - 1) // columns * tall :, count % columns * (images.SHEET_CELL + 8) :] == 255
+    ).all() or (count % columns == 0)
+
+
+def test_a_sheet_needs_a_label_for_every_picture(tmp_path):
+    with pytest.raises(ValueError, match="zip"):
+        write_sheet(tmp_path / "s.png", [np.zeros((4, 4, 3), np.uint8)], ["a", "b"])
+    assert os.listdir(tmp_path) == []

@@ -10,7 +10,17 @@ import time
 import numpy as np
 import pytest
 
-from illumcli.files.store import SUFFIX, Store, default_folder, default_limit, described, read_entry, size_of
+from illumcli.files import store as module
+from illumcli.files.store import (
+    SUFFIX,
+    Refused,
+    Store,
+    default_folder,
+    default_limit,
+    described,
+    read_entry,
+    size_of,
+)
 
 KEY = "0123456789abcdef" * 2
 
@@ -31,7 +41,9 @@ def path_of(store, key=KEY):
 
 def test_what_is_read_is_what_was_kept(store):
     assert store.read(KEY) is None
+    assert not store.has(KEY)
     assert store.save(KEY, {"buffer": "hits"}, arrays())
+    assert store.has(KEY)
     found = store.read(KEY)
     assert found.about == {"buffer": "hits"}
     for kept, array in zip(found.arrays, arrays(), strict=True):
@@ -164,6 +176,38 @@ def test_faults_names_what_is_not_sound(store):
     assert store.faults() == {}
     path_of(store).write_bytes(b"x" * 100)
     assert list(store.faults()) == [path_of(store)]
+
+
+def test_an_entry_that_another_process_took_away_is_no_fault(store, monkeypatch):
+    store.save(KEY, {}, arrays())
+    found = store.entries()
+    path_of(store).unlink()
+    monkeypatch.setattr(store, "entries", lambda: found)
+    assert store.faults() == {}
+    assert store.prune(0) == found
+
+
+@pytest.mark.parametrize("text", [b"{", b"\xff", b"[" * 60_000])
+def test_a_description_that_cannot_be_read_is_refused(store, text):
+    head = module._HEADER.pack(module._MAGIC, module._FORMAT, len(text), 0, b"")
+    store.folder.mkdir()
+    path_of(store).write_bytes(head + text)
+    with pytest.raises(Refused, match="its description cannot be read"):
+        described(path_of(store))
+
+
+@pytest.mark.parametrize("data", [b"", b"illum\r\n\0", b"x" * 64])
+def test_a_foreign_file_is_not_described(store, data):
+    store.folder.mkdir()
+    path_of(store).write_bytes(data)
+    with pytest.raises(Refused, match="not an entry of this program"):
+        described(path_of(store))
+
+
+def test_an_entry_that_cannot_be_read_costs_time_alone(store):
+    path_of(store).mkdir(parents=True)
+    assert store.read(KEY) is None
+    assert "cannot be read: Is a directory" in store.warning
 
 
 def test_a_mapped_entry_outlives_its_file(store):

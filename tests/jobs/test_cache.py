@@ -5,8 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 
 import pytest
+
+from illumcli.errors import OutputError
+from illumcli.files.store import Store
+from illumcli.jobs import cache
 
 SCENE = """
 version: 1
@@ -48,6 +53,53 @@ def test_list_verify_prune_clear(illum, own):
     illum("cache", "clear")
     assert list((own / "kept").iterdir()) == []
     assert (own / "ring.png").read_bytes() == (own / "cold.png").read_bytes()
+
+
+def entry(own, name, text, used):
+    """A file of the cache with this description, last used so many seconds ago."""
+    from illumcli.files import store
+
+    head = store._HEADER.pack(store._MAGIC, store._FORMAT, len(text), 0, b"")
+    (own / "kept").mkdir(exist_ok=True)
+    path = own / "kept" / f"{name}.illum"
+    path.write_bytes(head + text)
+    os.utime(path, (time.time() - used,) * 2)
+    return path
+
+
+def test_a_list_tells_what_is_damaged_and_how_long_ago_all_was_used(own):
+    good = b'{"about": {"buffer": "hits"}}'
+    texts = {"d": good, "c": b"[]", "b": b'{"abouu": 1}', "a": b"{"}
+    for (name, text), used in zip(texts.items(), (200_000, 7300, 200, 3), strict=True):
+        entry(own, name, text, used)
+    found = cache.listing()
+    assert [what for _, what in found.entries] == ["hits", "damaged", "damaged", "damaged"]
+    lines = cache.table(found).splitlines()
+    assert [line.split()[1:3] for line in lines[:-1]] == [["2", "d"], ["2", "h"], ["3", "min"], ["3", "s"]]
+    assert lines[-1].startswith(f"{found.bytes:,} of {found.limit:,} bytes in 4 entries")
+
+
+def test_an_entry_that_another_process_took_away_is_not_listed(own, monkeypatch):
+    path = entry(own, "a", b"{}", 1)
+    entries = Store(own / "kept").entries()
+    path.unlink()
+    monkeypatch.setattr(Store, "entries", lambda self: entries)
+    assert cache.listing().entries == ()
+    assert cache.verify() == (1, {})
+
+
+def test_what_cannot_be_removed_is_an_error_of_the_output(own, monkeypatch):
+    path = entry(own, "a", b"{}", 1)
+
+    def refused(self, missing_ok=False):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(type(path), "unlink", refused)
+    for remove in (cache.verify, cache.clear, lambda: cache.prune("0")):
+        with pytest.raises(OutputError, match=r"kept.*: Permission denied; check its permissions"):
+            remove()
+    monkeypatch.undo()
+    assert path.exists()
 
 
 def test_a_plan_says_what_is_at_hand(illum, own):

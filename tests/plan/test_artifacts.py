@@ -308,3 +308,34 @@ def test_buffers_come_back_as_they_were(scene):
         a, b = getattr(world, name), getattr(again, name)
         np.testing.assert_array_equal(a, b)
         assert a.flags.f_contiguous == b.flags.f_contiguous
+
+
+def test_a_book_lists_what_it_may_be_asked_for(scene, store):
+    loaded = load(scene)
+    made = plan(loaded.scene, loaded, ["beauty"])
+    book = policy.Book(made.book, made.views[0], Artifacts(store))
+    assert list(book) == list(made.book)
+    assert len(book) == len(made.book)
+
+
+def test_what_is_no_buffer_is_a_programming_error():
+    with pytest.raises(TypeError, match="object is not among what is kept"):
+        encode(object(), [], {})
+
+
+def test_a_look_reads_nothing_and_finds_what_is_there(scene, store):
+    loaded = load(scene)
+    made = plan(loaded.scene, loaded, ["beauty"])
+    assert reusing(made, made.views[0], Artifacts(store, look=True)).reused == {}
+    picture(scene, store=store, only=["beauty"])
+    for entry in store.entries():
+        entry.path.write_bytes(b"")
+    assert {"hits", "world"} <= reusing(made, made.views[0], Artifacts(store, look=True)).reused.keys()
+
+
+def test_buffers_of_another_rate_are_not_kept(scene, store):
+    """Their lanes are vertices or polygons, not samples."""
+    picture(scene, "shading=gouraud", store=store, only=["beauty"])
+    _, made, _, reused = picture(scene, "shading=gouraud", store=store, only=["beauty"])
+    assert "hits" in reused
+    assert "points" in made

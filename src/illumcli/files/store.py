@@ -16,7 +16,6 @@ import hashlib
 import json
 import mmap
 import os
-import secrets
 import struct
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -128,7 +127,7 @@ class Store:
         described = {"key": key, "about": about, "arrays": places}
         text = json.dumps(described, separators=(",", ":")).encode()
         text += b" " * (-(len(text) + _HEADER.size) % 64)
-        part = self.folder / f".{key}.{os.getpid()}.{secrets.token_hex(4)}.part"
+        part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}.part"
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             return Writer(self, part, self._path(key), text, [place["at"] for place in places], end)
@@ -276,7 +275,7 @@ def described(path: Path) -> dict[str, Any]:
             raise Refused("not an entry of this program")
         try:
             said: dict[str, Any] = json.loads(file.read(min(_HEADER.unpack(head)[2], MAPPED)))
-        except ValueError:
+        except (ValueError, RecursionError):
             raise Refused("damaged: its description cannot be read") from None
     return said
 

@@ -279,13 +279,11 @@ class _Buffer:
     def __init__(self, document: dict[str, Any], data: bytes = b"") -> None:
         self.document, self.parts, self.size = document, [data], len(data)
 
-    def add(self, values: NDArray[Any], target: int | None, bounds: bool = False) -> int:
+    def add(self, values: NDArray[Any], target: int, bounds: bool = False) -> int:
         """Number of the accessor of a (N,) or (N, k) array."""
         raw = np.ascontiguousarray(values)
         fill = -self.size % 4
-        view = {"buffer": 0, "byteOffset": self.size + fill, "byteLength": raw.nbytes}
-        if target is not None:
-            view["target"] = target
+        view = {"buffer": 0, "byteOffset": self.size + fill, "byteLength": raw.nbytes, "target": target}
         self.parts += [b"\0" * fill, raw.tobytes()]
         self.size += fill + raw.nbytes
         views = self.document.setdefault("bufferViews", [])

@@ -35,7 +35,7 @@ def listing() -> Listing:
             found.append((entry, str(described(entry.path)["about"]["buffer"])))
         except FileNotFoundError:
             continue
-        except (OSError, Refused):
+        except (OSError, Refused, KeyError, TypeError):  # the last two: a description of something else
             found.append((entry, "damaged"))
     return Listing(store.folder, store.limit, tuple(found))
 

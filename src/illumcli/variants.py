@@ -6,7 +6,6 @@ a run what its scene uses. Nothing is registered and no list is kept.
 
 from __future__ import annotations
 
-import difflib
 import pkgutil
 from dataclasses import dataclass
 from functools import cache
@@ -53,6 +52,8 @@ def members(package: str) -> tuple[type[Any], ...]:
 
 def suggestion(word: str, known: tuple[str, ...]) -> str:
     """The way out of a misspelling: the nearest known word, or all of them where none is near."""
+    import difflib
+
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ ENDS = {
     "interrupted_import()": (-signal.SIGINT, ""),
 }
 SCRIPT = """
+import os
 import signal
 import illumcli.cli as cli
 
@@ -73,3 +75,26 @@ def test_a_second_signal_ends_at_once_and_leaves_no_file(tmp_path):
         assert run.wait(timeout=30) == -signal.SIGINT
         assert run.stderr.read() == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_metadata_of_packages_is_read_when_asked_for():
+    script = """
+import sys
+import illumcli.cli as cli
+cli._look_for_no_plugins()
+from illumcli.models.lambert import Lambert
+Lambert.model_validate({})
+assert "email" not in sys.modules
+from importlib.metadata import entry_points, version
+assert version("pydantic") and entry_points() is not None
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+def test_output_that_cannot_be_printed_is_an_error():
+    with open("/dev/full", "w") as full:
+        words = [sys.executable, "-m", "illumcli", "models"]
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "No space left on device; check the disk and the permissions\n"

@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from importlib import import_module
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any
 
 import click
@@ -77,10 +77,10 @@ def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
     for number in STOPS:
         signal.signal(number, _unwind)
-    # pydantic looks for plug-ins in every installed package, a tenth of a small start; there are none
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    _look_for_no_plugins()
     try:
         status = illum.main(standalone_mode=False)
+        sys.stdout.flush()
     except IllumError as error:
         click.echo(f"{error}", err=True)
         sys.exit(error.exit_code)
@@ -105,7 +105,33 @@ def main() -> None:
     except MemoryError:
         click.echo("out of memory; make the film, the meshes or the samples smaller", err=True)
         sys.exit(4)
-    sys.exit(status if isinstance(status, int) else 0)
+    # all is written: to take the interpreter apart costs an eighth of a small render
+    os._exit(status if isinstance(status, int) else 0)
+
+
+def _look_for_no_plugins() -> None:
+    """Keep pydantic from looking for plug-ins in every installed package, a tenth of a small start.
+
+    It takes `entry_points` from `importlib.metadata` all the same, which needs mail, sockets and archives:
+    that can wait until it is called.
+    """
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    sys.modules.setdefault(_Later.NAME, _Later(_Later.NAME))
+
+
+class _Later(ModuleType):
+    """Stands for a module until one of its functions is called or another attribute read."""
+
+    NAME = "importlib.metadata"
+
+    def entry_points(self, **words: Any) -> Any:
+        return self.__getattr__("entry_points")(**words)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # the import itself asks
+            raise AttributeError(name)
+        sys.modules.pop(self.NAME, None)
+        return getattr(import_module(self.NAME), name)
 
 
 class _Stopped(BaseException):

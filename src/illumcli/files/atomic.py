@@ -9,8 +9,6 @@ from __future__ import annotations
 import errno
 import os
 import re
-import secrets
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -56,7 +54,7 @@ class Part:
         self._named = os.fspath(target)
         self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
         folder, name = self.target.parent, self.target.name
-        self.path = folder / f".{name}.{_host()}.{os.getpid()}.{secrets.token_hex(4)}.part"
+        self.path = folder / f".{name}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
         with _refusals(self._named):
             if self.target.exists() and not self.target.is_file():
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
@@ -140,7 +138,7 @@ def _force(path: Path) -> None:
 
 def _host() -> str:
     """The machine's name as part of a file name: a process number means nothing on another machine."""
-    return re.sub(r"\W", "", socket.gethostname()) or "host"
+    return re.sub(r"\W", "", os.uname().nodename) or "host"
 
 
 def _remove_left_over(folder: Path, name: str) -> None:

@@ -19,8 +19,10 @@ import numpy as np
 
 from illumcli.models._base import IlluminationModel
 from illumcli.plan import recipes, stages
+from illumcli.plan.artifacts import Artifacts
 from illumcli.plan.execute import Tally, bands, run_once
 from illumcli.plan.plan import plan
+from illumcli.plan.unseen import unseen_objects, without
 from illumcli.scene.load import load
 from illumcli.shading import direct
 from illumcli.visibility import arriving
@@ -43,6 +45,11 @@ lights:
 """
 
 
+AWAY = """
+  - {name: away, mesh: {shape: sphere, radius: 0.5}, material: clay, transform: {translate: [7, 0.5, 6]}}
+"""
+
+
 @dataclass(frozen=True)
 class Skip:
     """A skip, the scene that shows it, and how it is turned off."""
@@ -52,6 +59,8 @@ class Skip:
     off: tuple[tuple[object, str, object], ...] = ()
     layers: tuple[str, ...] = ("beauty",)
     layers_off: tuple[str, ...] | None = None
+    objects: str = ""
+    """More of them."""
 
 
 def everywhere(light, frame, position, n=None):
@@ -97,13 +106,19 @@ SKIPS = (
         "directions nobody reads", ("objects.ball.material=grey",), ((recipes, "reached_words", _directions),)
     ),
     Skip("layers nobody asks for", (), (), ("depth",), ("depth", "beauty")),
+    Skip(
+        "objects no view can tell",
+        ("obscurance.falloff={falloff: smooth, max_distance: 1}",),
+        ((sys.modules[__name__], "unseen_objects", lambda *_: ()),),
+        objects=AWAY,
+    ),
     Skip("ids alone", (), (), ("object_id",), ("object_id", "beauty")),
 )
 
 
 def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict[str, int]]:
     """The layers of the scene, and what making them took."""
-    counts = {"rays": 0, "responses": 0, "lobes": 0, "steps": 0}
+    counts = {"rays": 0, "responses": 0, "lobes": 0, "steps": 0, "triangles": 0}
     response, evaluate = direct.response, direct.evaluate
 
     def counted(models, lobes, material, lit, *rest):
@@ -117,10 +132,13 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
     loaded = load(path, skip.overrides)
     made = plan(loaded.scene, loaded, layers)
     tally = Tally()
+    made = without(made, loaded, unseen_objects(made, Artifacts(), tally))
     with patch.object(direct, "response", counted), patch.object(direct, "evaluate", counted_lobes):
-        parts = list(bands(made, run_once(made, tally), made.views[0], 1, tally))
+        shared = run_once(made, tally)
+        parts = list(bands(made, shared, made.views[0], 1, tally))
     counts["rays"] = sum(tally.rays.values())
     counts["steps"] = len(made.once) + len(made.tile)
+    counts["triangles"] = len(shared["world"].triangles)
     return {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}, counts
 
 
@@ -128,8 +146,8 @@ def compared(width: int, each: Callable[[Skip], bool] = yes) -> Iterator[tuple[s
     """Per skip: its name, counts with it and without, and whether the pictures agree in every value."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "scene.yaml")
-        path.write_text(SCENE.replace("WIDTH", str(width)))
         for skip in filter(each, SKIPS):
+            path.write_text(SCENE.replace("WIDTH", str(width)).replace("lights:", f"{skip.objects}lights:"))
             on, few = render(path, skip, skip.layers)
             with ExitStack() as turned_off:
                 for owner, name, other in skip.off:
@@ -142,7 +160,7 @@ def compared(width: int, each: Callable[[Skip], bool] = yes) -> Iterator[tuple[s
 
 def main() -> None:
     width = int(sys.argv[1]) if len(sys.argv) > 1 else 128
-    names = ("rays", "responses", "lobes", "steps")
+    names = ("rays", "responses", "lobes", "steps", "triangles")
     print(f"{'skip':34}" + "".join(f"{f'{n} with':>16}{'without':>12}" for n in names) + "  same")
     for name, few, many, same in compared(width):
         print(f"{name:34}" + "".join(f"{few[n]:>16,}{many[n]:>12,}" for n in names) + f"  {same}")

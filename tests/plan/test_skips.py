@@ -10,7 +10,7 @@ import pytest
 SKIPS = (
     "lights of intensity 0", "points a light does not reach", "points in shadow", "lobes that are black",
     "ambient light of 0", "k_a of 0", "emission of 0", "directions nobody reads", "layers nobody asks for",
-    "ids alone",
+    "objects no view can tell", "ids alone",
 )  # fmt: skip
 
 
@@ -32,8 +32,8 @@ def test_the_list_is_complete(bench):
 def test_a_skip_saves_work_and_changes_no_value(bench, name):
     ((_, few, many, same),) = bench.compared(40, lambda skip: skip.name == name)
     assert same
-    assert all(few[what] <= many[what] for what in few)
-    assert few != many
+    assert all(few[what] <= many[what] for what in few if what != "steps")
+    assert any(few[what] < many[what] for what in few)
 
 
 def test_gouraud_and_constant_are_evaluated_where_they_are_seen(bench, tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,17 @@ class Placed:
     first_corner: int
     first_polygon: int
     first_triangle: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """Where every object stands: known before any of them is cut in triangles."""
+
+    matrices: tuple[NDArray[np.float64], ...]  # (4, 4) each, object to scene
+    low: NDArray[np.float64]  # (O, 3) corner of what its polygons use [scene units]; inf without polygons
+    high: NDArray[np.float64]  # (O, 3); -inf without polygons
+    polygons: NDArray[np.int64]  # (O,) how many
+    frame: Frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,32 +102,83 @@ def used(mesh: Mesh) -> NDArray[np.bool_]:
     return mask
 
 
-def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> World:
-    """Mesh i under matrix i, all in one World whose box has its centre at 0 and half its diagonal 1.
+def stand(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Standing:
+    """Mesh i under matrix i; the frame's box holds them all, with its centre at 0 and half its diagonal 1."""
+    low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
+    for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
+        in_use = used(mesh)
+        if in_use.any():
+            low[number], high[number] = bounds(moved(mesh, matrix)[in_use])
+    lowest, highest = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
+    if not np.isfinite(lowest).all():
+        lowest, highest = np.zeros(3), np.zeros(3)
+    centre = (lowest + highest) / 2
+    radius = float(np.linalg.norm((highest - lowest) / 2)) or 1.0
+    frame = Frame((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+    polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
+    return Standing(tuple(matrices), low, high, polygons, frame)
+
+
+def moved(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(V, 3) vertices where they stand in the scene."""
+    out: NDArray[np.float64] = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return out
+
+
+def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
+    """The largest diagonal of a polygon's box in the scene; 0 where all polygons and normals of the mesh
+    agree on one of its own axes, as those of a floor do."""
+    if not mesh.polygon_count:
+        return 0.0
+    low, high = bounds(mesh.vertices[used(mesh)])
+    across = low < high
+    if not across.all() and (mesh.normals is None or not mesh.normals[:, across].any()):
+        return 0.0
+    corners, first = moved(mesh, matrix)[mesh.corners], mesh.starts[:-1]
+    size = np.maximum.reduceat(corners, first, axis=0) - np.minimum.reduceat(corners, first, axis=0)
+    return float(np.sqrt(np.square(size).sum(axis=1).max()))
+
+
+def without_polygons(mesh: Mesh) -> Mesh:
+    """The mesh with all its names and nothing that can be seen."""
+    per_corner: dict[str, Any] = {
+        name: None if (rows := getattr(mesh, name)) is None else rows[:0]
+        for name in ("corner_normals", "corner_uvs", "polygon_materials", "polygon_groups")
+    }
+    return replace(
+        mesh,
+        vertices=mesh.vertices[:0],
+        corners=mesh.corners[:0],
+        starts=np.zeros(1, np.int32),
+        attributes={name: values[:0] for name, values in mesh.attributes.items()},
+        repairs={},
+        **per_corner,
+    )
+
+
+def place(
+    meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]], frame: Frame | None = None
+) -> World:
+    """Mesh i under matrix i, all in one World of unit radius: in `frame`, or in that of all these meshes.
 
     The move and the scaling happen in float64, before anything is rounded to float32.
     """
+    frame = frame or stand(meshes, matrices).frame
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
     repairs: dict[str, int] = {}
     places: dict[str, str] = {}
     known: dict[int, list[Fault]] = {}
     first = {"vertex": 0, "corner": 0, "polygon": 0, "triangle": 0}
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
         cut = triangulate(mesh)
-        moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
         own = cut.corners[:, ::-1] if mirrored else cut.corners
-        in_use = used(mesh)
-        if in_use.any():
-            lowest, highest = bounds(moved[in_use])
-            low, high = np.minimum(low, lowest), np.maximum(high, highest)
         placed.append(
             Placed(
                 mesh, matrix, mirrored, first["vertex"], first["corner"], first["polygon"], first["triangle"]
             )
         )
-        vertices.append(moved)
+        vertices.append(moved(mesh, matrix))
         triangles.append(mesh.corners[own] + np.int32(first["vertex"]))
         corners.append(own + np.int32(first["corner"]))
         polygons.append(cut.polygon + np.int32(first["polygon"]))
@@ -131,11 +193,6 @@ def place(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Wo
             repairs[fault.what] = repairs.get(fault.what, 0) + fault.count
             if fault.first:
                 places.setdefault(fault.what, f"{fault.first} of object {number + 1}")
-    if not np.isfinite(low).all():
-        low, high = np.zeros(3), np.zeros(3)
-    centre = (low + high) / 2
-    radius = float(np.linalg.norm((high - low) / 2)) or 1.0
-    frame = Frame((float(centre[0]), float(centre[1]), float(centre[2])), radius)
     return World(
         frame=frame,
         placed=tuple(placed),

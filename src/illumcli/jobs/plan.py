@@ -6,11 +6,14 @@ import json
 import textwrap
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from illumcli.jobs.render import opened_store
 from illumcli.plan.artifacts import Artifacts
+from illumcli.plan.execute import Tally
 from illumcli.plan.plan import Plan, plan, reusing
+from illumcli.plan.unseen import unseen_objects, why_all, without
 from illumcli.scene.load import load
 
 
@@ -25,8 +28,20 @@ def run(
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
     store = opened_store() if cache else None
+    numbers = unseen_objects(made, Artifacts(store), Tally(), at_hand=True)
+    made = replace(without(made, loaded, numbers), objects=objects(made, numbers))
     parts = [reusing(made, view, Artifacts(store, look=True)) for view in made.views]
     return json.dumps([part.as_data() for part in parts], indent=1) if as_json else table(parts)
+
+
+def objects(made: Plan, left_out: tuple[int, ...]) -> str:
+    """Which objects take part, and why."""
+    why = why_all(made)
+    if why is not None:
+        return f"all: {why}"
+    if left_out:
+        return f"all but {len(left_out)} that no view can tell"
+    return "known once the meshes are read, or all are needed"
 
 
 def table(parts: Sequence[Plan]) -> str:
@@ -39,6 +54,7 @@ def _lines(made: Plan) -> list[str]:
     memory = made.expected_bytes()
     lines = [
         f"view    {view.name}: {view.width} x {view.height}, {view.samples} samples per pixel",
+        f"objects {made.objects}",
         _row("layers", [layer.name for layer in made.layers]),
         _row("once", [step.makes for step in made.once if step.makes not in made.reused]),
         _row("tile", [step.makes for step in made.tile if step.makes not in made.reused]),

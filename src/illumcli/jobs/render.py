@@ -27,8 +27,9 @@ from illumcli.jobs.limits import refuse_disk, refuse_memory
 from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Band, Tally, bands, run_once
 from illumcli.plan.keys import digest
-from illumcli.plan.plan import Plan, content_key, plan, reusing
+from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
 from illumcli.plan.recipes import View
+from illumcli.plan.unseen import unseen_objects, without
 from illumcli.scene.load import Loaded, load
 from illumcli.scene.spec import Scene
 
@@ -182,21 +183,33 @@ def rendered(
     force: bool = False,
     progress: Progress = lambda what, done, of: None,
     strict: bool = False,
+    following: Work | None = None,
 ) -> Report:
-    """Render what is due and say what happened; `strict` refuses what needs repairs."""
+    """Render what is due and say what happened.
+
+    `strict` refuses what needs repairs, in all objects, seen or not. In `memory` remains what `following`
+    reads.
+    """
     start = time.perf_counter()
-    steps = work.plan
     threads = threads or len(os.sched_getaffinity(0))
     identity = digest([target.content for target in work.targets])
-    report = Report(str(work.loaded.path), identity, work.scene.seed, threads, skipped=dict(steps.skipped))
+    report = Report(
+        str(work.loaded.path), identity, work.scene.seed, threads, skipped=dict(work.plan.skipped)
+    )
     due = [target for target in work.targets if not is_kept(target, force)]
     report.kept = [str(target.path) for target in work.targets if target not in due]
     refuse_too_large(work, due)
     tally = Tally()
+    first = Artifacts(store, memory)
+    numbers = unseen_objects(work.plan, first, tally) if due and not strict else ()
+    steps = without(work.plan, work.loaded, numbers)
+    if memory is not None and due:
+        after = without(following.plan, following.loaded, numbers) if following is not None else None
+        memory.wanted = read_by_others(steps, after)
     for view in steps.views:
         mine = [target for target in due if target.view is view]
         if mine:
-            artifacts = Artifacts(store, memory)
+            artifacts = Artifacts(store, memory, reused=dict(first.reused), made=first.made)
             began = time.perf_counter()
             narrowed = reusing(steps, view, artifacts)
             tally.add({"artifacts": time.perf_counter() - began}, {})

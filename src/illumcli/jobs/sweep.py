@@ -22,7 +22,6 @@ from illumcli.files.names import check_unique
 from illumcli.geometry.formula import parse as formula
 from illumcli.jobs.render import Progress, Report, Work, is_kept, opened_store, prepared, rendered
 from illumcli.plan.artifacts import Memory
-from illumcli.plan.plan import read_by_others
 from illumcli.scene.load import load
 
 MOST = 100_000
@@ -109,9 +108,9 @@ def run(
     for number, (variant, work) in enumerate(zip(variants, works, strict=True)):
         outcome = Outcome(variant, work)
         following = next((later for later in range(number + 1, len(works)) if due[later]), None)
-        memory.wanted = read_by_others(work.plan, None if following is None else works[following].plan)
         try:
-            outcome.report = rendered(work, store, memory, threads, force, progress)
+            after = None if following is None else works[following]
+            outcome.report = rendered(work, store, memory, threads, force, progress, following=after)
         except IllumError as error:
             outcome.error = error
         memory.retire()

@@ -20,7 +20,7 @@ from illumcli.arrays import F
 from illumcli.demand import Recipe
 from illumcli.files.store import Store
 from illumcli.frame import Frame
-from illumcli.geometry.assemble import CornerVectors, Placed, World
+from illumcli.geometry.assemble import CornerVectors, Placed, Standing, World
 from illumcli.geometry.mesh import Mesh
 from illumcli.plan.keys import Keys, code
 from illumcli.plan.stages import Repairs, Tile
@@ -35,12 +35,14 @@ about half as fast as measured."""
 MEMORY = 1 << 30
 """Bytes that the variants of a sweep keep in memory for each other."""
 
-ONCE = ("mesh", "world", "frame", "repairs", "corner_normals", "numbering")
+ONCE = ("mesh", "standing", "lifts", "world", "repairs", "corner_normals", "numbering")
 """Buffers of the whole scene that are kept, by name or by its part before the colon.
 
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.
 """
-CLASSES = {cls.__name__: cls for cls in (Mesh, World, Placed, Frame, CornerVectors, Repairs, Numbering)}
+CLASSES = {
+    cls.__name__: cls for cls in (Mesh, Standing, World, Placed, Frame, CornerVectors, Repairs, Numbering)
+}
 
 
 def worth(seconds: float, size: int) -> bool:
@@ -226,9 +228,13 @@ class Artifacts:
     look: bool = False
     reused: dict[str, str] = field(default_factory=dict)
     """Buffer -> where it was found: `memory` or `store`."""
+    made: dict[str, Any] = field(default_factory=dict)
+    """By key, what this run made of the whole scene before it knew its plan."""
 
     def recipe(self, name: str, key: str, view: Any) -> Recipe | None:
         """A recipe that loads the buffer; None where it must be made."""
+        if key in self.made:
+            return Recipe(name, partial(_known, self.made[key]), {})
         found = self._in_memory(name, key) or self._in_store(name, key, view)
         return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,8 @@ class Plan:
     """Buffer -> where it is at hand: `memory` or `store`."""
     keeps: Mapping[str, str] = field(default_factory=dict)
     """Buffers that are made and may be kept -> the key they are kept by."""
+    objects: str = ""
+    """Which objects take part."""
     scene: Scene | None = field(default=None, repr=False)
     book: Mapping[str, Recipe] = field(default_factory=dict, repr=False)
 
@@ -72,6 +74,7 @@ class Plan:
                 for v in self.views
             ],
             "layers": [layer.name for layer in self.layers],
+            "objects": self.objects,
             "once": [step.makes for step in self.once],
             "tile": [step.makes for step in self.tile],
             "skipped": dict(self.skipped),
@@ -113,15 +116,17 @@ class Plan:
         return frozenset(needs)
 
 
-def plan(scene: Scene, loaded: Any, only: Sequence[str] = ()) -> Plan:
+def plan(scene: Scene, loaded: Any, only: Sequence[str] = (), unseen: tuple[int, ...] = ()) -> Plan:
     """The plan for a scene's outputs, or for `only` some layers. Reads no mesh, traces nothing.
+
+    The objects of the numbers `unseen` are known to change no picture.
 
     Raises
     ------
     LimitError
         A film larger or more rays than this program takes on.
     """
-    book = recipes(scene, loaded)
+    book = recipes(scene, loaded, unseen)
     wanted = tuple(layers(scene, only or scene.outputs.layers))
     all_views = tuple(views(scene))
     once, tile = _steps(book, wanted)
@@ -143,10 +148,20 @@ def reusing(made: Plan, view: View, artifacts: Artifacts) -> Plan:
     rays = _expected_rays(made.scene, (view,), steps - found.keys())
     skipped = dict(made.skipped)
     for step in (*made.once, *made.tile):
-        if step.makes not in steps:
+        if step.makes not in steps and book.keys_of(step.makes) not in artifacts.made:
             skipped[step.makes] = "all that needs it is at hand"
-    kept = {name: book.keys_of(name) for name in steps - found.keys() if artifacts.keeps(name)}
-    return Plan((view,), made.layers, once, tile, skipped, rays, found, kept, made.scene, made.book)
+    new = [name for name in steps - found.keys() if book.keys_of(name) not in artifacts.made]
+    kept = {name: book.keys_of(name) for name in new if artifacts.keeps(name)}
+    return replace(
+        made,
+        views=(view,),
+        once=once,
+        tile=tile,
+        skipped=skipped,
+        expected_rays=rays,
+        reused=found,
+        keeps=kept,
+    )
 
 
 def content_key(made: Plan, view: View, buffers: Iterable[str]) -> str:
@@ -170,7 +185,7 @@ def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
         asked = {layer.buffer for layer in following.layers} | {"hits", "samples", "alpha"}
         read = {need for step in following.tile if step.makes not in common for need in step.needs.values()}
         wanted |= {other(name) for name in common & (asked | read)}
-        wanted |= {other(step.makes) for step in following.once}
+        wanted |= {other(name) for name in ("lifts", *(step.makes for step in following.once))}
     return frozenset(wanted)
 
 

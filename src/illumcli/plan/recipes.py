@@ -170,8 +170,10 @@ def active_lights(scene: Scene) -> dict[str, Light]:
     return {name: light for name, light in scene.named_lights().items() if sends(light)}
 
 
-def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
+def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str, Recipe]:
     """Every buffer this scene could make, by name; `view` and `tile` are given.
+
+    The objects of the numbers `unseen` are left out of it, as far as nothing can tell.
 
     A recipe binds only those parts of the scene that its buffer depends on: they are what the buffer is known
     by (`plan.keys`).
@@ -184,7 +186,7 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
     grains = tuple(thing.grain for thing in scene.objects)
     by_uv = {"uv_tangents": "uv_tangents"} if None in grains else {}
     book = [
-        *_geometry(scene, loaded, rate),
+        *_geometry(scene, loaded, rate, unseen),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
@@ -199,7 +201,7 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
         Recipe.of(stages.shadow_origins, **smooth),
         Recipe.of(stages.obscurance_origins),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
-        *_obscurance(scene, loaded),
+        *_obscurance(scene, loaded, unseen),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
         Recipe.of(stages.emission, **_varying(scene, "emission")),
         Recipe.of(stages.alpha),
@@ -221,9 +223,12 @@ def recipes(scene: Scene, loaded: Any) -> dict[str, Recipe]:
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
 
 
-def _obscurance(scene: Scene, loaded: Any) -> list[Recipe]:
+def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Recipe]:
     """w, by rays or from the files that its objects' meshes name."""
-    files = baked_files(scene, loaded)
+    files = tuple(
+        (name, None if number in unseen else file)
+        for number, (name, file) in enumerate(baked_files(scene, loaded))
+    )
     settings = scene.obscurance or Obscurance()
     more = {"horizon": "horizon"}
     if any(file for _, file in files):
@@ -262,7 +267,7 @@ def all_baked(scene: Scene) -> bool:
     return bool(scene.objects) and all(is_baked(scene))
 
 
-def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
+def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int, ...]) -> list[Recipe]:
     """Meshes, each source once, what is made of them all, and their normals."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
     found = {
@@ -274,10 +279,20 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Recipe]:
     how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
     methods = tuple("newell" if said is None else said.polygon for said in normals)
     parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
+    flat = tuple(own == "constant" for own in rate)
+    every = "every_mesh" if unseen else "meshes"
+    left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
         *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
-        Recipe("meshes", partial(stages.meshes, which), parts),
-        Recipe.of(partial(stages.world, tuple(thing.transform for thing in scene.objects)), "world"),
+        Recipe(every, partial(stages.meshes, which), parts),
+        *left,
+        Recipe.of(
+            partial(stages.standing, tuple(thing.transform for thing in scene.objects)),
+            "standing",
+            meshes=every,
+        ),
+        Recipe.of(partial(stages.lifts, flat), "lifts", meshes=every),
+        Recipe.of(stages.world),
         Recipe.of(stages.frame),
         Recipe.of(stages.repairs),
         Recipe.of(stages.tracer_over, "tracer"),

@@ -14,7 +14,7 @@ from illumcli.errors import InputError
 from illumcli.files.content import Content
 from illumcli.frame import Frame
 from illumcli.geometry import assemble
-from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.assemble import CornerVectors, Standing, World
 from illumcli.geometry.mesh import Mesh
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
@@ -69,17 +69,39 @@ def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
     return tuple(own[k] for k in which)
 
 
-def world(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> World:
-    """All triangles, placed, recentred and scaled to unit radius."""
+def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> Standing:
+    """Where every object stands, and the scene's centre and radius."""
     matrices = [
         assemble.transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)
     ]
-    return assemble.place(meshes, matrices)
+    return assemble.stand(meshes, matrices)
 
 
-def frame(world: World) -> Frame:
+def lifts(flat: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing) -> NDArray[np.float64]:
+    """(O,) how far off each object's surface its shadow rays start at most [scene units]: the curved surface
+    that normals pretend lies no farther from a polygon than this is wide."""
+    sizes = [
+        0.0 if own else assemble.widest_polygon(mesh, matrix)
+        for own, mesh, matrix in zip(flat, meshes, standing.matrices, strict=True)
+    ]
+    return np.array(sizes, np.float64)
+
+
+def left(unseen: tuple[int, ...], meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
+    """The meshes, those of objects that nobody sees without their polygons."""
+    return tuple(
+        assemble.without_polygons(mesh) if number in unseen else mesh for number, mesh in enumerate(meshes)
+    )
+
+
+def world(meshes: tuple[Mesh, ...], standing: Standing) -> World:
+    """All triangles, placed, recentred and scaled to unit radius."""
+    return assemble.place(meshes, standing.matrices, standing.frame)
+
+
+def frame(standing: Standing) -> Frame:
     """The scene's centre and radius."""
-    return world.frame
+    return standing.frame
 
 
 @dataclass(frozen=True, slots=True)

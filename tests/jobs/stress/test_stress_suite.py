@@ -34,7 +34,14 @@ def test_the_whole_suite_passes():
 def test_every_scene_of_the_list_is_there(quick):
     cases = {row.case for row in quick.rows}
     assert set(scenes.MUST_RENDER) | set(scenes.MUST_REFUSE) <= cases
-    assert {"size and distance", "powers of two", "contact gaps", "threads", "model: ward"} <= cases
+    assert {
+        "size and distance",
+        "size and distance, baked",
+        "powers of two",
+        "contact gaps",
+        "threads",
+        "model: ward",
+    } <= cases
 
 
 def test_the_table_has_a_line_per_case_and_totals(quick):

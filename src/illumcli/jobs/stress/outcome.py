@@ -16,6 +16,7 @@ from illumcli.errors import IllumError, InputError, LimitError
 LAYERS = (
     "beauty", "ambient", "diffuse", "specular", "lights", "shadows", "obscurance", "alpha", "depth",
     "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+    "error",
 )  # fmt: skip
 SIGNED = ("P", "N", "Ng", "uv")
 """Layers whose values may be below 0; all others are light, shares, distances and numbers."""
@@ -71,6 +72,25 @@ class Room:
         image.unlink()
         self._count(channels)
         return channels, data
+
+    def bake(self, scene: Mapping[str, Any], rays: int) -> NDArray[np.float32]:
+        """Obscurance baked at every vertex of the scene, one object after the other.
+
+        Raises
+        ------
+        IllumError
+            What `illum ao-bake` would end with.
+        """
+        from illumcli.files.vertex_data import read_npz
+        from illumcli.jobs.ao_bake import Settings, run
+
+        path, baked = self.folder / "bake.yaml", self.folder / "bake.npz"
+        path.write_text(json.dumps({"version": 1, **scene}))
+        run(path, [baked], Settings(samples=rays), threads=1, force=True)
+        w = read_npz(baked).obscurance
+        self.values += w.size
+        self.not_finite += int(np.count_nonzero(~np.isfinite(w)))
+        return w
 
     def _count(self, channels: Channels) -> None:
         self.pixels += next(iter(channels.values())).size

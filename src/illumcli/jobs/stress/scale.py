@@ -25,6 +25,7 @@ def rows(room: Room, quick: bool) -> list[Row]:
     film = {"width": 32, "height": 24, "samples": 1} if quick else {"width": 96, "height": 72, "samples": 1}
     return [
         _matrix(room, chosen, film),
+        _baked(room, chosen),
         _powers_of_two(room, (-20, 7) if quick else range(-20, 21, 4), film),
         *_convex(room, chosen, film),
     ]
@@ -47,9 +48,27 @@ def _matrix(room: Room, pairs: list[tuple[float, float]], film: Scene) -> Row:
 
 
 def _view(room: Room, size: float, distance: float, film: Scene) -> Channels:
-    away = (5 * size * distance,) * 3  # the scene's radius is about 5
-    said = {**scaled(size, *away), "film": film, "obscurance": {"samples": RAYS}}
+    said = {**_there(size, distance), "film": film, "obscurance": {"samples": RAYS}}
     return room.picture(said, LAYERS)[0]
+
+
+def _baked(room: Room, pairs: list[tuple[float, float]]) -> Row:
+    reference = room.bake(_there(1.0, 0.0), RAYS)
+    most, where = 0.0, (1.0, 0.0)
+    for size, distance in pairs:
+        off = float(np.abs(room.bake(_there(size, distance), RAYS) - reference).max())
+        if off > most:
+            most, where = off, (size, distance)
+    check = f"{len(pairs)} pairs of size and distance: |dw| <= 1/{RAYS} at every vertex"
+    worst = f"|dw| {most:.3g} at most, of {len(reference)} vertices"
+    if most:
+        worst += f", size {where[0]:g} at {where[1]:g} radii"
+    return Row("size and distance, baked", check, worst, bool(most <= 1.01 / RAYS and reference.min() < 0.9))
+
+
+def _there(size: float, distance: float) -> Scene:
+    """Ball and floor of a size, so many radii from the origin; the scene's radius is about 5."""
+    return scaled(size, *(5 * size * distance,) * 3)
 
 
 def _beyond(a: Channels, b: Channels) -> float:

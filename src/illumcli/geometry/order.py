@@ -24,25 +24,25 @@ def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
     Bentley, J. L. (1975). Multidimensional binary search trees used for associative searching. CACM 18(9).
     """
     count = len(points)
-    order = along_curve(points)
+    if not count:
+        return np.zeros(0, np.int64)
     size = min(BLOCK, 1 << max(count - 1, 1).bit_length())
-    padded = np.concatenate([order, np.full(-count % size, -1)])
+    padded = np.concatenate([along_curve(points), np.full(-count % size, count)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes = np.vstack([points, high + (high - low)]).T.copy()  # (3, N + 1), the last one far out
     while size > SMALLEST:
         boxes = padded.reshape(-1, size)
-        own = points[boxes]
-        own[boxes < 0] = np.nan  # sorts last
-        low, high = np.fmin.reduce(own, axis=1), np.fmax.reduce(own, axis=1)
-        axis = np.argmax(np.nan_to_num(high - low), axis=1)
-        along = np.take_along_axis(own, axis[:, None, None], axis=2)[:, :, 0]
-        padded = np.take_along_axis(boxes, np.argsort(along, axis=1), axis=1).ravel()
+        own = axes.take(boxes, axis=1)
+        longest = np.argmax(own.max(axis=2) - own.min(axis=2), axis=0)
+        along = own[longest, np.arange(len(boxes))]
+        halves = np.argpartition(along, size // 2, axis=1)
+        padded = np.take_along_axis(boxes, halves, axis=1).ravel()
         size //= 2
-    return padded[padded >= 0]
+    return padded[padded < count]
 
 
 def along_curve(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
-    """(N,) the points' numbers in Morton order (1966)."""
-    if not len(points):
-        return np.zeros(0, np.int64)
+    """(N,) the numbers of N > 0 points in Morton order (1966)."""
     low = points.min(axis=0)
     size = float(np.max(points.max(axis=0) - low)) or 1.0
     cell = ((np.asarray(points, np.float64) - low) / size * (2**BITS - 1)).astype(np.uint64)

@@ -19,8 +19,8 @@ from illumcli.geometry.order import compact
 FAN = 8
 GROUP = 64  # points asked about together
 GROUPS_AT_ONCE = 64
-TRY_FIRST = 8
-"""One group in so many is asked first; where none of their points is clear, the others cast rays."""
+TRY_FIRST = 16
+"""One group in so many is asked first; where none of its points is clear, its neighbours cast rays."""
 MOST_CLUSTERS = 1 << 13
 """Groups that look at more clusters than this cast rays instead."""
 PROBES = 64
@@ -86,16 +86,22 @@ class Horizon:
         """
         if not len(self._points):
             return np.ones(len(origins), bool)
+        group = np.arange(len(origins)) // GROUP
+        tried = group % TRY_FIRST == 0
         out = np.zeros(len(origins), bool)
-        for first in range(0, len(origins), GROUP * GROUPS_AT_ONCE):
-            lane = np.arange(first, min(first + GROUP * GROUPS_AT_ONCE, len(origins)))
-            tried = lane // GROUP % TRY_FIRST == 0
-            for part in (lane[tried], lane[~tried]):
-                o, up = np.asarray(origins[part], np.float64), np.asarray(n[part], np.float64)
-                out[part] = self._cleared(o, up, most)
-                if not out[part].any():
-                    break
+        self._clear(out, np.flatnonzero(tried), origins, n, most)
+        cleared = np.bincount(group // TRY_FIRST, out) > 0
+        self._clear(out, np.flatnonzero(~tried & cleared[group // TRY_FIRST]), origins, n, most)
         return out
+
+    def _clear(
+        self, out: NDArray[np.bool_], lanes: NDArray[np.int64], origins: Vectors, n: Vectors, most: int
+    ) -> None:
+        """Answer for some lanes."""
+        for first in range(0, len(lanes), GROUP * GROUPS_AT_ONCE):
+            lane = lanes[first : first + GROUP * GROUPS_AT_ONCE]
+            o, up = np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64)
+            out[lane] = self._cleared(o, up, most)
 
     def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
         """(M,) True where no occluder is above the plane, as far as probes and then clusters tell."""

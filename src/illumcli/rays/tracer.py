@@ -121,11 +121,11 @@ class Tracer:
         lowest = reach.min(initial=np.inf)
         if np.isnan(lowest):
             raise IllumError("a ray's limit is not a number")
+        far = np.minimum(reach, FARTHEST)
         out = np.empty(count, np.bool_)
         for part in _parts(count):
             # embreex gets an array of its own: it may write to it
-            own = np.full(part.stop - part.start, reach) if reach.ndim == 0 else reach[part].copy()
-            np.minimum(own, FARTHEST, out=own)
+            own = far[part] if far.ndim else np.full(part.stop - part.start, far)
             hit = self._scene.run(origins[part], directions[part], own, query="OCCLUDED")
             np.greater_equal(hit, 0, out=out[part])
         return out if lowest > 0 else out & (reach > 0)

@@ -176,11 +176,11 @@ def slabs(points: NDArray[np.float64], size: int) -> Slabs:
     group = padded.reshape(count, size, 3)
     centre = group.mean(axis=1)
     centred = group - centre[:, None]
-    _, vectors = np.linalg.eigh(np.einsum("kpi,kpj->kij", centred, centred))
+    _, vectors = np.linalg.eigh(np.matmul(centred.transpose(0, 2, 1), centred))
     axis = np.ascontiguousarray(vectors[:, :, 0])
-    along = np.einsum("kpi,ki->kp", centred, axis)
-    across = centred - along[:, :, None] * axis[:, None]
-    width = np.sqrt(np.einsum("kpi,kpi->kp", across, across).max(axis=1))
+    along = np.matmul(centred, axis[:, :, None])[:, :, 0]
+    across = np.matmul(np.square(centred), np.ones(3)) - np.square(along)  # squared, and no less than along's
+    width = np.sqrt(across.max(axis=1).clip(0))
     # a rounding wider than they are: bounds must hold
     room = 1e-12
     return Slabs(centre, axis, along.min(axis=1) - room, along.max(axis=1) + room, width + room)

@@ -108,10 +108,11 @@ def estimates(
     lane = np.arange(count)
     if horizon is not None:
         lane = np.flatnonzero(~horizon.clears(origins, n, CLUSTERS_PER_RAY * method.samples))
+    frames = about(n, draws, method)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, len(lane), at_once):
         part = lane[first : first + at_once]
-        d = directions(n[part], draws[:, part], method)
+        d = np.matmul(patterns(draws[:, part], method), frames[part])
         mu = seen(tracer, origins[part], d.reshape(-1, 3), method).reshape(len(part), -1)
         w[part] = shares(mu)
         if errors:
@@ -125,8 +126,8 @@ def estimates(
 
 def shares(mu: NDArray[Any]) -> NDArray[np.float32]:
     """(M,) mean of each row; 1 exactly where nothing is in the way."""
-    if mu.dtype == np.bool_:
-        return (np.count_nonzero(mu, axis=1) / mu.shape[1]).astype(F)
+    if mu.dtype == np.bool_:  # exact: counts are below 2^24
+        return (mu.astype(F) @ np.ones(mu.shape[1], F)) / F(mu.shape[1])
     return mu.mean(axis=1, dtype=np.float64).astype(F)
 
 
@@ -195,11 +196,14 @@ def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> L
 
 def directions(n: Vectors, draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
     """(M, samples, 3) float32 unit directions about each normal, cosine-weighted."""
-    first, second = draws
+    return np.matmul(patterns(draws, method), about(n, draws, method))
+
+
+def patterns(draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
+    """(M, samples, 3) float32 cosine-weighted unit directions about the third axis."""
     if method.sampler == "spiral":
         table = spiral_table(method.samples)
-        pattern = table.take((second * len(table)).astype(np.int32), axis=0)
-        return np.matmul(pattern, turned_frame(n, (2 * np.pi * first).astype(F)))
+        return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
     seeds = (draws * 2.0**32).astype(np.uint32)
     if method.sampler == "owen":
         u, v = (
@@ -210,8 +214,13 @@ def directions(n: Vectors, draws: NDArray[np.float64], method: Method) -> NDArra
         ray = np.arange(method.samples, dtype=np.uint32)[None, :]
         u, v = (unit_interval(hashed(k, hashed(k + 7, seeds[k])[:, None] + ray)) for k in (0, 1))
     r, angle = np.sqrt(u), 2 * np.pi * v
-    pattern = np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=-1).astype(F)
-    return np.matmul(pattern, turned_frame(n, np.zeros(len(n), F)))
+    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=-1).astype(F)
+
+
+def about(n: Vectors, draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
+    """(M, 3, 3) float32 the axes of each point's pattern, as rows: spirals are turned."""
+    angle = 2 * np.pi * draws[0] if method.sampler == "spiral" else np.zeros(len(n))
+    return turned_frame(n, angle.astype(F))
 
 
 def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:

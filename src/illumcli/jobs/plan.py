@@ -53,7 +53,8 @@ def _lines(made: Plan) -> list[str]:
     view = made.views[0]
     memory = made.expected_bytes()
     lines = [
-        f"view    {view.name}: {view.width} x {view.height}, {view.samples} samples per pixel",
+        f"view    {view.name}: {view.width} x {view.height}, {view.samples} samples per pixel"
+        + (f", {view.adaptive.first} where these agree" if view.is_adaptive else ""),
         f"objects {made.objects}",
         _row("layers", [layer.name for layer in made.layers]),
         _row("once", [step.makes for step in made.once if step.makes not in made.reused]),

@@ -67,7 +67,10 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
     spared: dict[str, int] = field(default_factory=dict)
-    """Points that a light does not reach (`lit`) or not freely (`free`): no ray, no response."""
+    """Points that a light does not reach (`lit`) or not freely (`free`): no ray, no response. Polygons of
+    objects that no view can tell. Samples of pixels that adaptive antialiasing leaves at the first few."""
+    refined: int = 0
+    """Pixels that adaptive antialiasing gave all samples."""
     reused: dict[str, dict[str, str]] = field(default_factory=dict)
     """Camera -> buffer -> where it was at hand: `memory` or `store`."""
     warnings: list[str] = field(default_factory=list)
@@ -227,6 +230,7 @@ def rendered(
             if sums.pixels:
                 report.standard_error[view.name] = sums.as_data()
     report.seconds, report.rays, report.spared = dict(tally.seconds), dict(tally.rays), dict(tally.spared)
+    report.refined = tally.refined
     report.written = [str(target.path) for target in due]
     report.total_seconds = time.perf_counter() - start
     return report

@@ -116,6 +116,7 @@ def subject(
         )
     if width is not None and view.width > width:
         view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
+    view = replace(view, adaptive=None)
     return Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
 
 

@@ -80,6 +80,8 @@ class Choice:
         """The counts as `-D` has them."""
         said = [f"film.samples={self.sampling.pixel}"]
         scene = self.subjects[0].scene
+        if scene.film.adaptive is not None:  # every pixel counts for the error that was asked for
+            said.append("film.adaptive=null")
         for name, camera in scene.named_cameras().items():
             if camera.samples is not None:
                 place = f"cameras.{name}" if scene.cameras else "camera"
@@ -137,7 +139,7 @@ def chosen(
         )
     layer = min(means, key=lambda layer: layer.buffer != "beauty")
     first = subject(loaded, layer.name, threads)
-    subjects = tuple(replace(first, view=view) for view in views(loaded.scene))
+    subjects = tuple(replace(first, view=replace(view, adaptive=None)) for view in views(loaded.scene))
     has_rays = "obscurance" in {step.makes for step in steps.tile} and loaded.scene.obscurance is not None
     pilots = [Pilot(each, has_rays) for each in subjects]
     goal = (MARGIN * target) ** 2

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F
+from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.film import pixel_means, pixel_nearest
 from illumcli.memory import keep_freed_memory
 from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
-from illumcli.plan.recipes import View
+from illumcli.plan.recipes import SHAPE, View
 from illumcli.plan.stages import LANES, Scattered, Tile
 from illumcli.rays.tracer import Interrupted
 from illumcli.visibility.arriving import Lit
@@ -34,7 +35,10 @@ class Tally:
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     rays: dict[str, int] = field(default_factory=lambda: defaultdict(int))
     spared: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-    """Points that a light does not reach, or does not reach freely: neither rays nor models see them."""
+    """Points that a light does not reach, or does not reach freely: neither rays nor models see them. Samples
+    of pixels that agree."""
+    refined: int = 0
+    """Pixels that wanted all their samples."""
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(
@@ -91,7 +95,8 @@ def bands(
     The pixels do not depend on `threads`, `side` or `artifacts`, where what is worth it is kept. When the
     consumer stops or is interrupted, tiles in flight end at their next step.
     """
-    side = plan.tile_side(view, side)
+    adaptive = view.is_adaptive
+    side = plan.tile_side(view.coarse() if adaptive else view, side)
     stop = threading.Event()
     tiles = [
         [
@@ -103,7 +108,8 @@ def bands(
     ahead = threads + 1
     last_use = plan.last_use()
     covered = any(step.makes == "alpha" for step in plan.tile)
-    keeper = Keeper(artifacts or Artifacts(), plan.keeps, view)
+    keeper = Keeper(artifacts or Artifacts(), {} if adaptive else plan.keeps, view)
+    make = _adaptive_tile if adaptive else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
@@ -113,7 +119,7 @@ def bands(
             def submit() -> None:
                 for tile in queue:
                     pending.append(
-                        (tile, pool.submit(_tile, plan, shared, view, tile, last_use, tally, stop, keeper))
+                        (tile, pool.submit(make, plan, shared, view, tile, last_use, tally, stop, keeper))
                     )
                     if len(pending) >= ahead + len(tiles[0]):
                         break
@@ -186,6 +192,24 @@ def _tile(
     keeper: Keeper,
 ) -> tuple[Planes, Kept]:
     """Every layer of one tile, (rows, columns, channels) each, and what is kept of its buffers."""
+    buffers, kept = _made(plan, shared, view, tile, last_use, tally, stop, keeper)
+    start = time.perf_counter()
+    out = _pixels(plan, buffers, view, tile)
+    tally.add({"film": time.perf_counter() - start}, {})
+    return out, kept
+
+
+def _made(
+    plan: Plan,
+    shared: Mapping[str, Any],
+    view: View,
+    tile: Tile,
+    last_use: Mapping[str, int],
+    tally: Tally,
+    stop: threading.Event,
+    keeper: Keeper,
+) -> tuple[dict[str, Any], Kept]:
+    """The buffers of one tile that the film reads, and what is kept of them all."""
     buffers: dict[str, Any] = {**shared, "view": view, "tile": tile}
     tracer = None
     if "tracer" in shared:
@@ -206,11 +230,71 @@ def _tile(
         for name in step.needs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)
-    start = time.perf_counter()
-    out = _pixels(plan, buffers, view, tile)
-    seconds["film"] = time.perf_counter() - start
     tally.add(seconds, rays, lanes)
-    return out, kept
+    return buffers, kept
+
+
+def _adaptive_tile(
+    plan: Plan,
+    shared: Mapping[str, Any],
+    view: View,
+    tile: Tile,
+    last_use: Mapping[str, int],
+    tally: Tally,
+    stop: threading.Event,
+    keeper: Keeper,
+) -> tuple[Planes, Kept]:
+    """Every layer of one tile: of few samples, and of all of them where it differs among these.
+
+    The few are taken of a border of one pixel too, so that a pixel sees the same neighbours in any tile. Each
+    layer decides for itself, by the shapes seen and its own values: no layer depends on what others are asked
+    for.
+    """
+    few, around = view.coarse(), tile.grown(view.width, view.height)
+    buffers, _ = _made(plan, shared, few, around, last_use, tally, stop, keeper)
+    start = time.perf_counter()
+    own = (
+        slice(tile.y - around.y, tile.y - around.y + tile.height),
+        slice(tile.x - around.x, tile.x - around.x + tile.width),
+    )
+    out = {name: np.array(values[own]) for name, values in _pixels(plan, buffers, few, around).items()}
+    differing = _differing(plan, buffers, few, around, view.adaptive.difference)
+    which = {name: mask[own] for name, mask in differing.items()}
+    wanted = np.logical_or.reduce([*which.values()])
+    rows, columns = np.nonzero(wanted)
+    tally.add({"film": time.perf_counter() - start}, {})
+    some = max(1, LANES // view.samples)
+    for first in range(0, len(rows), some):
+        y, x = rows[first : first + some], columns[first : first + some]
+        part = Scattered.at(x + tile.x, y + tile.y)
+        finer, _ = _tile(plan, shared, view, part, last_use, tally, stop, keeper)
+        for name, values in finer.items():
+            mine = which[name][y, x]
+            out[name][y[mine], x[mine]] = values[0][mine]
+    pixels, refined = tile.width * tile.height, len(rows)
+    taken = around.width * around.height * few.samples + refined * view.samples
+    tally.add({}, {}, {"samples": pixels * view.samples - taken})
+    with tally.lock:
+        tally.refined += refined
+    return out, {}
+
+
+def _differing(
+    plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile, difference: float
+) -> dict[str, NDArray[np.bool_]]:
+    """(rows, columns) by layer: where its pixels want more samples than the view has."""
+    lane, shape = buffers["hits"].lane, (tile.height, tile.width)
+    objects, normals, depths = (buffers[name] for name in SHAPE)
+    forms = differs_in_shape(objects, normals, depths, lane, shape, view.samples)
+    out = {}
+    for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.layers] + [
+        ("alpha", "alpha", True)
+    ]:
+        out[name] = forms
+        if not data:
+            light = differs_in_light(buffers[buffer], lane, shape, view.samples, difference)
+            out[name] = forms | light
+    return out
 
 
 def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> Planes:

@@ -11,13 +11,14 @@ import numpy as np
 
 from illumcli import __version__
 from illumcli.demand import Recipe, order
-from illumcli.errors import LimitError
+from illumcli.errors import InputError, LimitError
 from illumcli.film.film import Layer
 from illumcli.plan.artifacts import Artifacts, Book, Picture, kind_of
 from illumcli.plan.doubled import AGAIN, BLOCK, doubled_count
 from illumcli.plan.keys import Keys, code, digest
 from illumcli.plan.recipes import (
     GIVEN,
+    SHAPE,
     View,
     active_lights,
     is_ambient,
@@ -57,7 +58,9 @@ class Plan:
 
     def last_use(self) -> dict[str, int]:
         """The last tile step that reads each buffer made in the tile; those of layers are kept."""
-        kept = {layer.buffer for layer in self.layers} | {"hits", "samples", "alpha"}  # the film reads them
+        # the film reads them
+        kept = {layer.buffer for layer in self.layers} | {"hits", "samples", "alpha"}
+        kept |= set(SHAPE) if any(view.is_adaptive for view in self.views) else set()
         made = {step.makes for step in self.tile}
         last: dict[str, int] = {}
         for number, step in enumerate(self.tile):
@@ -71,6 +74,7 @@ class Plan:
         return {
             "views": [
                 {"camera": v.name, "width": v.width, "height": v.height, "samples": v.samples}
+                | ({"first_samples": v.adaptive.first} if v.is_adaptive else {})
                 for v in self.views
             ],
             "layers": [layer.name for layer in self.layers],
@@ -123,13 +127,19 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = (), unseen: tuple[int,
 
     Raises
     ------
+    InputError
+        Layers that do not exist, or not with this film.
     LimitError
         A film larger or more rays than this program takes on.
     """
     book = recipes(scene, loaded, unseen)
     wanted = tuple(layers(scene, only or scene.outputs.layers))
     all_views = tuple(views(scene))
-    once, tile = _steps(book, wanted)
+    if any(layer.per_pixel for layer in wanted) and any(view.is_adaptive for view in all_views):
+        raise InputError(
+            "the layer error is that of a fixed number of samples; leave it out, or film.adaptive"
+        )
+    once, tile = _steps(book, wanted, all_views)
     made = {step.makes for step in (*once, *tile)}
     rays = _expected_rays(scene, all_views, made)
     _refuse(all_views, rays)
@@ -142,7 +152,7 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = (), unseen: tuple[int,
 def reusing(made: Plan, view: View, artifacts: Artifacts) -> Plan:
     """The plan for one view, with what is at hand loaded instead of made."""
     book = Book(made.book, view, artifacts)
-    once, tile = _steps(book, made.layers)
+    once, tile = _steps(book, made.layers, (view,))
     steps = {step.makes for step in (*once, *tile)}
     found = {name: where for name, where in artifacts.reused.items() if name in steps}
     rays = _expected_rays(made.scene, (view,), steps - found.keys())
@@ -190,12 +200,15 @@ def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
 
 
 def _steps(
-    book: Mapping[str, Recipe], wanted: Sequence[Layer]
+    book: Mapping[str, Recipe], wanted: Sequence[Layer], all_views: Sequence[View]
 ) -> tuple[tuple[Recipe, ...], tuple[Recipe, ...]]:
     """What runs once and what runs per tile, each after all it needs."""
     coverage = ["alpha"] if any(layer.buffer == "beauty" for layer in wanted) else []
     nearest = ["samples"] if any(layer.data for layer in wanted) else []
     filled = dict.fromkeys(layer.buffer for layer in wanted)
+    if any(view.is_adaptive for view in all_views):
+        filled |= dict.fromkeys(SHAPE)
+        coverage = ["alpha"]
     steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", "repairs"], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []
@@ -209,7 +222,10 @@ def _steps(
 
 
 def _expected_rays(scene: Any, all_views: Sequence[View], made: set[str]) -> dict[str, int]:
-    samples = sum(view.width * view.height * view.samples for view in all_views)
+    samples = sum(
+        view.width * view.height * (view.samples + (view.adaptive.first if view.is_adaptive else 0))
+        for view in all_views
+    )
     doubled = sum(doubled_count(view.width, view.height) * view.samples for view in all_views)
     again = {name.removeprefix(AGAIN) for name in made if name.startswith(AGAIN)}
     more = _rays_of(scene, doubled, again)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -38,6 +38,16 @@ class View:
     width: int
     height: int
     samples: int
+    adaptive: Any = None
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Are pixels sampled to different counts?"""
+        return self.adaptive is not None and self.adaptive.first < self.samples
+
+    def coarse(self) -> View:
+        """The view with as many samples as every pixel gets."""
+        return replace(self, samples=self.adaptive.first, adaptive=None)
 
 
 def views(scene: Scene) -> list[View]:
@@ -50,6 +60,7 @@ def views(scene: Scene) -> list[View]:
             camera.width or film.width,
             camera.height or film.height,
             camera.samples or film.samples,
+            film.adaptive,
         )
         for name, camera in scene.named_cameras().items()
     ]
@@ -435,3 +446,7 @@ def _sums(scene: Scene) -> list[Recipe]:
         total("uncued" if cued else "beauty", *glow, *both),
         *cued,
     ]
+
+
+SHAPE = ("object_id", "geometric_normal", "depth")
+"""Buffers whose differences say, before any light, which pixels want more samples."""

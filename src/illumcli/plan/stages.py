@@ -297,6 +297,12 @@ class Tile:
         y, x = np.divmod(np.arange(self.width * self.height), self.width)
         return x + self.x, y + self.y
 
+    def grown(self, width: int, height: int) -> Tile:
+        """The rectangle and a border of one pixel, within a film of this size."""
+        x, y = max(self.x - 1, 0), max(self.y - 1, 0)
+        right, lower = min(self.x + self.width + 1, width), min(self.y + self.height + 1, height)
+        return Tile(x, y, right - x, lower - y)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scattered(Tile):

@@ -199,6 +199,23 @@ class Filter(Description):
     """Support of box and tent, and two standard deviations of the Gaussian, either side [half pixels]."""
 
 
+class Adaptive(Description):
+    """Few samples for every pixel, and all of them only where these differ from each other or from those of
+    the neighbouring pixels: in object, normal or depth, and each layer in its own light.
+
+    Not unbiased: what the few samples miss, as things smaller than the gaps between them, stays missed.
+    """
+
+    first: Count = 4
+    """Samples that every pixel gets."""
+    difference: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """How far light may differ among them, as a share of the brightest."""
+
+
+def _adaptive(value: Any) -> Any:
+    return {"first": value} if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class Film(Description):
     """Size and sampling of the picture."""
 
@@ -206,6 +223,11 @@ class Film(Description):
     height: Count = 720
     samples: Count = 4
     """Per pixel; 1 looks through the pixel's centre."""
+    adaptive: (
+        Annotated[Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)] | None
+    ) = None
+    """Take all samples only where fewer differ; a number says how many every pixel gets. By default every
+    pixel gets all."""
     filter: Filter = DEFAULTS
     background: Color | None = None
     """Behind everything; by default nothing, with alpha 0."""

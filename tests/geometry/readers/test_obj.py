@@ -194,3 +194,10 @@ def test_colours_on_every_vertex_need_no_repair(tmp_path: Path) -> None:
     mesh = mesh_of(tmp_path, "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 1 2 3\n")
     assert mesh.attributes["color"].tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]]
     assert mesh.repairs == {}
+
+
+@pytest.mark.parametrize("corner", ["/", "//", "/ /"])
+def test_corners_of_slashes_alone_are_refused(tmp_path: Path, corner: str) -> None:
+    """Found by coverage-guided fuzzing: no number in any face."""
+    with pytest.raises(InputError, match=r"a\.obj:5: '/+' is no corner of a face; write v, v/vt"):
+        mesh_of(tmp_path, f"{SQUARE}f {corner}\n")

@@ -192,7 +192,7 @@ def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
     corner_count = int(counts.sum())
     four = ~(first[1:-2] | first[2:-1] | first[3:])
     explained = passed + _trailing(faces.data, slash) == np.count_nonzero(slash)
-    if four.any() or slots.max() > 2 or corner[-1] + 1 != corner_count or not explained:
+    if four.any() or slots.max(initial=0) > 2 or np.count_nonzero(first) != corner_count or not explained:
         raise _bad_corner(faces)
     _nonzero(faces, values, corner)
     references = {}

@@ -69,6 +69,9 @@ def test_whatever_stops_the_writer_leaves_no_debris(tmp_path, stop):
         stopped()
     assert os.listdir(tmp_path) == ["a.txt"]
     assert (tmp_path / "a.txt").read_text() == "old"
+    assert not [path for path in atomic._open if path.parent == tmp_path]
+    write_text(tmp_path / "a.txt", "new")
+    assert not [path for path in atomic._open if path.parent == tmp_path]
 
 
 def test_folder_in_the_place_of_the_file_is_refused(tmp_path):
@@ -193,3 +196,16 @@ def test_a_part_of_somebody_elses_process_is_kept(tmp_path, monkeypatch):
     part.write_text("half")
     write_text(tmp_path / "a.txt", "whole")
     assert part.exists()
+
+
+@pytest.mark.parametrize(("name", "part"), [("a-b.c", "abc"), ("-", "host"), ("", "host")])
+def test_the_name_of_the_machine_is_one_word(monkeypatch, name, part):
+    monkeypatch.setattr(atomic.os, "uname", lambda: os.uname_result(("", name, "", "", "")))
+    assert atomic._host() == part
+
+
+def test_a_part_that_is_gone_already_is_discarded_too(tmp_path):
+    part = Part(tmp_path / "a.txt")
+    part.path.unlink()
+    part.discard()
+    assert not [path for path in atomic._open if path.parent == tmp_path]

@@ -37,6 +37,7 @@ def test_what_lies_beside_counts_by_name_and_content_and_by_its_absence(tmp_path
     beside.rename(moved)
     seen.add(content(own, moved).digest)
     assert len(seen) == 5
+    assert {len(digest) for digest in seen} == {32}
 
 
 def test_a_change_is_seen_once_the_content_was_asked_for(tmp_path):

@@ -66,3 +66,15 @@ def test_an_order_holds_every_point_once_and_rows_are_near():
     rows = p[order[:8000]].reshape(-1, 8, 3)
     assert np.ptp(rows, axis=1).max(axis=1).mean() < 0.15
     assert compact(np.zeros((5, 3))).tolist() == [0, 1, 2, 3, 4]
+
+
+def test_points_of_a_hollow_settle_each_other_without_the_tree(monkeypatch):
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-1, 1, 30), np.linspace(-1, 1, 30)))
+    p = np.stack([x, y, 0.2 * (x * x + y * y)], axis=1).astype(F)
+    n = np.stack([-0.4 * x, -0.4 * y, np.ones_like(x)], axis=1)
+    n = (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(F)
+    t = np.arange(900, dtype=np.int32).reshape(-1, 3)
+    order = compact(p)
+    monkeypatch.setattr(Horizon, "_tree", lambda self: pytest.fail("the tree was asked"))
+    monkeypatch.setattr("illumcli.visibility.horizon.extremes", lambda points: points[:1])
+    assert not Horizon(p, t).clears(raised(p, n)[order], n[order]).any()

@@ -104,9 +104,14 @@ class Horizon:
             out[lane] = self._cleared(o, up, most)
 
     def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
-        """(M,) True where no occluder is above the plane, as far as probes and then clusters tell."""
+        """(M,) True where no occluder is above the plane, as far as probes, the points near by and then
+        clusters tell."""
         height = np.einsum("ij,ij->i", o, n)
         out = (n.astype(F) @ self._probes.T).max(axis=1) <= height + CLEARLY
+        for first in range(0, len(o), GROUP) if out.any() else ():
+            own = slice(first, first + GROUP)
+            if out[own].any():
+                out[own] &= clear_of_each_other(o[own], n[own])
         left = np.flatnonzero(out)
         if left.size:
             out[left] = self._below(o[left], n[left], most)
@@ -153,6 +158,16 @@ class Horizon:
             kept = reach + planes.spread[group] * far + planes.room[group] > 0
             group, cluster = group[kept], cluster[kept]
         return group, cluster, told
+
+
+def clear_of_each_other(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(M,) False where one of the points is clearly above the plane of another.
+
+    The points lie on occluders, off them by a hundredth of what counts as clearly: in a hollow this tells at
+    once.
+    """
+    near, up = (o - o[0]).astype(F), n.astype(F)
+    return (up @ near.T).max(axis=1) <= np.einsum("ij,ij->i", up, near) + CLEARLY
 
 
 def groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> Groups:

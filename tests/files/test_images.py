@@ -174,6 +174,13 @@ def test_whole_numbers_beyond_32_bits_become_text(tmp_path):
     assert read_metadata(tmp_path / "a.exr")["illum:seed"] == str(2**63 + 1)
 
 
+@pytest.mark.parametrize("number", [2**31 - 1, -(2**31), 2**31, -(2**31) - 1])
+def test_whole_numbers_of_32_bits_stay_numbers(tmp_path, number):
+    write(tmp_path / "a.exr", noise(3, 3, 1), {"Z": "float"}, metadata={"illum:seed": number})
+    fits = -(2**31) <= number < 2**31
+    assert read_metadata(tmp_path / "a.exr")["illum:seed"] == (number if fits else str(number))
+
+
 def test_png_metadata_survives_as_text(tmp_path):
     given = {"illum:seed": 7, "illum:exposure": 0.5, "illum:eye": (1, 2), "illum:scene": "teapot"}
     write(tmp_path / "a.png", np.zeros((3, 3, 3), np.uint8), dict.fromkeys("RGB", "uint8"), metadata=given)

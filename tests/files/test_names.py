@@ -116,9 +116,10 @@ def test_names_that_some_file_system_takes_for_one_collide(names):
 
 def test_every_collision_is_listed():
     with pytest.raises(InputError) as caught:
-        check_unique(["a", "b", "a", "c", "b", "a", *("d" * 8)])
+        check_unique(["a", "b", "a", "c", "b", "a", *("d" * 8), *("e" * 5)])
     assert [p.split(";")[0] for p in caught.value.problems] == [
         "a: the name of 3 images (1, 3, 6)",
         "b: the name of 2 images (2, 5)",
         "d: the name of 8 images (7, 8, 9, 10, 11, ...)",
+        "e: the name of 5 images (15, 16, 17, 18, 19)",
     ]

@@ -237,3 +237,28 @@ def test_sizes_are_read(text, size):
 def test_what_is_no_size_is_refused(text):
     with pytest.raises(ValueError):  # noqa: PT011
         size_of(text)
+
+
+def test_the_checksum_stays_what_it_is():
+    """Caches outlive versions of the program: these bytes are in users' files."""
+    data = np.arange(100_000, dtype=np.uint32).view(np.uint8)
+    assert module.checksum(b"text", data[:1000]).hex()[:16] == "a0d1f05907d0cf9b"
+    assert module.checksum(b"text", data).hex()[:16] == "2c619bbf4af563d6"
+
+
+def test_an_entry_may_take_a_quarter_of_the_limit(tmp_path):
+    store = Store(tmp_path, limit=4096)
+    assert store.save(KEY, {}, [np.zeros(1024, np.uint8)])
+    assert not store.save(KEY, {}, [np.zeros(1025, np.uint8)])
+
+
+@pytest.mark.parametrize("saves", [True, False])
+def test_the_end_of_a_run_that_kept_something_prunes(store, saves):
+    store.save("a" * 32, {}, [np.zeros(1000)])
+    os.utime(path_of(store, "a" * 32), (1000, 1000))
+    again = Store(store.folder, limit=12_000)
+    if saves:
+        assert again.save(KEY, {}, [np.zeros(300)])
+        again.limit = 8_500
+    again.finish()
+    assert path_of(store, "a" * 32).exists() != saves

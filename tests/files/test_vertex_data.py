@@ -146,6 +146,7 @@ def test_obscurance_goes_into_the_channel_asked_for(tmp_path, channel, expected)
     write_ply(tmp_path / "a.ply", [shape()], baked(), None, channel)
     row = PlyData.read(tmp_path / "a.ply")["vertex"].data[1]
     assert [row[name] for name in ("red", "green", "blue")] == expected
+    assert ("alpha" in row.dtype.names) == (channel == "a")
     if channel == "a":
         assert row["alpha"] == 85
 

@@ -584,9 +584,45 @@ def test_a_name_that_another_has_by_default_is_taken(problems, group, order):
         ("camera: {position: []}", "camera.position: must be a list of 3, has 0"),
         ("shading: 3", "shading: must be 'constant', 'gouraud', 'phong' or 'quadratic', is 3"),
         ("shading: fong", "shading: no choice 'fong'; did you mean 'phong'?"),
+        ("ambient: {form: [1]}", "ambient.form: must be 'separate' or 'coupled', is a list"),
+        ("meshes: {a: {file: b.obj, materials: 3}}", "meshes.a.materials: must be true or false, is 3"),
+        ("camera: {fov: 0}", "camera.fov: must be above 0, is 0"),
+        ("camera: {fov: 180}", "camera.fov: must be below 180, is 180"),
+        ("objects: 3", "objects: must be a list, is 3"),
+        ("objects: [{mesh: a.obj, override: 3}]", "objects.0.override: must be a mapping, is 3"),
+        ("film: {width: 1.5}", "film.width: must be a whole number, is 1.5"),
         ("shading:", "shading: must be 'constant', 'gouraud', 'phong' or 'quadratic', is empty"),
     ],
 )
 def test_one_fault_is_one_line(problems, text, fact):
     (line,) = problems(f"version: 1\n{text}\n")
     assert line.partition(": ")[2] == fact
+
+
+def test_as_many_bases_as_allowed(write):
+    for i in range(8):
+        write(f"extends: c{i + 1}.yaml\n" if i < 7 else "version: 1\nseed: 7\n", f"scenes/c{i}.yaml")
+    assert load(write("extends: c0.yaml\n")).scene.seed == 7
+    with pytest.raises(InputError, match="more than 8 files, each extending the next"):
+        load(write("extends: s.yaml\n", "scenes/t.yaml"))
+    names = [f"b{i}.yaml" for i in range(64)]
+    for name in names:
+        write("version: 1\n", f"scenes/{name}")
+    assert load(write(f"extends: [{', '.join(names[:63])}]\n")).scene.version == 1
+    with pytest.raises(InputError, match="more than 64 files in all"):
+        load(write(f"extends: [{', '.join(names)}]\n"))
+
+
+def test_a_law_of_another_kind_replaces_and_paths_of_bakes_move(write):
+    write(
+        "version: 1\nlights: []\nmeshes: {a: {file: a.obj, obscurance: a.npz}}\n"
+        "materials:\n  m: {model: lambert, diffuse: {texture: t.png, wrap: clamp}}\n"
+        "obscurance: {falloff: {falloff: linear, max_distance: 3}}\n",
+        "scenes/sub/base.yaml",
+    )
+    text = "extends: sub/base.yaml\nobscurance: {falloff: {falloff: step}}\n"
+    scene = load(write(text)).scene
+    assert scene.obscurance.falloff.falloff == "step"
+    assert scene.meshes["a"].obscurance == os.path.join("sub", "a.npz")
+    assert scene.materials["m"].diffuse.texture == os.path.join("sub", "t.png")
+    assert load(write(f"{text}meshes: {{a: {{shape: box}}}}\n")).scene.meshes["a"].shape == "box"

@@ -1,12 +1,18 @@
-"""How long do others take for the ambient occlusion of a mesh's vertices, and how far off are they?
+"""Which baker of ambient occlusion is nearest to the truth after so many seconds?
 
-Question   Seconds and error at equal rays, and seconds at equal error where the quantity is the same.
-Others     libigl (Embree; uniform directions, so another quantity without the cosine weight: time only),
-           PyMeshLab (CPU filter: sum over faces, then vertices, of shared directions: time only), Open3D
-           (a script over RaycastingScene with independent cosine-weighted rays: the same quantity).
+Question   Seconds and error of a mesh's vertices at a few numbers of rays, and from these the seconds that
+           each takes to the error we have at EQUAL rays.
+Others     Open3D (a script over RaycastingScene with independent cosine-weighted rays) computes our quantity:
+           the whole hemisphere, weighed by the cosine, no cut-off. PyMeshLab's CPU filter does too, but at
+           the middles of faces, averaged to vertices, and without dividing by what an open point sees.
+           libigl counts rays that are spread evenly over the hemisphere, without the cosine. Both are
+           judged by what they tend to: libigl by REFERENCE even directions, PyMeshLab by itself at FINEST.
 Reference  REFERENCE rays at VERTICES vertices.
-Repeats    In turn within one process, the best of REPEATS. Needs `pip install libigl pymeshlab open3d`,
-           in an environment of its own.
+Repeats    Every run once per round, the least of ROUNDS; counts from SLOW rays on in the first round alone.
+           Each run builds its tree anew and ends with values at all vertices; ours with their errors, too.
+           The seconds at equal error follow each curve's own line in log-log.
+           Needs `pip install libigl pymeshlab open3d` in an environment of its own; Open3D the system's
+           libusb-1.0-0 and libgl1.
 
     python benchmarks/ao_peers.py MESH
 """
@@ -15,116 +21,196 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from _bench import SMALL, Took, header, took
 from ao_error import caster
+from illumcli.arrays import F
+from illumcli.jobs.ao_bake import Settings, bare, occluders_of, world_of
+from illumcli.jobs.ao_bake_cast import Caster
+from illumcli.jobs.ao_bake_points import vertex_points
+from illumcli.rays.sampling import GOLDEN
+from illumcli.visibility.obscurance import Method, turned_frame
 
-RAYS = 256
-REFERENCE = 8192
-VERTICES = 400
-REPEATS = 3
+COUNTS = (16, 64) if SMALL else (16, 64, 256, 1024)
+EQUAL = 64 if SMALL else 256
+REFERENCE = 32768
+FINEST = 4096
+VERTICES = 100 if SMALL else 400
+ROUNDS, SLOW = 3, 1024
+THREADS = len(os.sched_getaffinity(0))
+
+
+@dataclass(slots=True)
+class Baker:
+    """A program: its values at all points with so many rays, and what they tend to at some."""
+
+    name: str
+    bake: Callable[[int], np.ndarray]
+    limit: np.ndarray
+    best: dict[int, Took] = field(default_factory=dict)
+    rmse: dict[int, float] = field(default_factory=dict)
+    off: dict[int, float] = field(default_factory=dict)
 
 
 def main() -> None:
-    path = Path(sys.argv[1])
-    bake, lanes = caster(path)
+    path = Path(next(word for word in sys.argv[1:] if not word.startswith("-")))
+    own, lanes = caster(path)
     few = np.sort(np.random.default_rng(0).permutation(lanes)[:VERTICES])
-    truth = bake.cast("reference", few, np.full(len(few), REFERENCE), 1 << 30).w.astype(float)
-    around = bake.occluders[0]
-    origins = np.ascontiguousarray(bake.points.origins)
-    n = np.ascontiguousarray(bake.points.n)
-    vertices, faces = world_arrays(path)
-    runs: dict[str, Callable[[], np.ndarray | None]] = {
-        "illum, 256 rays": lambda: ours(bake, lanes, RAYS),
-        **others(path, vertices, faces, origins, n),
-    }
-    best = dict.fromkeys(runs, np.inf)
-    values: dict[str, np.ndarray | None] = {}
-    for _ in range(REPEATS):
-        for name, run in runs.items():
-            start = time.perf_counter()
-            values[name] = run()
-            best[name] = min(best[name], time.perf_counter() - start)
-    cores = len(os.sched_getaffinity(0))
-    print(f"{path.name}: {len(origins)} vertices, {around.tracer.triangle_count} triangles, {cores} cores")
-    base = best["illum, 256 rays"]
-    for name, seconds in best.items():
-        found = values[name]
-        error = "" if found is None else f"  RMSE {np.sqrt(np.mean((found[few] - truth) ** 2)):.5f}"
-        print(f"  {name:44s} {seconds:8.3f} s  {seconds / base:6.2f} times ours{error}")
+    truth = own.cast("reference", few, np.full(len(few), REFERENCE), 1 << 30).w.astype(float)
+    header("Which baker is nearest to the truth after so many seconds?", mesh=path.name, rounds=ROUNDS)
+    bakers = [illum(path, truth), *peers(path, own, few, truth)]
+    for number in range(ROUNDS):
+        for count in COUNTS:
+            for each in bakers if number == 0 or count < SLOW else ():
+                measure(each, count, few, truth)
+    print(f"{'':12s} {'rays':>6s} {'wall [s]':>9s} {'cpu [s]':>9s} {'RMSE':>9s} {'RMSE to w':>10s}")
+    for each in bakers:
+        for count in COUNTS:
+            times = each.best[count]
+            errors = f"{each.rmse[count]:9.5f} {each.off[count]:10.5f}"
+            print(f"{each.name:12s} {count:6d} {times.wall:9.3f} {times.cpu:9.3f} {errors}")
+    aim = bakers[0].rmse[EQUAL]
+    print(f"to our RMSE at {EQUAL} rays, {aim:.5f}:")
+    for each in bakers:
+        rays, wall, cpu = (at_error(each, aim, what) for what in ("rays", "wall", "cpu"))
+        base = bakers[0].best[EQUAL]
+        print(
+            f"  {each.name:12s} {rays:8.0f} rays, wall {wall:8.2f} s, {wall / base.wall:6.2f} times ours;"
+            f" cpu {cpu:8.2f} s, {cpu / base.cpu:6.2f} times ours"
+        )
 
 
-def ours(bake, lanes: np.ndarray, rays: int) -> np.ndarray:
-    """Values at every vertex point."""
-    w = np.ones(len(bake.points.number))
-    w[lanes] = bake.cast("values", lanes, np.full(len(lanes), rays), 0).w
-    return w
+def measure(each: Baker, count: int, few: np.ndarray, truth: np.ndarray) -> None:
+    """Run once; keep the least seconds and the error."""
+    made: list[np.ndarray] = []
+    now = took(lambda: made.append(each.bake(count)))
+    before = each.best.get(count, now)
+    each.best[count] = Took(min(now.wall, before.wall), min(now.cpu, before.cpu))
+    if count not in each.rmse:
+        each.rmse[count] = float(np.sqrt(np.mean((made[0][few] - each.limit) ** 2)))
+        each.off[count] = float(np.sqrt(np.mean((made[0][few] - truth) ** 2)))
 
 
-def world_arrays(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The triangles as they are cast at."""
-    from illumcli.jobs.ao_bake import bare, world_of
+def at_error(each: Baker, aim: float, what: str) -> float:
+    """Rays or seconds at which a baker's line through its two nearest counts has the error."""
+    count = np.array(COUNTS)
+    rmse = np.log([each.rmse[n] for n in COUNTS])
+    values = count if what == "rays" else [getattr(each.best[n], what) for n in COUNTS]
+    k = int(np.clip(np.searchsorted(-rmse, -np.log(aim)), 1, len(count) - 1))
+    share = (np.log(aim) - rmse[k - 1]) / (rmse[k] - rmse[k - 1])
+    low, high = np.log(values[k - 1]), np.log(values[k])
+    return float(np.exp(low + share * (high - low)))
 
+
+def illum(path: Path, truth: np.ndarray) -> Baker:
+    """This program: all that `illum ao-bake` does between reading and writing."""
     loaded = bare(path, ())
     world = world_of(loaded.scene, loaded)
-    return np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles)
+    settings = Settings()
+
+    def bake(rays: int) -> np.ndarray:
+        points = vertex_points(world).points
+        method = Method(rays, settings.obscurance().falloff, world.frame.radius)
+        quiet = lambda what, done, of: None  # noqa: E731
+        made = Caster(points, occluders_of(loaded.scene, world, settings), method, 0, THREADS, quiet)
+        lanes = np.flatnonzero(~made.open())
+        samples = np.full(len(lanes), rays)
+        w = np.ones(len(points.number))
+        found = made.cast("values", lanes, samples, 0)
+        w[lanes] = found.w
+        made.errors(lanes, samples, 1 << 20).at(found.unevenness, rays)
+        return w
+
+    return Baker("illum", bake, truth)
 
 
-def others(path: Path, vertices, faces, origins, n) -> dict[str, Callable[[], np.ndarray | None]]:
+def peers(path: Path, own: Caster, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
     """Those that are installed."""
-    runs: dict[str, Callable[[], np.ndarray | None]] = {}
-    try:
-        import igl.embree
+    loaded = bare(path, ())
+    world = world_of(loaded.scene, loaded)
+    vertices, faces = np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles)
+    origins, n = np.ascontiguousarray(own.points.origins), np.ascontiguousarray(own.points.n)
+    found = []
+    for name, make in {
+        "Open3D": lambda: Baker("Open3D", open3d_script(vertices, faces, origins, n), truth),
+        "PyMeshLab": lambda: pymeshlab_filter(vertices, faces, own.points.number, few),
+        "libigl": lambda: Baker("libigl", libigl(vertices, faces, origins, n), even(own, few)),
+    }.items():
+        try:
+            found.append(make())
+            print(f"# {name} {version(name.lower())}")
+        except ImportError as why:
+            print(f"# no {name}: {why}")
+    return found
 
-        v, f = vertices.astype(float), faces.astype(np.int64)
 
-        def libigl() -> None:
-            igl.embree.ambient_occlusion(v, f, origins.astype(float), n.astype(float), RAYS)
+def even(own: Caster, few: np.ndarray) -> np.ndarray:
+    """What libigl tends to: the share of the hemisphere, without the cosine, that is open."""
+    k = np.arange(REFERENCE)
+    z = (k + 0.5) / REFERENCE
+    angle = 2 * np.pi * ((k * GOLDEN) % 1)
+    r = np.sqrt(1 - z * z)
+    pattern = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1).astype(F)
+    turns = np.random.default_rng(2).random(len(few)) * 2 * np.pi
+    out = np.empty(len(few))
+    for number, (lane, turn) in enumerate(zip(few, turns, strict=True)):
+        part = own.points.take(np.array([lane]))
+        d = pattern @ turned_frame(part.n, np.array([turn], F))[0]
+        o = np.repeat(np.ascontiguousarray(part.origins), REFERENCE, axis=0)
+        out[number] = 1 - own.occluders[0].tracer.occluded(o, d).mean()
+    return out
 
-        runs["libigl, 256 rays"] = libigl
-    except ImportError as why:
-        print(f"no libigl: {why}")
-    try:
-        import pymeshlab
 
+def libigl(vertices, faces, origins, n) -> Callable[[int], np.ndarray]:
+    """libigl's function, 1 where open."""
+    import igl.embree
+
+    given = vertices.astype(float), faces.astype(np.int64), origins.astype(float), n.astype(float)
+    return lambda rays: 1 - igl.embree.ambient_occlusion(*given, rays)
+
+
+def pymeshlab_filter(vertices, faces, number, few) -> Baker:
+    """MeshLab's filter, scaled so that its largest value is what a vertex sees that is open."""
+    import pymeshlab
+
+    def bake(rays: int) -> np.ndarray:
         meshes = pymeshlab.MeshSet()
         meshes.add_mesh(pymeshlab.Mesh(vertices.astype(float), faces.astype(np.int32)))
+        meshes.compute_scalar_ambient_occlusion(rays=rays)
+        values = meshes.current_mesh().vertex_scalar_array()[number]
+        return values / values.max()
 
-        def pymeshlab_filter() -> None:
-            meshes.compute_scalar_ambient_occlusion(rays=RAYS)
+    return Baker("PyMeshLab", bake, bake(FINEST)[few])
 
-        runs["PyMeshLab, 256 rays"] = pymeshlab_filter
-    except ImportError as why:
-        print(f"no PyMeshLab: {why}")
-    try:
-        import open3d
 
-        scene = open3d.t.geometry.RaycastingScene(nthreads=len(os.sched_getaffinity(0)))
+def open3d_script(vertices, faces, origins, n) -> Callable[[int], np.ndarray]:
+    """A script as Open3D's users write it, in calls of some vertices."""
+    import open3d
+
+    rng = np.random.default_rng(1)
+
+    def bake(rays: int) -> np.ndarray:
+        scene = open3d.t.geometry.RaycastingScene(nthreads=THREADS)
         scene.add_triangles(vertices, faces.astype(np.uint32))
-        rng = np.random.default_rng(1)
+        out = np.empty(len(origins))
+        size = max(1, (1 << 20) // rays)
+        for first in range(0, len(origins), size):
+            m = n[first : first + size]
+            d = rng.standard_normal(size=(len(m), rays, 3), dtype=np.float32)
+            d /= np.linalg.norm(d, axis=2, keepdims=True)
+            d += m[:, None]  # a unit vector plus the normal is cosine-weighted
+            o = np.broadcast_to(origins[first : first + size, None], d.shape)
+            hit = scene.test_occlusions(open3d.core.Tensor(np.concatenate([o, d], axis=2)))
+            out[first : first + size] = 1 - hit.numpy().mean(axis=1)
+        return out
 
-        def open3d_script(rays: int) -> np.ndarray:
-            out = np.empty(len(origins))
-            size = 1 << 12
-            for first in range(0, len(origins), size):
-                m = n[first : first + size]
-                d = rng.normal(size=(len(m), rays, 3)).astype(np.float32)
-                d /= np.linalg.norm(d, axis=2, keepdims=True)
-                d += m[:, None]  # a unit vector plus the normal is cosine-weighted
-                o = np.broadcast_to(origins[first : first + size, None], d.shape)
-                hit = scene.test_occlusions(open3d.core.Tensor(np.concatenate([o, d], axis=2)))
-                out[first : first + size] = 1 - hit.numpy().mean(axis=1)
-            return out
-
-        runs["Open3D script, 256 rays"] = lambda: open3d_script(RAYS)
-        runs["Open3D script, 3584 rays (our error)"] = lambda: open3d_script(14 * RAYS)
-    except ImportError as why:
-        print(f"no Open3D: {why}")
-    return runs
+    return bake
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -77,6 +78,8 @@ def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
     for number in STOPS:
         signal.signal(number, _unwind)
+    # a start makes many objects and no garbage: the default looks through them again and again, 5 % of it
+    gc.set_threshold(100_000, 50, 50)
     _look_for_no_plugins()
     try:
         status = illum.main(standalone_mode=False)
@@ -96,9 +99,6 @@ def main() -> None:
         click.echo(f"{place}{error.strerror or error}; check the disk and the permissions", err=True)
         sys.exit(1)
     except ImportError as error:  # most often too little memory to map a library
-        cause = error.__cause__ or error.__context__  # a signal during an import arrives as its failure
-        if isinstance(cause, _Stopped):
-            _die_by(cause.number)
         said = str(error).strip().splitlines()[-1:] or ["no reason given"]
         click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
         sys.exit(1)
@@ -142,9 +142,16 @@ class _Stopped(BaseException):
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:
-    """The first signal leaves by way of all that is open; a second one ends at once."""
+    """The first signal leaves by way of all that is open; a second one ends at once.
+
+    So does one during an import: libraries do not all survive an exception while they start, some abort.
+    """
     for each in STOPS:
         signal.signal(each, _end)
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            _die_by(number)
+        frame = frame.f_back
     raise _Stopped(number)
 
 

@@ -54,6 +54,8 @@ def exposed(linear: NDArray[np.float32], stops: float) -> NDArray[np.float32]:
 
 def unpremultiplied(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.float32]:
     """`color` / `alpha`, the colour a covered part shows; as it is where nothing is covered."""
+    if not ((alpha > 0) & (alpha < 1)).any():  # a division takes longer than all else here
+        return color
     with np.errstate(over="ignore"):
         return np.divide(color, alpha, out=color.copy(), where=alpha > 0)
 

@@ -16,6 +16,7 @@ SCRIPTS = {
     "scaling": "peak [MiB]",
     "memory": "cpu per pixel",
     "replay": "ratio whole / rays alone",
+    "adaptive": "samples spared",
 }
 
 

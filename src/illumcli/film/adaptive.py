@@ -21,7 +21,6 @@ from illumcli.arrays import F, Ids
 
 TURN = 0.3
 """Components of unit normals that lie farther apart differ: directions 17 degrees apart or more."""
-DEPTH_RATIO = 1.1
 DARK = 0.05
 """Light below this counts as this much when differences are weighed."""
 
@@ -29,16 +28,17 @@ DARK = 0.05
 def differs_in_shape(
     objects: NDArray[np.float32],
     normals: NDArray[np.float32],
-    depths: NDArray[np.float32],
     lane: Ids,
     shape: tuple[int, int],
     samples: int,
 ) -> NDArray[np.bool_]:
-    """(h, w) True where samples around see different objects, faces turned apart, or a leap in depth.
+    """(h, w) True where samples around see different objects or faces turned apart.
+
+    A leap in depth between faces of one object that lie alike shows in its light or nowhere.
 
     Parameters
     ----------
-    objects, depths : (M,) float32
+    objects : (M,) float32
     normals : (M, 3) float32
         Of the samples that see something; 0 stands for the others.
     lane : (M,) int32
@@ -46,11 +46,10 @@ def differs_in_shape(
     shape : (int, int)
         Rows and columns of the pixels, `samples` each.
     """
-    low, high = extremes(np.column_stack([objects, normals, depths]), lane, shape, samples)
+    low, high = extremes(np.column_stack([objects, normals]), lane, shape, samples)
     other = low[..., 0] != high[..., 0]
-    turned = (high[..., 1:4] - low[..., 1:4] > TURN).any(axis=2)
-    leap = high[..., 4] > DEPTH_RATIO * low[..., 4]
-    return np.asarray(other | turned | leap)
+    turned = (high[..., 1:] - low[..., 1:] > TURN).any(axis=2)
+    return np.asarray(other | turned)
 
 
 def differs_in_light(

@@ -7,13 +7,13 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, columns
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.film import pixel_means, pixel_nearest
 from illumcli.memory import keep_freed_memory
@@ -261,22 +261,56 @@ def _adaptive_tile(
     differing = _differing(plan, buffers, few, around, view.adaptive.difference)
     which = {name: mask[own] for name, mask in differing.items()}
     wanted = np.logical_or.reduce([*which.values()])
-    rows, columns = np.nonzero(wanted)
+    down, across = np.nonzero(wanted)
     tally.add({"film": time.perf_counter() - start}, {})
-    some = max(1, LANES // view.samples)
-    for first in range(0, len(rows), some):
-        y, x = rows[first : first + some], columns[first : first + some]
+    rest = view.rest()
+    some = max(1, LANES // rest.samples)
+    for first in range(0, len(down), some):
+        y, x = down[first : first + some], across[first : first + some]
         part = Scattered.at(x + tile.x, y + tile.y)
-        finer, _ = _tile(plan, shared, view, part, last_use, tally, stop, keeper)
-        for name, values in finer.items():
+        others, _ = _made(plan, shared, rest, part, last_use, tally, stop, keeper)
+        start = time.perf_counter()
+        pixel = (part.rows - around.y) * around.width + part.columns - around.x
+        joined = _joined(plan, buffers, others, pixel)
+        tally.add({"film": time.perf_counter() - start}, {})
+        for name, values in _pixels(plan, joined, view, part).items():
             mine = which[name][y, x]
             out[name][y[mine], x[mine]] = values[0][mine]
-    pixels, refined = tile.width * tile.height, len(rows)
-    taken = around.width * around.height * few.samples + refined * view.samples
+    pixels, refined = tile.width * tile.height, len(down)
+    taken = around.width * around.height * few.samples + refined * rest.samples
     tally.add({}, {}, {"samples": pixels * view.samples - taken})
     with tally.lock:
         tally.refined += refined
     return out, {}
+
+
+def _joined(
+    plan: Plan, few: Mapping[str, Any], others: Mapping[str, Any], pixel: NDArray[np.int64]
+) -> dict[str, Any]:
+    """What the film reads of the pixels of these numbers: their few samples and after them the others."""
+    first, last = few["samples"], others["samples"]
+    count = first.per_pixel + last.per_pixel
+    place = np.full(len(first.x), -1)
+    place[pixel] = np.arange(len(pixel))
+    own, sample = np.divmod(few["hits"].lane, first.per_pixel)
+    among = np.flatnonzero(place[own] >= 0)
+    pixel_of, other = np.divmod(others["hits"].lane, last.per_pixel)
+    lane = np.concatenate(
+        [place[own[among]] * count + sample[among], pixel_of * count + first.per_pixel + other]
+    ).astype(np.int32)
+    order = np.argsort(lane)
+    points = np.concatenate(
+        [each.points.reshape(-1, each.per_pixel, 2)[which] for each, which in ((first, pixel), (last, ...))],
+        axis=1,
+    )
+    joined = {
+        "hits": replace(others["hits"], lane=lane[order]),
+        "samples": replace(last, points=points.reshape(-1, 2), per_pixel=count, first=None),
+    }
+    for name in {"alpha", *(layer.buffer for layer in plan.layers)}:
+        values = np.concatenate([few[name][among], others[name]])
+        joined[name] = columns(values[order])
+    return joined
 
 
 def _differing(
@@ -284,8 +318,8 @@ def _differing(
 ) -> dict[str, NDArray[np.bool_]]:
     """(rows, columns) by layer: where its pixels want more samples than the view has."""
     lane, shape = buffers["hits"].lane, (tile.height, tile.width)
-    objects, normals, depths = (buffers[name] for name in SHAPE)
-    forms = differs_in_shape(objects, normals, depths, lane, shape, view.samples)
+    objects, normals = (buffers[name] for name in SHAPE)
+    forms = differs_in_shape(objects, normals, lane, shape, view.samples)
     out = {}
     for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.layers] + [
         ("alpha", "alpha", True)

@@ -222,10 +222,7 @@ def _steps(
 
 
 def _expected_rays(scene: Any, all_views: Sequence[View], made: set[str]) -> dict[str, int]:
-    samples = sum(
-        view.width * view.height * (view.samples + (view.adaptive.first if view.is_adaptive else 0))
-        for view in all_views
-    )
+    samples = sum(view.width * view.height * view.samples for view in all_views)
     doubled = sum(doubled_count(view.width, view.height) * view.samples for view in all_views)
     again = {name.removeprefix(AGAIN) for name in made if name.startswith(AGAIN)}
     more = _rays_of(scene, doubled, again)

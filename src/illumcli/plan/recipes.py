@@ -39,6 +39,8 @@ class View:
     height: int
     samples: int
     adaptive: Any = None
+    first: int | None = None
+    """Number of the first sample, where these are part of a pixel's samples."""
 
     @property
     def is_adaptive(self) -> bool:
@@ -46,8 +48,13 @@ class View:
         return self.adaptive is not None and self.adaptive.first < self.samples
 
     def coarse(self) -> View:
-        """The view with as many samples as every pixel gets."""
-        return replace(self, samples=self.adaptive.first, adaptive=None)
+        """The view with the samples that every pixel gets."""
+        return replace(self, samples=self.adaptive.first, adaptive=None, first=0)
+
+    def rest(self) -> View:
+        """The view with all the other samples."""
+        few = self.adaptive.first
+        return replace(self, samples=self.samples - few, adaptive=None, first=few)
 
 
 def views(scene: Scene) -> list[View]:
@@ -448,5 +455,5 @@ def _sums(scene: Scene) -> list[Recipe]:
     ]
 
 
-SHAPE = ("object_id", "geometric_normal", "depth")
+SHAPE = ("object_id", "geometric_normal")
 """Buffers whose differences say, before any light, which pixels want more samples."""

@@ -329,6 +329,7 @@ class Samples:
     y: NDArray[np.int64]  # (P,)
     points: NDArray[np.float64]  # (N, 2) in [0, 1)^2
     per_pixel: int
+    first: int | None = None  # number of each pixel's first, where these are part of its samples
 
     def nearest(self) -> Ids:
         """(P,) the lane of the sample nearest to each pixel's centre."""
@@ -341,8 +342,8 @@ def samples(seed: int, view: Any, tile: Tile) -> Samples:
     """Where the tile's samples lie, keyed by pixel number."""
     x, y = tile.pixels()
     pixel = (y * view.width + x).astype(np.uint32)
-    points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples)
-    return Samples(x, y, points, view.samples)
+    points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples, view.first)
+    return Samples(x, y, points, view.samples, view.first)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -356,8 +357,8 @@ class Rays:
 
 def rays(film_filter: Any, frame: Frame, view: Any, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
-    count = samples.per_pixel
-    points = film_points(samples.x, samples.y, samples.points, film_filter if count > 1 else None)
+    several = samples.per_pixel > 1 or samples.first is not None
+    points = film_points(samples.x, samples.y, samples.points, film_filter if several else None)
     return Rays(*camera_rays(view.camera, frame, view.width, view.height, points))
 
 
@@ -541,7 +542,7 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
     """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
     key = sampling.stream(seed, "obscurance")
     pixel, sample = np.divmod(hits.lane, samples.per_pixel)
-    return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
+    return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample + (samples.first or 0))
 
 
 def obscurance(

@@ -201,7 +201,7 @@ class Filter(Description):
 
 class Adaptive(Description):
     """Few samples for every pixel, and all of them only where these differ from each other or from those of
-    the neighbouring pixels: in object, normal or depth, and each layer in its own light.
+    the neighbouring pixels: in object or normal, and each layer in its own light.
 
     Not unbiased: what the few samples miss, as things smaller than the gaps between them, stays missed.
     """

@@ -1,7 +1,7 @@
 """What does a variant cost when only a material changes, and is it the picture a cold render makes?
 
-`python benchmarks/sweep.py [MESH.obj] [--variants N] [--width W] [--runs N]`: ratios within one run; cold
-renders and shell runs alternate with what they are compared to. The cache is this run's own.
+`python benchmarks/sweep.py [MESH.obj] [--variants N] [--width W] [--runs N] [--cold N]`: ratios within one
+run; cold renders and shell runs alternate with what they are compared to. The cache is this run's own.
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ def main() -> None:
     options.add_argument("--variants", type=int, default=24)
     options.add_argument("--width", type=int, default=1280)
     options.add_argument("--runs", type=int, default=7)
+    options.add_argument("--cold", type=int, default=3, help="variants that are rendered cold, too")
     said = options.parse_args()
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors")
     with tempfile.TemporaryDirectory() as folder:
@@ -60,13 +61,13 @@ def main() -> None:
         Path("mesh.obj").write_bytes(said.mesh.read_bytes())
         height = said.width * 9 // 16
         Path("scene.yaml").write_text(SCENE.replace("WIDTH", str(said.width)).replace("HEIGHT", str(height)))
-        swept(said.variants)
+        swept(said.variants, said.cold)
         shell(said.runs)
         moved()
         stored()
 
 
-def swept(count: int) -> None:
+def swept(count: int, cold: int) -> None:
     """A sweep of one material parameter: variants against the first render, bytes against cold ones."""
     from illumcli.jobs.render import run as render
     from illumcli.jobs.sweep import run, variants_of
@@ -79,7 +80,7 @@ def swept(count: int) -> None:
     print(f"sweep of {count}: first {took[0]:.2f} s, {rays[0]:,} rays; others {sum(rays[1:])} rays")
     print(f"  variant / first: mean {np.mean(rest) / took[0]:.4f}, worst {max(rest) / took[0]:.4f}")
     same = 0
-    some = done.outcomes[:: max(1, count // 3)]
+    some = done.outcomes[:: max(1, count // cold)]
     for outcome in some:
         (path,), _ = render(
             Path("scene.yaml"), outcome.variant.overrides, "cold.png", force=True, cache=False

@@ -14,17 +14,11 @@ ENDS = {
     "ImportError('a\\n\\nOriginal error was: failed to map segment')": (1, "failed to map segment"),
     "MemoryError()": (4, "out of memory"),
     "cli._Stopped(signal.SIGTERM)": (-signal.SIGTERM, ""),
-    "interrupted_import()": (-signal.SIGINT, ""),
 }
 SCRIPT = """
 import os
 import signal
 import illumcli.cli as cli
-
-def interrupted_import():
-    error = ImportError("initialization failed")
-    error.__cause__ = cli._Stopped(signal.SIGINT)
-    return error
 
 def end(*words, **more):
     raise {}
@@ -98,3 +92,27 @@ def test_output_that_cannot_be_printed_is_an_error():
         done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr == "No space left on device; check the disk and the permissions\n"
+
+
+ABORTING = """
+import os, time
+print("loading", flush=True)
+try:
+    time.sleep(60)
+except BaseException:  # as a library does whose start is interrupted
+    os.abort()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_an_import_ends_by_itself(tmp_path, number):
+    (tmp_path / "aborting.py").write_text(ABORTING)
+    loading = "import illumcli.cli as cli; cli.illum.main = lambda **more: __import__('aborting'); cli.main()"
+    words = [sys.executable, "-c", loading]
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        assert run.stdout.readline() == "loading\n"
+        run.send_signal(number)
+        assert run.wait(timeout=30) == -number
+        assert run.stderr.read() == ""

@@ -245,6 +245,23 @@ def test_interrupt_leaves_no_debris(tmp_path, stop):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.parametrize("silent", [True, False])
+def test_a_picture_that_is_given_up_says_nothing_by_itself(tmp_path, capfd, monkeypatch, silent):
+    if not silent:  # without a handle for it what libpng prints is heard
+
+        def refused(handle):
+            raise OSError(24, "Too many open files")
+
+        monkeypatch.setattr(images.os, "dup", refused)
+    ImageWriter(tmp_path / "a.png", 8, 8, {"Y": "uint8"}).discard()
+    monkeypatch.undo()
+    os.write(2, b"heard again\n")
+    said = capfd.readouterr().err
+    assert said.endswith("heard again\n")
+    assert (said == "heard again\n") == silent
+    assert os.listdir(tmp_path) == []
+
+
 @pytest.mark.parametrize("suffix", [".exr", ".png"])
 @pytest.mark.parametrize("damage", ["cut", "last byte", "middle"])
 def test_read_back_catches_a_damaged_part(tmp_path, monkeypatch, suffix, damage):

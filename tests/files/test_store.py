@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from illumcli.files import atomic
 from illumcli.files import store as module
 from illumcli.files.store import (
     SUFFIX,
@@ -262,3 +263,14 @@ def test_the_end_of_a_run_that_kept_something_prunes(store, saves):
         again.limit = 8_500
     again.finish()
     assert path_of(store, "a" * 32).exists() != saves
+
+
+def test_a_signal_leaves_no_part_of_an_entry(store):
+    writer = store.writer(KEY, {}, [((10,), np.float64)])
+    writer.write(np.zeros(10))
+    assert len(list(store.folder.iterdir())) == 1
+    atomic.discard_open()
+    assert list(store.folder.iterdir()) == []
+    writer.discard()
+    assert store.save(KEY, {}, arrays())
+    assert not [path for path in atomic._open if path.parent == store.folder]

@@ -96,6 +96,16 @@ class Part:
             raise refused(self._named, error) from error
 
 
+def remember(part: Path) -> None:
+    """Count a file that others make among the parts of this process."""
+    _open.add(part)
+
+
+def forget(part: Path) -> None:
+    """It is a part no more."""
+    _open.discard(part)
+
+
 def discard_open() -> None:
     """Remove every part of this process; for the end by a signal, which may fall between any two steps."""
     for path in tuple(_open):

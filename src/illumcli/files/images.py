@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -173,7 +174,8 @@ class ImageWriter:
 
     def discard(self) -> None:
         """Remove what was written so far."""
-        self._output.close()
+        with _unheard():
+            self._output.close()
         self._part.discard()
 
     def __enter__(self) -> Self:
@@ -486,6 +488,23 @@ def _no_utf8(path: str) -> bool:
 def _shown(path: str) -> str:
     """The path with such bytes as \\xNN."""
     return os.fsencode(path).decode("utf-8", "backslashreplace")
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Whatever is printed to stderr is lost: libpng says of each unfinished file that it is unfinished."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # no stderr, or no handle left: then it is heard
+        yield
+        return
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _ends_with(path: Path, tail: bytes) -> bool:

@@ -28,6 +28,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.files import atomic
+
 SUFFIX = ".illum"
 LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
@@ -213,6 +215,7 @@ class Writer:
         self.bytes = self._start + end
         self._failed = False
         self._number = 0
+        atomic.remember(part)
         self._file: BinaryIO = part.open("w+b")
         self._try(lambda: self._file.truncate(self._start + end))
 
@@ -239,6 +242,7 @@ class Writer:
         self._file.close()
         with suppress(OSError):
             self._part.unlink()
+        atomic.forget(self._part)
 
     def _finish(self) -> None:
         head = _HEADER.pack(_MAGIC, _FORMAT, len(self._text), self._end, b"")[:24]
@@ -249,6 +253,7 @@ class Writer:
         _write_at(self._file, np.frombuffer(head + sum_ + bytes(8), np.uint8), 0)
         self._file.close()
         os.replace(self._part, self._target)
+        atomic.forget(self._part)
         self._store.saved()
 
     def _try(self, action: Any) -> None:

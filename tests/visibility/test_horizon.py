@@ -78,3 +78,13 @@ def test_points_of_a_hollow_settle_each_other_without_the_tree(monkeypatch):
     monkeypatch.setattr(Horizon, "_tree", lambda self: pytest.fail("the tree was asked"))
     monkeypatch.setattr("illumcli.visibility.horizon.extremes", lambda points: points[:1])
     assert not Horizon(p, t).clears(raised(p, n)[order], n[order]).any()
+
+
+@pytest.mark.parametrize(("down", "built"), [(50, True), (2000, False)])
+def test_the_tree_is_built_for_many_points_only(down, built):
+    p, t = ball(3000)
+    inward = -p[:down] / np.linalg.norm(p[:down], axis=1, keepdims=True)  # all of the ball is above these
+    o, n = np.concatenate([raised(p[:1], p[:1]), raised(p[:down], inward)]), np.concatenate([p[:1], inward])
+    horizon = Horizon(p, t)
+    assert horizon.clears(np.asfortranarray(o), n).tolist() == [built] + [False] * down
+    assert (horizon._levels is not None) == built

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,7 +100,7 @@ def _shared_over_copies(
     """Unit normal, longest edge and the first of equal copies, per vertex."""
     order, same = _by_place(world.vertices, thing)
     own, total, edge = unit(sums), sums.copy(order="F"), longest.copy()
-    shifts = [(s, lanes) for s in range(1, MOST_COPIES + 1) if (lanes := _alike(same, s)).size]
+    shifts = list(_runs(same))
     for s, lanes in shifts:
         a, b = order[lanes], order[lanes + s]
         joint = np.flatnonzero(dot(rows(own, a), rows(own, b)) > SEAM)
@@ -130,12 +131,14 @@ def _by_place(vertices: Vectors, thing: Ids) -> tuple[NDArray[np.int64], NDArray
     return order, same
 
 
-def _alike(same: NDArray[np.bool_], shift: int) -> NDArray[np.int64]:
-    """Lanes whose `shift`-th follower is at the same place."""
-    if len(same) < shift:
-        return np.zeros(0, np.int64)
+def _runs(same: NDArray[np.bool_]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Shifts from 1 on, and the lanes whose follower by so many is at the same place, while there are any."""
     run = np.concatenate([[0], np.cumsum(same)])
-    return np.flatnonzero(run[shift:] - run[:-shift] == shift)
+    for shift in range(1, min(MOST_COPIES, len(same)) + 1):
+        lanes = np.flatnonzero(run[shift:] - run[:-shift] == shift)
+        if not lanes.size:  # no run is that long, and none is longer
+            return
+        yield shift, lanes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,6 +23,9 @@ TRY_FIRST = 16
 """One group in so many is asked first; where none of its points is clear, its neighbours cast rays."""
 MOST_CLUSTERS = 1 << 13
 """Groups that look at more clusters than this cast rays instead."""
+FEWEST = 64
+"""Where the cheap tests leave fewer than one point in so many, the tree is not asked: to build it takes as
+long as a few rays from every vertex."""
 PROBES = 64
 CLEARLY = 1e-5
 
@@ -113,6 +116,8 @@ class Horizon:
             if out[own].any():
                 out[own] &= clear_of_each_other(o[own], n[own])
         left = np.flatnonzero(out)
+        if len(left) * FEWEST < len(o):
+            return np.zeros(len(o), bool)
         if left.size:
             out[left] = self._below(o[left], n[left], most)
         return out

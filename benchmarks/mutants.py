@@ -7,7 +7,7 @@ the tree. A change that no test fails upon has survived: a missing test, dead co
 difference (equivalent). Places are drawn with a fixed seed. Printed are the share found per module, and every
 survivor.
 
-    python benchmarks/mutants.py [COUNT] [MODULE...]       # 30 of each module take 20 minutes
+    python benchmarks/mutants.py [COUNT] [SEED] [MODULE...]       # 30 of each module take 20 minutes
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ MODULES = {
     ],
     "geometry/readers/_text.py": [f"{READERS}/test_{name}.py" for name in ("obj", "stl", "ply", "read_mesh")],
     "geometry/readers/gltf.py": [f"{READERS}/test_gltf.py"],
-    "geometry/readers/obj.py": [f"{READERS}/test_obj.py"],
+    "geometry/readers/obj.py": [f"{READERS}/test_obj.py", f"{READERS}/test_mtl.py"],
     "geometry/readers/ply.py": [f"{READERS}/test_ply.py"],
     "geometry/readers/stl.py": [f"{READERS}/test_stl.py"],
 }
@@ -155,7 +155,8 @@ def passes(folder: Path, tests: list[str], most: float) -> bool:
 def main() -> None:
     """Print the share of changes found, per module, and the survivors."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 30
-    chosen = sys.argv[2:] or list(MODULES)
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    chosen = sys.argv[3:] or list(MODULES)
     found_all = made_all = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "tree"
@@ -171,7 +172,7 @@ def main() -> None:
                 sys.exit(f"{module}: its tests fail before any change")
             most = 5 * (time.monotonic() - start) + 10
             survivors, made = [], 0
-            for what, changed in mutants(text, count, seed=1):
+            for what, changed in mutants(text, count, seed):
                 made += 1
                 path.write_text(changed)
                 if passes(folder, MODULES[module], most):

@@ -105,9 +105,13 @@ except BaseException:  # as a library does whose start is interrupted
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_during_an_import_ends_by_itself(tmp_path, number):
+@pytest.mark.parametrize("halves", ["", "illumcli.files.atomic"])
+def test_a_signal_during_an_import_ends_by_itself(tmp_path, number, halves):
     (tmp_path / "aborting.py").write_text(ABORTING)
-    loading = "import illumcli.cli as cli; cli.illum.main = lambda **more: __import__('aborting'); cli.main()"
+    loading = (
+        f"import sys, types; import illumcli.cli as cli; sys.modules[{halves!r}] = types.ModuleType('half');"
+        "cli.illum.main = lambda **more: __import__('aborting'); cli.main()"
+    )
     words = [sys.executable, "-c", loading]
     with subprocess.Popen(
         words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

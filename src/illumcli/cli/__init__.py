@@ -163,7 +163,8 @@ def _die_by(number: int) -> None:
     """End by the signal itself, so that the caller sees what happened; no half file stays behind."""
     for each in STOPS:
         signal.signal(each, signal.SIG_IGN)  # the tidying is short
-    if atomic := sys.modules.get("illumcli.files.atomic"):
-        atomic.discard_open()
+    # not there yet, or not whole where the signal falls into its own import: then nothing is open
+    if discard := getattr(sys.modules.get("illumcli.files.atomic"), "discard_open", None):
+        discard()
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)

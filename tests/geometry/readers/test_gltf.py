@@ -394,3 +394,13 @@ def test_an_address_of_a_buffer_must_be_text(tmp_path: Path) -> None:
     path.write_text(json.dumps({**json.loads(path.read_text()), "buffers": [{"byteLength": 9, "uri": 5}]}))
     with pytest.raises(InputError, match=r"buffers\[0\].uri is no text"):
         read_mesh(path)
+
+
+def test_normals_of_a_mirrored_node_keep_their_side(tmp_path: Path) -> None:
+    scene = Scene()
+    scene.primitive([0, 1, 2], NORMAL=scene.table([[0.6, 0, 0.8]] * 4))
+    scene.json["nodes"][0]["scale"] = [-1, 1, 1]
+    mesh = read_mesh(scene.write(tmp_path / "a.glb"))
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals[0] / np.linalg.norm(mesh.normals[0]), [-0.6, 0, 0.8], atol=1e-6)
+    assert triangles(mesh) == [[2, 1, 0]]

@@ -121,6 +121,7 @@ def test_a_mesh_that_is_a_link_finds_its_library_beside_the_link(tmp_path: Path)
         ("newmtl a\nKd 0,5 1 1\n", "a.mtl:2: '0,5 1 1' is no number"),
         ("newmtl a\nKd -1 1 1\n", "a.mtl:2: must be from 0"),
         ("newmtl a\nKd nan 1 1\n", "a.mtl:2: must be from 0"),
+        ("newmtl a\nNs 1.1e18\n", r"a.mtl:2: must be from 0 to 1e\+18, is 1.1e18"),
         ("newmtl a\n\nNs\n", "a.mtl:3: has no number"),
         ("newmtl a\nmap_Kd -clamp on\n", "a.mtl:2: names no image"),
     ],
@@ -128,3 +129,20 @@ def test_a_mesh_that_is_a_link_finds_its_library_beside_the_link(tmp_path: Path)
 def test_a_wrong_value_is_named_with_its_line(tmp_path: Path, library: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         mesh_of(tmp_path, library)
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["-blendu on", "-blendv off", "-boost 1", "-bm 1", "-cc on", "-clamp off", "-imfchan r", "-texres 64",
+     "-type sphere", "-mm 0 1", "-o 1", "-s 1 2", "-t 1 2 3"],
+)  # fmt: skip
+def test_options_of_a_texture_are_counted_and_no_part_of_its_name(tmp_path: Path, option: str) -> None:
+    mesh = mesh_of(tmp_path, f"newmtl a\nNs 1e18\nmap_Kd {option} wood.png\n")
+    assert mesh.materials["a"]["diffuse"] == {"texture": str(tmp_path / "wood.png")}
+    assert mesh.materials["a"]["exponent"] == 1e18
+    assert mesh.repairs["texture options left out"] == 1
+
+
+def test_opaque_materials_of_all_light_are_not_counted(tmp_path: Path) -> None:
+    assert mesh_of(tmp_path, "newmtl a\nd 1\nTr 0\nillum 2\n").repairs == {}
+    assert "transparent" in str(mesh_of(tmp_path, "newmtl a\nd 0.999\n").repairs)

@@ -265,3 +265,30 @@ def test_colours_in_floats_are_linear(tmp_path: Path) -> None:
     more = "property float red\nproperty float green\nproperty float blue\n"
     content = head(vertices=3, more=more) + "0 0 0 .5 0 1\n1 0 0 .5 0 1\n0 1 0 .5 0 1\n3 0 1 2\n"
     assert mesh_of(tmp_path, content).attributes["color"].tolist() == [[0.5, 0, 1]] * 3
+
+
+NAMES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ["ascii", "binary_big_endian"])
+def test_every_name_of_a_type_is_known(tmp_path: Path, name: str, kind: str) -> None:
+    header = head(vertices=3, kind=kind, more=f"property {name} mark\n").encode()
+    types = np.dtype([("p", ">f4", 3), ("mark", f">{NAMES[name]}")])
+    rows = np.array([((0, 0, 0), 7), ((1, 0, 0), 8), ((0, 1, 0), 9)], types)
+    body = rows.tobytes() + b"\3" + np.array([0, 1, 2], ">i4").tobytes()
+    text = b"0 0 0 7\n1 0 0 8\n0 1 0 9\n3 0 1 2\n"
+    mark = mesh_of(tmp_path, header + (text if kind == "ascii" else body)).attributes["mark"]
+    assert mark.tolist() == [7, 8, 9]
+    assert mark.dtype.kind == NAMES[name][0]
+
+
+@pytest.mark.parametrize(("name", "value"), [("uchar", 256), ("char", -129), ("uchar", 1.5), ("uint", -1)])
+def test_numbers_in_text_must_fit_their_type(tmp_path: Path, name: str, value: float) -> None:
+    text = head(vertices=3, more=f"property {name} mark\n") + f"0 0 0 1\n1 0 0 {value}\n0 1 0 3\n3 0 1 2\n"
+    with pytest.raises(InputError, match=rf"vertex 1 has {value} for 'mark', a u?int"):
+        mesh_of(tmp_path, text)

@@ -46,7 +46,7 @@ def test_what_is_no_file_with_content_is_refused(tmp_path: Path, suffix: str) ->
         read_mesh(path)
     path.unlink()
     path.symlink_to(path)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"cannot be read \(Too many levels of symbolic links\); check"):
         read_mesh(path)
 
 
@@ -194,3 +194,45 @@ def test_a_bad_number_at_the_end_is_seen_though_numpy_only_warns(tmp_path, monke
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3x\n")
     with pytest.raises(InputError, match=r"a\.obj:4: '3x' is no whole number"):
         read_mesh(path)
+
+
+def test_files_of_the_limit_are_read(tmp_path, monkeypatch) -> None:
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text)
+    monkeypatch.setattr(_files, "LARGEST_FILE", len(text))
+    assert read_mesh(tmp_path / "a.obj").polygon_count == 1
+    monkeypatch.setattr(_files, "LARGEST_FILE", len(text) - 1)
+    with pytest.raises(LimitError):
+        read_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("name", ["/x/a.mtl", "C:/a.mtl", "C:a.mtl"])
+def test_absolute_paths_are_called_so(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=rf"here: '{name}' is an absolute path; copy the file beside"):
+        _files.beside(tmp_path / "m.obj", name, "here")
+
+
+def test_paths_of_either_kind_of_slash_lead_into_folders(tmp_path: Path) -> None:
+    assert _files.beside(tmp_path / "m.obj", "x\\y\\a.mtl", "") == tmp_path / "x" / "y" / "a.mtl"
+    assert _files.beside(tmp_path / "m.obj", "x/../a.mtl", "").resolve() == tmp_path / "a.mtl"
+
+
+def test_strips_wind_alike_from_the_start_of_each() -> None:
+    from illumcli.geometry.readers._polygons import strip
+
+    assert strip([])[0].tolist() == strip([0, 1])[0].tolist() == []
+    assert strip([5, 6, 7])[0].tolist() == [[5, 6, 7]]
+    assert strip([0, 1, 2, 3])[0].tolist() == [[0, 1, 2], [2, 1, 3]]
+    assert strip([0, 1, 2, -1, 3, 4, 5, 6])[0].tolist() == [[0, 1, 2], [3, 4, 5], [5, 4, 6]]
+    assert strip([0, 1, 2, 3, -1, 4, 5, 6])[0].tolist() == [[0, 1, 2], [2, 1, 3], [4, 5, 6]]
+    assert strip([0, 0, 1, 1, 2])[1] == 3
+
+
+@pytest.mark.parametrize(("size", "sound"), [("1e18", True), ("-1e18", True), ("1.01e18", False)])
+def test_coordinates_up_to_the_limit_are_read(tmp_path: Path, size: str, sound: bool) -> None:
+    (tmp_path / "a.obj").write_text(f"v 0 0 {size}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    if sound:
+        assert read_mesh(tmp_path / "a.obj").vertices[0, 2] == float(size)
+    else:
+        with pytest.raises(InputError, match=r"1 of 3 vertices are not finite or beyond 1e\+18"):
+            read_mesh(tmp_path / "a.obj")

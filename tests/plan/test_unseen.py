@@ -22,7 +22,7 @@ from illumcli.plan.plan import plan, reusing
 from illumcli.plan.unseen import unseen_objects, why_all, without
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
-from illumcli.visibility.unseen import apart, frustum, outside, within
+from illumcli.visibility.unseen import GROUPS, LARGE, apart, fewer, frustum, outside, within
 
 SCENE = """
 version: 1
@@ -136,6 +136,21 @@ def test_artifacts_of_both_kinds_live_side_by_side(scene, tmp_path, monkeypatch)
     plain = pictures(scene, leave_out=False)[0]
     for leave_out in (True, False, True, False):
         same(plain, pictures(scene, leave_out=leave_out, store=store)[0])
+
+
+def test_of_many_objects_those_out_of_sight_are_left_out(scene):
+    field = ", ".join(
+        f"{{mesh: {{shape: sphere, segments: 8, rings: 5}}, transform: {{scale: 0.1, "
+        f"translate: [{x - 6.013}, 0.102, {z - 4.007}]}}}}"
+        for x in range(13)
+        for z in range(9)
+    )
+    floor = "{mesh: {shape: plane, size: [30, 30]}}"
+    overrides = [f"objects=[{floor}, {field}]", "camera.fov=20"]
+    few, left_out, triangles = pictures(scene, overrides)
+    assert 50 < len(left_out) < 110
+    assert triangles > 2
+    same(few, pictures(scene, overrides, leave_out=False)[0])
 
 
 def test_the_job_counts_and_names_them(scene, tmp_path, monkeypatch):
@@ -298,6 +313,17 @@ def test_boxes_told_apart_are_farther_than_the_gap(seed):
     distance = np.linalg.norm(way, axis=2).min(axis=1)
     assert (distance[told] > gap).all()
     assert told[distance > gap + 1.5].all()
+
+
+@pytest.mark.parametrize("count", [1, LARGE + GROUPS, LARGE + GROUPS + 1, 700])
+def test_fewer_boxes_hold_all_of_many(count):
+    random = np.random.default_rng(count)
+    low = random.normal(size=(count, 3))
+    high = low + random.exponential(0.1, (count, 3))
+    lower, higher = fewer(low, high)
+    assert len(lower) <= LARGE + GROUPS
+    inside = (lower[None] <= low[:, None]).all(axis=2) & (high[:, None] <= higher[None]).all(axis=2)
+    assert inside.any(axis=1).all()
 
 
 def test_what_a_box_and_a_frustum_share_holds_all_points_in_both(scene):

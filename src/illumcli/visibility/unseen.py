@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import columns
 from illumcli.frame import Frame
+from illumcli.geometry.order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
 
@@ -33,6 +34,9 @@ BEYOND = 20.0
 STEPS = 40
 PARALLEL = 1e-9
 AT_ONCE = 1 << 20
+LARGE, GROUPS = 8, 16
+"""Of many boxes so many of the largest stand alone; so many boxes hold the others, those that lie close
+together."""
 
 Points = NDArray[np.float64]
 Planes = tuple[NDArray[np.float64], NDArray[np.float64]]  # (K, 3) unit n and (K,) d: n.x <= d is inside
@@ -107,18 +111,34 @@ def apart(points: Points, low: Points, high: Points, gap: float) -> NDArray[np.b
         return np.concatenate([apart(points, low[part], high[part], gap) for part in parts])
     found = np.zeros(len(low), np.bool_)
     way = points.mean(axis=0) - (low + high) / 2
+    left = np.arange(len(low))
     for _ in range(STEPS):
         # the corner of (hull - box) that lies farthest back along the way
-        back = points[np.argmin(points @ way.T, axis=0)] - np.where(way > 0, high, low)
+        back = points[np.argmin(points @ way.T, axis=0)] - np.where(way > 0, high[left], low[left])
         size = np.linalg.norm(way, axis=1)
-        found |= np.einsum("ki,ki->k", back, way) > gap * size
-        step = back - way
+        told = np.einsum("ki,ki->k", back, way) > gap * size
+        found[left[told]] = True
+        # the way leads from a point of the box to one of the hull: a short one proves the opposite
+        on = np.flatnonzero(~told & (size > gap))
+        left, way = left[on], way[on]
+        if not len(left):
+            break
+        step = back[on] - way
         length = np.einsum("ki,ki->k", step, step)
         share = -np.einsum("ki,ki->k", way, step) / np.maximum(length, np.finfo(np.float64).tiny)
         way = way + np.clip(share, 0, 1)[:, None] * step
-        if found.all():
-            break
     return found
+
+
+def fewer(low: Points, high: Points) -> tuple[Points, Points]:
+    """Boxes that hold all of (K, 3) boxes: these, or where they are many fewer and larger ones."""
+    if len(low) <= LARGE + GROUPS:
+        return low, high
+    by_size = np.argsort(-np.linalg.norm(high - low, axis=1), kind="stable")
+    large, others = by_size[:LARGE], by_size[LARGE:]
+    others = others[compact((low[others] + high[others]) / 2)]
+    groups = [*large[:, None], *np.array_split(others, GROUPS)]
+    return np.array([low[g].min(axis=0) for g in groups]), np.array([high[g].max(axis=0) for g in groups])
 
 
 def unseen(
@@ -153,7 +173,7 @@ def unseen(
     more = (ROOM + lifts)[:, None]
     seen = np.concatenate(
         [
-            within(planes, (low - more)[mine], (high + more)[mine])
+            within(planes, *fewer((low - more)[mine], (high + more)[mine]))
             for planes, mine in zip(views, real & ~beyond, strict=True)
         ]
     )

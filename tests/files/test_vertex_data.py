@@ -138,6 +138,13 @@ def test_ply_of_shapes_holds_them_one_after_the_other(tmp_path):
     assert read_mesh(tmp_path / "a.ply").polygon_count == 2
 
 
+def test_ply_of_shapes_keeps_normals_that_all_have(tmp_path):
+    normal = np.tile([0.6, 0.0, 0.8], (4, 1))
+    write_ply(tmp_path / "a.ply", [shape(normal=normal)], baked(), None, None)
+    mesh = read_mesh(tmp_path / "a.ply")
+    np.testing.assert_allclose(mesh.normals, normal, rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("channel", "expected"),
     [("r", [85, 255, 255]), ("b", [255, 255, 85]), ("rgb", [85, 85, 85]), ("a", [255, 255, 255])],
@@ -159,12 +166,13 @@ def test_far_from_the_origin_coordinates_keep_double_precision(tmp_path):
     assert PlyData.read(tmp_path / "a.ply")["vertex"]["x"].tolist() == (SQUARE[:, 0] + 1e6 + 0.3).tolist()
 
 
-def test_polygons_of_more_than_255_corners_are_kept(tmp_path):
-    angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+@pytest.mark.parametrize("count", [255, 256, 300])
+def test_polygons_of_more_than_255_corners_are_kept(tmp_path, count):
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    corners, starts = np.arange(300, dtype=np.int32), np.array([0, 300], np.int32)
+    corners, starts = np.arange(count, dtype=np.int32), np.array([0, count], np.int32)
     disc = Shape("disc", circle, corners, starts, np.array([[0, 1, 2]], np.int32), {})
-    write_ply(tmp_path / "a.ply", [disc], baked(300), None, None)
+    write_ply(tmp_path / "a.ply", [disc], baked(count), None, None)
     assert read_mesh(tmp_path / "a.ply").corners.tolist() == corners.tolist()
 
 

@@ -339,3 +339,19 @@ def test_buffers_of_another_rate_are_not_kept(scene, store):
     _, made, _, reused = picture(scene, "shading=gouraud", store=store, only=["beauty"])
     assert "hits" in reused
     assert "points" in made
+
+
+def test_what_this_run_made_is_loaded_from_nowhere(scene):
+    recipe = Artifacts(made={"key": "the buffer"}).recipe("world", "key", None)
+    assert recipe.function() == "the buffer"
+    assert Artifacts(made={"key": "the buffer"}).recipe("world", "other", None) is None
+
+
+def test_a_store_too_small_for_a_buffer_keeps_none_of_it(scene, store):
+    store.limit = 4 * 3000
+    cold = picture(scene)[0]
+    same(cold, picture(scene, store=store)[0])
+    again, made, _, _ = picture(scene, store=store)
+    same(cold, again)
+    assert "hits" in made
+    assert all(entry.bytes <= 3000 + 1024 for entry in store.entries())

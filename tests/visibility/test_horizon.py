@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.geometry.assemble import place
 from illumcli.geometry.order import compact
+from illumcli.geometry.shapes.sphere import Sphere
+from illumcli.geometry.shapes.torus import Torus
 from illumcli.rays.offsets import lifted
-from illumcli.visibility.horizon import Horizon
+from illumcli.visibility.horizon import Horizon, OpenFacets
 
 F = np.float32
 
@@ -88,3 +91,47 @@ def test_the_tree_is_built_for_many_points_only(down, built):
     horizon = Horizon(p, t)
     assert horizon.clears(np.asfortranarray(o), n).tolist() == [built] + [False] * down
     assert (horizon._levels is not None) == built
+
+
+def world_of(*meshes):
+    return place(list(meshes), [np.eye(4)] * len(meshes))
+
+
+def test_every_facet_of_a_convex_mesh_is_open_in_front_and_none_behind():
+    world = world_of(Sphere(shape="sphere").mesh())
+    triangle = np.repeat(np.arange(len(world.triangles), dtype=np.int32), 2)
+    front = np.tile([False, True], len(world.triangles))
+    opened = OpenFacets(world).open(triangle, front, 1)
+    assert opened[~front].all()
+    assert not opened[front].any()
+
+
+def test_facets_that_few_samples_lie_on_are_not_looked_at():
+    world = world_of(Sphere(shape="sphere").mesh())
+    triangle = np.arange(len(world.triangles), dtype=np.int32)[:70]
+    opened = OpenFacets(world).open(triangle, np.zeros(70, bool), 10)
+    assert opened.tolist() == [True] * 64 + [False] * 6
+
+
+def test_an_open_facet_does_not_depend_on_who_asks_first():
+    world = world_of(Torus(shape="torus").mesh(), Sphere(shape="sphere").mesh())
+    triangle = np.arange(len(world.triangles), dtype=np.int32)
+    behind = np.zeros(len(triangle), bool)
+    whole = OpenFacets(world).open(triangle, behind, 1)
+    parts = OpenFacets(world)
+    for part in np.array_split(np.random.default_rng(1).permutation(len(triangle)), 50):
+        assert np.array_equal(parts.open(triangle[part], behind[part], 1), whole[part])
+
+
+def test_open_facets_are_open_to_every_vertex():
+    world = world_of(Torus(shape="torus").mesh())
+    triangle = np.arange(len(world.triangles), dtype=np.int32)
+    opened = OpenFacets(world).open(triangle, np.zeros(len(triangle), bool), 1)
+    corner = world.vertices[world.triangles[:, 0]].astype(float)
+    sides = [world.vertices[world.triangles[:, k]].astype(float) - corner for k in (1, 2)]
+    n = np.cross(*sides)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    above = (n @ world.vertices.astype(float).T).max(axis=1) - np.einsum("ij,ij->i", n, corner)
+    assert 0.3 < opened.mean() < 0.7
+    assert (above[opened] < 1e-6).all()
+    assert (above[~opened] > 1e-6).mean() > 0.9

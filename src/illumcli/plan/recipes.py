@@ -248,7 +248,7 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Reci
         for number, (name, file) in enumerate(baked_files(scene, loaded))
     )
     settings = scene.obscurance or Obscurance()
-    more = {"horizon": "horizon"}
+    more = {"open_facets": "open_facets"}
     if any(file for _, file in files):
         more["baked"] = "baked"
     if settings.faces != "count":
@@ -258,7 +258,7 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Reci
     else:
         w = Recipe.of(partial(stages.obscurance, settings), "obscurance", **more)
     return [
-        Recipe.of(stages.horizon),
+        Recipe.of(stages.open_facets),
         Recipe.of(stages.facet_normals),
         Recipe.of(partial(stages.baked, files), "baked"),
         w,

@@ -36,11 +36,13 @@ from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
 from illumcli.visibility.arriving import Lit, among
 from illumcli.visibility.arriving import lit as lit_lanes
-from illumcli.visibility.horizon import Horizon
+from illumcli.visibility.horizon import OpenFacets
 from illumcli.visibility.obscurance import Method, estimates
 
 LARGEST_HORIZON = 1 << 17
-"""Vertices up to which it is worth to look for points with nothing above them."""
+"""Vertices up to which it is worth to look for facets with nothing above them."""
+WORTH_RAYS = 1 << 11
+"""To look for one row of them takes about as long as so many rays."""
 
 # --- once: geometry ---------------------------------------------------------------------------------
 
@@ -122,9 +124,9 @@ def tracer_over(world: World) -> Tracer:
     return Tracer(world.vertices, world.triangles)
 
 
-def horizon(world: World) -> Horizon | None:
-    """What tells points with nothing above them; None for meshes so large that it does not pay."""
-    return Horizon(world.vertices, world.triangles) if len(world.vertices) <= LARGEST_HORIZON else None
+def open_facets(world: World) -> OpenFacets | None:
+    """What tells triangles with nothing above them; None for meshes so large that it does not pay."""
+    return OpenFacets(world) if len(world.vertices) <= LARGEST_HORIZON else None
 
 
 def facet_normals(world: World) -> Vectors:
@@ -553,7 +555,7 @@ def obscurance(
     facets: Facets,
     obscurance_origins: Vectors,
     obscurance_draws: NDArray[np.float64],
-    horizon: Horizon | None = None,
+    open_facets: OpenFacets | None = None,
     baked: BakedValues | None = None,
     facet_normals: Vectors | None = None,
 ) -> Lanes:
@@ -566,14 +568,18 @@ def obscurance(
         settings.faces,
         facet_normals,
     )
+    known = None
+    if open_facets is not None:
+        known = open_facets.open(hits.triangle, facets.behind, WORTH_RAYS // settings.samples)
     if baked is None:
         return estimates(
-            tracer, obscurance_origins, facets.ng, obscurance_draws, method, horizon, errors=False
+            tracer, obscurance_origins, facets.ng, obscurance_draws, method, known, errors=False
         ).w
     w = baked_obscurance(world, baked, hits)
     left = np.flatnonzero(np.isnan(w))
     origins, ng = rows(obscurance_origins, left), rows(facets.ng, left)
-    w[left] = estimates(tracer, origins, ng, obscurance_draws[:, left], method, horizon, errors=False).w
+    known = None if known is None else known.take(left)
+    w[left] = estimates(tracer, origins, ng, obscurance_draws[:, left], method, known, errors=False).w
     return w
 
 

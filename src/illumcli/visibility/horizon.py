@@ -13,8 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors
+from illumcli.arrays import F, Ids, Vectors, dot, rows
+from illumcli.geometry.assemble import World
 from illumcli.geometry.order import compact
+from illumcli.rays.offsets import SHARE
+from illumcli.rays.surface import facets, facing
 
 FAN = 8
 GROUP = 64  # points asked about together
@@ -109,17 +112,35 @@ class Horizon:
     def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
         """(M,) True where no occluder is above the plane, as far as probes, the points near by and then
         clusters tell."""
+        out = self._probed(o, n)
+        left = np.flatnonzero(out)
+        if len(left) * FEWEST < len(o):
+            return np.zeros(len(o), bool)
+        if left.size:
+            out[left] = self._below(o[left], n[left], most)
+        return out
+
+    def clear_planes(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) as `clears`, for M a multiple of 64: what is told of every 64 in a row depends on these alone.
+
+        Planes through points of occluders, lifted a little.
+        """
+        out = self._probed(o, n)
+        groups = out.reshape(-1, GROUP)
+        groups[groups.sum(axis=1) * 2 < GROUP] = False  # the tree tells little of what is mostly under others
+        some = np.repeat(groups.any(axis=1), GROUP)
+        if some.any():
+            out[some] &= self._below(o[some], n[some], MOST_CLUSTERS)
+        return out
+
+    def _probed(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) False where the vertices farthest out or the points near by are clearly above the plane."""
         height = np.einsum("ij,ij->i", o, n)
         out = (n.astype(F) @ self._probes.T).max(axis=1) <= height + CLEARLY
         for first in range(0, len(o), GROUP) if out.any() else ():
             own = slice(first, first + GROUP)
             if out[own].any():
                 out[own] &= clear_of_each_other(o[own], n[own])
-        left = np.flatnonzero(out)
-        if len(left) * FEWEST < len(o):
-            return np.zeros(len(o), bool)
-        if left.size:
-            out[left] = self._below(o[left], n[left], most)
         return out
 
     def _below(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
@@ -163,6 +184,50 @@ class Horizon:
             kept = reach + planes.spread[group] * far + planes.room[group] > 0
             group, cluster = group[kept], cluster[kept]
         return group, cluster, told
+
+
+class OpenFacets:
+    """Which triangles have nothing above their plane, on either side; safe to ask from threads.
+
+    All samples of a triangle look up from one plane, so each is settled once, with 63 others in a row: an
+    answer depends on these alone, whoever asks first.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._horizon = Horizon(world.vertices, world.triangles)
+        self._blocks = -(-len(world.triangles) // GROUP)  # of either side
+        self._asked = np.zeros(2 * self._blocks, bool)
+        self._clear = np.zeros(2 * self._blocks * GROUP, bool)
+
+    def open(self, triangle: Ids, behind: NDArray[np.bool_], worth: int) -> NDArray[np.bool_]:
+        """(M,) True where nothing is above the triangle that a sample lies on, on the side that is seen.
+
+        Rows of triangles that fewer than `worth` of the samples lie on are not looked at.
+        """
+        number = triangle + behind * np.int64(self._blocks * GROUP)
+        block = number // GROUP
+        seen = np.bincount(block, minlength=2 * self._blocks) >= worth
+        new = np.flatnonzero(seen & ~self._asked)
+        for first in range(0, len(new), GROUPS_AT_ONCE):
+            self._settle(new[first : first + GROUPS_AT_ONCE])
+        return self._clear.take(number) & seen.take(block)
+
+    def _settle(self, blocks: NDArray[np.int64]) -> None:
+        numbers = (blocks[:, None] * GROUP + np.arange(GROUP)).ravel()
+        side, triangle = np.divmod(numbers, self._blocks * GROUP)
+        triangle = np.minimum(triangle, len(self._world.triangles) - 1).astype(np.int32)
+        zero = np.zeros(len(triangle), F)
+        facet = facets(self._world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
+        n = facing(facet.ng, side > 0).astype(np.float64)
+        v0 = facet.position
+        others = (rows(self._world.vertices, self._world.triangles[:, k].take(triangle)) for k in (1, 2))
+        lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
+        # no ray starts lower: |ng|.|p| of `lifted` is at least the distance of the plane from the centre
+        step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
+        o = v0 + step[:, None] * n
+        self._clear[numbers] = self._horizon.clear_planes(np.ascontiguousarray(o), np.ascontiguousarray(n))
+        self._asked[blocks] = True
 
 
 def clear_of_each_other(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:

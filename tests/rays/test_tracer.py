@@ -119,6 +119,18 @@ def test_rays_that_are_not_finite_never_reach_embree(square, value, which):
         square.closest(*pair)
 
 
+def test_an_origin_stands_for_several_rays_in_a_row(ball):
+    vertices, faces = ball
+    tracer = Tracer(vertices.astype(F), faces)
+    rng = np.random.default_rng(5)
+    o, d = rng.normal(size=(50, 3)).astype(F), rng.normal(size=(350, 3)).astype(F)
+    each = np.repeat(o, 7, axis=0)
+    assert np.array_equal(tracer.occluded(o, d, 2.0), tracer.occluded(each, d, 2.0))
+    assert np.array_equal(tracer.distance(o, d), tracer.distance(each, d))
+    assert np.array_equal(tracer.closest(o, d).triangle, tracer.closest(each, d).triangle)
+    assert tracer.occluded(o, d, 2.0).mean() > 0.05
+
+
 def test_a_limit_that_is_not_a_number_is_refused(square):
     o, d = rays(([0.3, 0.1, 1], [0, 0, -1]))
     with pytest.raises(IllumError, match="not a number"):
@@ -134,9 +146,10 @@ dtypes = st.sampled_from([np.float32, np.float64, np.int32, np.float16])
 def test_no_arrays_crash_it(o_shape, d_shape, limit_shape, o_type, d_type):
     tracer = Tracer(SQUARE, FACES)
     o, d, limits = np.ones(o_shape, o_type), np.ones(d_shape, d_type), np.ones(limit_shape, F)
-    fits = o.shape == d.shape and o.ndim == 2 and o.shape[1:] == (3,) and {o.dtype, d.dtype} == {np.dtype(F)}
-    if fits and limits.shape in ((len(o),), ()):
-        assert len(tracer.occluded(o, d, limits)) == len(o)
+    fits = o.ndim == d.ndim == 2 and o.shape[1] == d.shape[1] == 3 and {o.dtype, d.dtype} == {np.dtype(F)}
+    fits = fits and (len(o) == len(d) or (0 < len(o) < len(d) and len(d) % len(o) == 0))
+    if fits and limits.shape in ((len(d),), ()):
+        assert len(tracer.occluded(o, d, limits)) == len(d)
     else:
         with pytest.raises(ValueError, match=r"must be|for"):
             tracer.occluded(o, d, limits)

@@ -80,6 +80,8 @@ def main() -> None:
         signal.signal(number, _unwind)
     # a start makes many objects and no garbage: the default looks through them again and again, 5 % of it
     gc.set_threshold(100_000, 50, 50)
+    # threads are ours: those of numpy's linear algebra would only spin beside them
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _look_for_no_plugins()
     try:
         status = illum.main(standalone_mode=False)

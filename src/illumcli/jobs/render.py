@@ -33,7 +33,7 @@ from illumcli.plan.unseen import unseen_objects, without
 from illumcli.scene.load import Loaded, load
 from illumcli.scene.spec import Scene
 
-BAND_ROWS = 128
+BAND_ROWS = 256
 """No band of tiles is higher [pixels]."""
 BYTES = {"half": 2, "float": 4, "uint8": 1, "uint16": 2}
 Progress = Callable[[str, int, int], None]

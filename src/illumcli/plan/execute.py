@@ -20,7 +20,7 @@ from illumcli.memory import keep_freed_memory
 from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import SHAPE, View
-from illumcli.plan.stages import LANES, Scattered, Tile
+from illumcli.plan.stages import MOST, Scattered, Tile
 from illumcli.rays.tracer import Interrupted
 from illumcli.visibility.arriving import Lit
 
@@ -165,7 +165,7 @@ def at_pixels(
     tally: Tally,
 ) -> Planes:
     """Layer -> (K, channels) at K pixels of a view: what `bands` makes there, and nothing else is made."""
-    some = max(1, LANES // view.samples)
+    some = max(1, MOST // view.samples)
     tiles = [Scattered.at(x[a : a + some], y[a : a + some]) for a in range(0, len(x), some)]
     last_use, keeper = plan.last_use(), Keeper(Artifacts(), {}, view)
     stop = threading.Event()
@@ -264,7 +264,7 @@ def _adaptive_tile(
     down, across = np.nonzero(wanted)
     tally.add({"film": time.perf_counter() - start}, {})
     rest = view.rest()
-    some = max(1, LANES // rest.samples)
+    some = max(1, MOST // rest.samples)
     for first in range(0, len(down), some):
         y, x = down[first : first + some], across[first : first + some]
         part = Scattered.at(x + tile.x, y + tile.y)

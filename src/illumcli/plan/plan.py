@@ -89,7 +89,7 @@ class Plan:
 
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default, in whole blocks where these have one error."""
-        side = side or tile_side(view.samples)
+        side = side or tile_side(view.samples, view.width * view.height)
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.layers) else side
 
     def expected_bytes(self) -> dict[str, int]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors
+from illumcli.arrays import F, Ids, Lanes, Vectors, repeated
 from illumcli.errors import IllumError
 from illumcli.rays.upload import upload
 
@@ -43,7 +43,10 @@ class Interrupted(Exception):
 
 
 class Tracer:
-    """Two questions about a set of triangles, asked with arrays; safe to ask from many threads."""
+    """Two questions about a set of triangles, asked with arrays; safe to ask from many threads.
+
+    There may be fewer origins than directions: each then stands for as many rays in a row.
+    """
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
         from embreex.rtcore_scene import EmbreeScene
@@ -77,17 +80,19 @@ class Tracer:
 
     def closest(self, origins: Vectors, directions: Vectors) -> Closest:
         """What each ray hits first; a ray that misses is shot a second time, turned by 2^-19 rad."""
+        origins = self._asked(origins, directions)
         hits = self._closest(origins, directions)
         again = np.flatnonzero(hits.triangle < 0)
         if again.size and self.triangle_count:
             d = directions[again]
+            self.rays += len(again)
             second = self._closest(origins[again], d + TURN * np.abs(d[:, [1, 2, 0]]))
             for name in Closest.__slots__:
                 getattr(hits, name)[again] = getattr(second, name)
         return hits
 
     def _closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        count = self._asked(origins, directions)
+        count = len(directions)
         hits = Closest(np.empty(count, np.int32), np.empty(count, F), np.empty(count, F), np.empty(count, F))
         for part in _parts(count):
             answer = self._scene.run(origins[part], directions[part], query="INTERSECT", output=1)
@@ -100,7 +105,7 @@ class Tracer:
 
     def distance(self, origins: Vectors, directions: Vectors) -> Lanes:
         """(N,) distance to what each ray hits first, inf where it hits nothing."""
-        count = self._asked(origins, directions)
+        origins, count = self._asked(origins, directions), len(directions)
         far = np.empty(count, F)
         for part in _parts(count):
             far[part] = self._scene.run(origins[part], directions[part], query="DISTANCE")
@@ -114,7 +119,7 @@ class Tracer:
 
         A limit of 0 or less asks nothing and answers False, where Embree would answer True.
         """
-        count = self._asked(origins, directions)
+        origins, count = self._asked(origins, directions), len(directions)
         reach = np.asarray(limits, F)
         if reach.ndim and len(reach) != count:
             raise ValueError(f"{len(reach)} limits for {count} rays")
@@ -130,12 +135,13 @@ class Tracer:
             np.greater_equal(hit, 0, out=out[part])
         return out if lowest > 0 else out & (reach > 0)
 
-    def _asked(self, origins: Vectors, directions: Vectors) -> int:
+    def _asked(self, origins: Vectors, directions: Vectors) -> Vectors:
+        """An origin for each direction, after a look at everything that Embree does not look at."""
         if self._stop is not None and self._stop.is_set():
             raise Interrupted
-        count = _checked(origins, directions)
-        self.rays += count
-        return count
+        each = _checked(origins, directions)
+        self.rays += len(directions)
+        return origins if each == 1 else repeated(origins, each)
 
 
 class _Errors(logging.Handler):
@@ -154,7 +160,7 @@ def _parts(count: int) -> list[slice]:
 
 
 def _checked(origins: Vectors, directions: Vectors) -> int:
-    """The number of rays, after looking at everything that Embree does not look at."""
+    """How many directions there are to an origin; everything is finite and has its shape."""
     for name, array in (("origins", origins), ("directions", directions)):
         if array.ndim != 2 or array.shape[1] != 3 or array.dtype != F:
             raise ValueError(f"{name} must be (N, 3) float32, are {array.shape} {array.dtype}")
@@ -164,9 +170,10 @@ def _checked(origins: Vectors, directions: Vectors) -> int:
         if not np.isfinite(total) and not np.isfinite(array).all():
             bad = int(np.count_nonzero(~np.isfinite(array).all(axis=1)))
             raise IllumError(f"{bad} of {len(array)} rays have {name} that are not finite")
-    if len(origins) != len(directions):
-        raise ValueError(f"{len(origins)} origins for {len(directions)} directions")
-    return len(origins)
+    starts, count = len(origins), len(directions)
+    if starts != count and not (0 < starts < count and count % starts == 0):
+        raise ValueError(f"{starts} origins for {count} directions")
+    return count // starts if starts else 1
 
 
 def tracer(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> Tracer:

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Lanes, Vectors, columns, dot, rows
+from illumcli.arrays import F, Lanes, Vectors, columns, dot, repeated, rows
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.rays.tracer import Tracer
 from illumcli.visibility.falloffs._base import Falloff
@@ -22,8 +22,9 @@ from illumcli.visibility.falloffs._base import Falloff
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
-RAYS_AT_ONCE = 1 << 14
-"""Directions, origins and answers of as many rays stay in a core's cache."""
+RAYS_AT_ONCE = 1 << 17
+"""So many that the ray core has its cache to itself for long: a tenth faster than 2^14, of which directions,
+origins and answers would stay in it; with two threads a fifth."""
 MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
 
@@ -158,10 +159,12 @@ def neighbours(samples: int) -> list[int]:
 def seen(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArray[Any]:
     """(M * samples,) mu along each direction: bool where it is a step, float32 elsewhere."""
     reach = method.falloff.reach(method.radius)
-    o = np.repeat(np.ascontiguousarray(origins), method.samples, axis=0)
     if method.any_hit:
-        return ~tracer.occluded(o, d, np.inf if reach == np.inf else reach / method.radius)
-    far = tracer.distance(o, d) if method.faces == "count" else facing_distance(tracer, o, d, method)
+        return ~tracer.occluded(origins, d, np.inf if reach == np.inf else reach / method.radius)
+    if method.faces == "count":
+        far = tracer.distance(origins, d)
+    else:
+        far = facing_distance(tracer, repeated(origins, method.samples), d, method)
     weight = method.falloff.weight(far.astype(np.float64) * method.radius, reach, method.radius)
     return weight > 0.5 if method.falloff.step else weight.astype(F)
 

@@ -3,9 +3,9 @@
 Reference: the same rays, recorded where the renderer asks them, put to embreex's own scene in the same chunks
 by as many threads: no generation, no checks, no shading, no files. The rays are recorded a row of tiles at a
 time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2, ...: no hit
-that was kept is met again.
+that was kept is met again. The command sets OPENBLAS_NUM_THREADS itself.
 
-    PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
+    OPENBLAS_NUM_THREADS=1 PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
 
     def recording(name: str) -> Any:
         def question(self: Tracer, origins: np.ndarray, directions: np.ndarray, *more: Any) -> Any:
-            asked.append((name, np.array(origins, order="C"), np.array(directions, order="C"), more))
+            each = len(directions) // max(len(origins), 1)
+            starts = np.repeat(np.array(origins, order="C"), each, axis=0)
+            asked.append((name, starts, np.array(directions, order="C"), more))
             return own[name](self, origins, directions, *more)
 
         return question

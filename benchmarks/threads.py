@@ -4,7 +4,7 @@ Reference: the same render with `-t 1`, in the same process, with a scene read a
 bound by shading. A machine that does other things meanwhile shows less than there is: see the load, and the
 same ratio of sums that hold no lock, which is what the machine gives.
 
-    PYTHONPATH=src python benchmarks/threads.py [--small]
+    OPENBLAS_NUM_THREADS=1 PYTHONPATH=src python benchmarks/threads.py [--small]
 """
 
 from __future__ import annotations

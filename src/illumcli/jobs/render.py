@@ -29,11 +29,12 @@ from illumcli.plan.execute import Band, Tally, bands, run_once
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
 from illumcli.plan.recipes import View
+from illumcli.plan.stages import MOST
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.scene.load import Loaded, load
 from illumcli.scene.spec import Scene
 
-BAND_ROWS = 256
+BAND_ROWS = math.isqrt(MOST)
 """No band of tiles is higher [pixels]."""
 BYTES = {"half": 2, "float": 4, "uint8": 1, "uint16": 2}
 Progress = Callable[[str, int, int], None]

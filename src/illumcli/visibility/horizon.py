@@ -83,33 +83,31 @@ class Horizon:
                 self._levels = levels
         return self._levels
 
-    def clears(self, origins: Vectors, n: Vectors, most: int = MOST_CLUSTERS) -> NDArray[np.bool_]:
+    def clears(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
         """(M,) True where no occluder reaches above the plane through an origin with normal `n`.
 
         Origins are those of rays, off the surface by more than the rounding of this test; points in a row
         should lie close together. False may also mean that it was too much work to tell: that a group of
-        points would look at more than `most` clusters.
+        points would look at more than `MOST_CLUSTERS`.
         """
         if not len(self._points):
             return np.ones(len(origins), bool)
         group = np.arange(len(origins)) // GROUP
         tried = group % TRY_FIRST == 0
         out = np.zeros(len(origins), bool)
-        self._clear(out, np.flatnonzero(tried), origins, n, most)
+        self._clear(out, np.flatnonzero(tried), origins, n)
         cleared = np.bincount(group // TRY_FIRST, out) > 0
-        self._clear(out, np.flatnonzero(~tried & cleared[group // TRY_FIRST]), origins, n, most)
+        self._clear(out, np.flatnonzero(~tried & cleared[group // TRY_FIRST]), origins, n)
         return out
 
-    def _clear(
-        self, out: NDArray[np.bool_], lanes: NDArray[np.int64], origins: Vectors, n: Vectors, most: int
-    ) -> None:
+    def _clear(self, out: NDArray[np.bool_], lanes: NDArray[np.int64], origins: Vectors, n: Vectors) -> None:
         """Answer for some lanes."""
         for first in range(0, len(lanes), GROUP * GROUPS_AT_ONCE):
             lane = lanes[first : first + GROUP * GROUPS_AT_ONCE]
             o, up = np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64)
-            out[lane] = self._cleared(o, up, most)
+            out[lane] = self._cleared(o, up)
 
-    def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
+    def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(M,) True where no occluder is above the plane, as far as probes, the points near by and then
         clusters tell."""
         out = self._probed(o, n)
@@ -117,7 +115,7 @@ class Horizon:
         if len(left) * FEWEST < len(o):
             return np.zeros(len(o), bool)
         if left.size:
-            out[left] = self._below(o[left], n[left], most)
+            out[left] = self._below(o[left], n[left])
         return out
 
     def clear_planes(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -130,7 +128,7 @@ class Horizon:
         groups[groups.sum(axis=1) * 2 < GROUP] = False  # the tree tells little of what is mostly under others
         some = np.repeat(groups.any(axis=1), GROUP)
         if some.any():
-            out[some] &= self._below(o[some], n[some], MOST_CLUSTERS)
+            out[some] &= self._below(o[some], n[some])
         return out
 
     def _probed(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -143,10 +141,10 @@ class Horizon:
                 out[own] &= clear_of_each_other(o[own], n[own])
         return out
 
-    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64], most: int) -> NDArray[np.bool_]:
+    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(M,) True where all points are below, for points that no probe is above."""
         planes = groups(o, n)
-        group, cluster, told = self._near(planes, most)
+        group, cluster, told = self._near(planes)
         out = np.zeros(len(o), bool)
         bounds = np.searchsorted(group, np.arange(len(planes.centre) + 1))
         for g in np.flatnonzero(told):
@@ -158,16 +156,14 @@ class Horizon:
             out[lane] = (n[lane] @ near.T).max(axis=1, initial=-np.inf) <= height
         return out
 
-    def _near(
-        self, planes: Groups, most: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    def _near(self, planes: Groups) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
         """Pairs (group, cluster of `FAN` points), by group, that may have a point above a plane, and for each
-        group whether they are all there: groups with more than `most` are left out."""
+        group whether they are all there: groups with more than `MOST_CLUSTERS` are left out."""
         count = len(planes.centre)
         told = np.ones(count, bool)
         group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all
         for level in reversed(self._tree()):
-            few = np.bincount(group, minlength=count) <= most // FAN
+            few = np.bincount(group, minlength=count) <= MOST_CLUSTERS // FAN
             told &= few
             group, cluster = group[few[group]], cluster[few[group]]
             group = np.repeat(group, FAN)

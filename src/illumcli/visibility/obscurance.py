@@ -192,11 +192,6 @@ def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> L
     return far
 
 
-def directions(n: Vectors, draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
-    """(M, samples, 3) float32 unit directions about each normal, cosine-weighted."""
-    return np.matmul(patterns(draws, method), about(n, draws, method))
-
-
 def patterns(draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
     """(M, samples, 3) float32 cosine-weighted unit directions about the third axis."""
     if method.sampler == "spiral":

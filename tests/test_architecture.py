@@ -18,6 +18,7 @@ LEAVES = {
     "demand",
     "variants",
     "description",
+    "values",
     "frame",
     "pixels",
     "docstrings",
@@ -51,6 +52,7 @@ MAY = {
 HOMES = {
     "click": ("cli",),
     "yaml": ("scene/source.py",),
+    "pydantic": ("jobs/schema.py",),
     "embreex": ("rays/",),
     "OpenImageIO": ("files/images.py",),
     "matplotlib": ("jobs/",),

@@ -12,8 +12,9 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from illumcli.description import Description
 
 
 @cache
@@ -38,7 +39,7 @@ def member(package: str, tag: str) -> type[Any]:
     classes = [
         value
         for value in vars(module).values()
-        if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, BaseModel)
+        if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, Description)
     ]
     if len(classes) != 1:
         raise TypeError(f"{module.__name__} must define one class, defines {len(classes)}")
@@ -65,13 +66,11 @@ class Tagged:
     package: str
     tag: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(
-            self._validate, serialization=core_schema.plain_serializer_function_ser_schema(_dump)
-        )
+    def schema(self, of: Any) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validated, metadata={"family": self})
 
-    def _validate(self, value: Any, info: ValidationInfo) -> Any:
-        if isinstance(value, BaseModel):
+    def _validated(self, value: Any, info: Any) -> Any:
+        if isinstance(value, Description):
             return value
         if not isinstance(value, dict):
             raise PydanticCustomError("mapping", "must be a mapping with the key '{tag}'", {"tag": self.tag})
@@ -86,14 +85,4 @@ class Tagged:
         except LookupError as error:
             facts = {"tag": self.tag, "name": name, "way": str(error)}
             raise PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts) from None
-        return chosen.model_validate(value, context=info.context)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        choices = [handler(each.__pydantic_core_schema__) for each in members(self.package)]
-        return {"oneOf": choices, "discriminator": {"propertyName": self.tag}}
-
-
-def _dump(value: BaseModel) -> dict[str, Any]:
-    return value.model_dump()
+        return chosen.validated(value, info.context)

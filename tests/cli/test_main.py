@@ -77,7 +77,7 @@ import sys
 import illumcli.cli as cli
 cli._look_for_no_plugins()
 from illumcli.models.lambert import Lambert
-Lambert.model_validate({})
+Lambert.validated({})
 assert "email" not in sys.modules
 from importlib.metadata import entry_points, version
 assert version("pydantic") and entry_points() is not None

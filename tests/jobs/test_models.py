@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from illumcli.docstrings import field_docs
 from illumcli.errors import InputError
-from illumcli.jobs.models import meanings, page, table
+from illumcli.jobs.models import page, table
 from illumcli.variants import members, tags
 
 MODELS = members("illumcli.models")
@@ -21,12 +22,12 @@ def test_the_table_has_every_model_with_parameters_and_claims():
 
 @pytest.mark.parametrize("Model", MODELS, ids=lambda Model: Model.__name__)
 def test_a_page_has_formula_source_and_every_parameter(Model):
-    text = page(Model.model_fields["model"].default)
+    text = page(Model.model)
     assert "response = " in text
     assert "References" in text
-    for name in Model.model_fields:
+    for name in Model.fields():
         assert name == "model" or f"\n{name}: " in text
-        assert name == "model" or meanings(Model)[name]
+        assert name == "model" or field_docs(Model)[name]
 
 
 def test_a_page_goes_into_the_parts_of_a_parameter():

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
 from illumcli.arrays import columns, cross, dot, unit
+from illumcli.description import Description
+from illumcli.jobs.schema import schema_of
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.variants import members, tags
@@ -52,8 +54,8 @@ def parameters(Model, choices=True, gentle=False):
 
     `gentle` keeps lobes wide enough for a quadrature.
     """
-    schema = Model.model_json_schema()
-    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.model_validate)
+    schema = schema_of(Model)
+    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.validated)
 
 
 def _object(schema, defs, choices, gentle):
@@ -73,6 +75,8 @@ def _field(name, field, defs, choices, gentle):
         return _object(defs[field["$ref"].rpartition("/")[2]], defs, choices, gentle)
     if "const" in field:
         return st.just(field["const"])
+    if "anyOf" in field and field["anyOf"][-1]["type"] == "array":  # one number, or a colour
+        return value(field["anyOf"][-1])
     if "anyOf" in field:  # something optional
         return st.none() | value(field["anyOf"][0]) if choices else st.just(field["default"])
     if "discriminator" in field:
@@ -87,7 +91,7 @@ def _field(name, field, defs, choices, gentle):
     if field["type"] == "boolean":
         return st.booleans() if choices else st.just(field["default"])
     if field["type"] == "array":
-        return st.tuples(*(value(part) for part in field["prefixItems"]))
+        return st.tuples(*[value(field["items"])] * field["minItems"])
     return _number(name, field, gentle)
 
 
@@ -196,18 +200,18 @@ def varied(part, count, prefix=""):
     """Path -> the parameter once per lane, of every parameter that may vary over the surface."""
     found = {}
     for name, value in part:
-        annotation = str(type(part).model_fields[name].annotation)
+        annotation = str(type(part).fields()[name].kind)
         if isinstance(value, float | tuple) and "VertexValues" in annotation:
             found[prefix + name] = (
                 columns(np.tile(value, (count, 1))) if isinstance(value, tuple) else np.full(count, value)
             )
-        elif hasattr(value, "model_fields_set"):
+        elif isinstance(value, Description):
             found |= varied(value, count, f"{prefix}{name}.")
     return found
 
 
 @pytest.mark.parametrize(
-    "Model", [Model for Model in MODELS if "file" not in Model.model_fields], ids=lambda Model: Model.__name__
+    "Model", [Model for Model in MODELS if "file" not in Model.fields()], ids=lambda Model: Model.__name__
 )
 def test_single_precision_follows_double(Model):
     given = directions(1, 5000, np.float32, least=0.02)
@@ -271,7 +275,7 @@ def turned(given, angle):
 
 @pytest.mark.parametrize(
     "Model",
-    [Model for Model in MODELS if Model.isotropic and "file" not in Model.model_fields],  # tables jump
+    [Model for Model in MODELS if Model.isotropic and "file" not in Model.fields()],  # tables jump
     ids=lambda Model: Model.__name__,
 )
 @settings(max_examples=40, deadline=None)
@@ -299,7 +303,7 @@ def test_a_skipped_lobe_is_black(Model, data, seed):
     for method, names in Model.scales.items():
         for name in names if hasattr(Model, method) else ():
             value = getattr(model, name)
-            zero = model.model_copy(update={name: (0.0, 0.0, 0.0) if isinstance(value, tuple) else 0.0})
+            zero = model.replaced(**{name: (0.0, 0.0, 0.0) if isinstance(value, tuple) else 0.0})
             lobe = method.removesuffix("_lobe")
             assert lobe not in zero.lobes()
             assert not evaluate({lobe: getattr(zero, method)}, given)[lobe].any()
@@ -310,7 +314,7 @@ def test_a_skipped_lobe_is_black(Model, data, seed):
 
 @every_model
 def test_the_file_is_named_after_the_tag(Model):
-    tag = Model.model_fields["model"].default
+    tag = Model.model
     assert Model.__module__ == f"illumcli.models.{tag}"
     assert tag in tags("illumcli.models")
 
@@ -350,6 +354,6 @@ def test_every_number_has_a_range(Model):
             for inner in part:
                 yield from numbers(inner)
 
-    for number in numbers(Model.model_json_schema()):
+    for number in numbers(schema_of(Model)):
         assert "maximum" in number
         assert "minimum" in number or "exclusiveMinimum" in number

@@ -22,7 +22,7 @@ FRESNEL = {
 
 
 def model_of(i):
-    return CookTorrance.model_validate(
+    return CookTorrance.validated(
         {
             "diffuse": i["albedo"],
             "diffuse_weight": i["kd"],

@@ -138,7 +138,7 @@ def render(setup):
     blocked, *_ = intersect(setup, lifted + SELF * radius * ng, l, SELF * radius, distance - SELF * radius)
     delta = (lit & (blocked < 0)).astype(float)
 
-    model = Scene.model_validate({"version": 1, "materials": {"m": setup.material}}).materials["m"]
+    model = Scene.validated({"version": 1, "materials": {"m": setup.material}}).materials["m"]
     given = {name: np.asfortranarray(value[lit]) for name, value in (("n", n), ("l", l), ("v", -d))}
     lobes = evaluate(model.lobes(), given)
     light = {}

@@ -66,7 +66,7 @@ class Settings:
 
     def obscurance(self) -> Obscurance:
         """The same as a scene has it."""
-        return Obscurance.model_validate(
+        return Obscurance.validated(
             {
                 "samples": self.samples,
                 "falloff": dict(self.falloff),
@@ -200,7 +200,7 @@ def bare(path: Path, overrides: Sequence[str]) -> Loaded:
     """A scene of one mesh file alone, as it stands."""
     found = load(path, overrides)
     about = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
-    return replace(found, scene=Scene.model_validate(about))
+    return replace(found, scene=Scene.validated(about))
 
 
 def parameters(settings: Settings) -> dict[str, Any]:
@@ -211,7 +211,7 @@ def parameters(settings: Settings) -> dict[str, Any]:
 
 def content_hash(scene: Scene, hashes: Sequence[str], settings: Settings) -> str:
     """Of all that the values and the files depend on."""
-    placed = [thing.transform.model_dump() for thing in scene.objects]
+    placed = [dict(thing.transform) for thing in scene.objects]
     text = json.dumps(
         [__version__, parameters(settings), list(hashes), placed, scene.object_names()], default=str
     )

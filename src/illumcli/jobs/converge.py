@@ -144,7 +144,7 @@ def run(
     """
     loaded = load(path, overrides)
     if seed is not None:
-        loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": seed}))
+        loaded = replace(loaded, scene=loaded.scene.replaced(seed=seed))
     scene = loaded.scene
     vary = vary or ("obscurance" if scene.obscurance is not None else "pixels")
     own = subject(

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import sys
 import textwrap
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from typing import Any
 
 from illumcli.errors import InputError
-from illumcli.models._base import IlluminationModel
+from illumcli.jobs.schema import schema_of
 from illumcli.variants import member, members
 
 PACKAGE = "illumcli.models"
@@ -28,9 +26,9 @@ def table() -> str:
     """Tag, parameters and claims of every model, one line each."""
     rows = [("model", "parameters", "claims")]
     for Model in members(PACKAGE):
-        names = [name for name in Model.model_fields if name not in ("model", *SHARED)]
+        names = [name for name in Model.fields() if name not in ("model", *SHARED)]
         claims = [claim for claim in CLAIMS if getattr(Model, claim)]
-        rows.append((_tag(Model), ", ".join(names), ", ".join(claims)))
+        rows.append((Model.model, ", ".join(names), ", ".join(claims)))
     first, second = (max(len(row[i]) for row in rows) for i in (0, 1))
     return "\n".join(f"{a:{first}}  {b:{second}}  {c}".rstrip() for a, b, c in rows)
 
@@ -48,8 +46,8 @@ def page(tag: str) -> str:
     except LookupError as error:
         raise InputError(f"no model '{tag}'; {error}") from None
     lines = [inspect.cleandoc(sys.modules[Model.__module__].__doc__ or ""), "", "Parameters", "----------"]
-    schema = Model.model_json_schema()
-    lines += _parameters(Model, schema, schema.get("$defs", {}))
+    schema = schema_of(Model)
+    lines += _parameters(schema, schema.get("$defs", {}))
     lines += ["", "Claims", "------"]
     lines += [
         f"{'yes' if getattr(Model, claim) else 'no':4}{claim}: {text}" for claim, text in CLAIMS.items()
@@ -57,65 +55,28 @@ def page(tag: str) -> str:
     return "\n".join(lines)
 
 
-def meanings(cls: type[Any]) -> dict[str, str]:
-    """Field -> the docstring under it, of the class and the classes it stands on.
-
-    Read from the source when asked: pydantic would parse every source at import.
-    """
-    found: dict[str, str] = {}
-    for each in reversed(cls.__mro__):
-        if not each.__module__.startswith("illumcli."):
-            continue
-        body = next(
-            node.body
-            for node in ast.parse(inspect.getsource(sys.modules[each.__module__])).body
-            if isinstance(node, ast.ClassDef) and node.name == each.__name__
-        )
-        for field, text in pairwise(body):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                found[field.target.id] = inspect.cleandoc(str(text.value.value)).replace("\n", " ")
-    return found
-
-
-def _tag(Model: type[IlluminationModel]) -> str:
-    return str(Model.model_fields["model"].default)
-
-
-def _parameters(cls: type[Any], schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Iterator[str]:
-    text = meanings(cls)
-    fields = [name for name in cls.model_fields if name not in SHARED]
-    for name in [*fields, *(each for each in SHARED if each in cls.model_fields)]:
-        field = schema["properties"][name]
+def _parameters(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Iterator[str]:
+    properties = schema["properties"]
+    own = [name for name in properties if name not in SHARED]
+    for name in [*own, *(each for each in SHARED if each in properties)]:
+        field = properties[name]
         if "const" in field:
             continue
         yield f"{name}: {allowed(field)}; {_default(field)}"
-        if name in text:
-            yield textwrap.fill(text[name], 100, initial_indent="    ", subsequent_indent="    ")
+        if "description" in field:
+            yield textwrap.fill(field["description"], 100, initial_indent="    ", subsequent_indent="    ")
         if "discriminator" in field:
-            for tag, part in _parts(cls, name).items():
-                key = field["discriminator"]["propertyName"]
-                doc = inspect.cleandoc(part.__doc__ or "").replace("\n", " ")
-                yield f"    {{{key}: {tag}}}: {doc}"
-                inner = "\n".join(_parameters(part, defs[part.__name__], defs))
-                yield textwrap.indent(inner, "        ")
-
-
-def _parts(cls: type[Any], name: str) -> dict[str, type[Any]]:
-    """Tag -> class of each choice of a field that is told apart by a key."""
-    info = cls.model_fields[name]
-    key = str(info.discriminator)
-    return {part.model_fields[key].default: part for part in info.annotation.__args__}
+            key, choices = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
+            for tag, reference in choices.items():
+                part = defs[reference.rpartition("/")[2]]
+                yield f"    {{{key}: {tag}}}: {part['description']}"
+                yield textwrap.indent("\n".join(_parameters(part, defs)), "        ")
 
 
 def allowed(field: Mapping[str, Any]) -> str:
     """The values a field takes, in words, from its schema."""
-    if "anyOf" in field:
-        return allowed(field["anyOf"][0])
+    if "anyOf" in field:  # something that may be left out, or a number for a colour
+        return allowed(next(part for part in reversed(field["anyOf"]) if part.get("type") != "null"))
     if "discriminator" in field:
         key = field["discriminator"]["propertyName"]
         return f"one of {{{key}: {' | '.join(field['discriminator']['mapping'])}}}"
@@ -124,7 +85,7 @@ def allowed(field: Mapping[str, Any]) -> str:
     if "enum" in field:
         return " | ".join(map(str, field["enum"]))
     if field["type"] == "array":
-        return f"colour, {_range(field['prefixItems'][0])}"
+        return f"colour, {_range(field['items'])}"
     if field["type"] == "number":
         return f"number, {_range(field)}"
     return {"boolean": "true | false", "string": "text"}[field["type"]]

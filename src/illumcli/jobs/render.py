@@ -173,7 +173,7 @@ def prepared(
     values: Mapping[str, Any] | None = None,
 ) -> Work:
     """What rendering a scene takes; `values` are more fields of its files' names."""
-    scene = loaded.scene if seed is None else loaded.scene.model_copy(update={"seed": seed})
+    scene = loaded.scene if seed is None else loaded.scene.replaced(seed=seed)
     steps = plan(scene, loaded, only)
     patterns = (pattern,) if pattern else scene.outputs.files
     return Work(loaded, scene, steps, tuple(image_set(loaded, scene, steps, patterns, values or {})))

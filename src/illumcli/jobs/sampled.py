@@ -57,8 +57,8 @@ class Subject:
         update: dict[str, Any] = {"seed": sampling.seed}
         if self.scene.obscurance is not None:
             finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
-            update["obscurance"] = self.scene.obscurance.model_copy(update=finer)
-        steps = plan(self.scene.model_copy(update=update), self.loaded, [self.layer.name])
+            update["obscurance"] = self.scene.obscurance.replaced(**finer)
+        steps = plan(self.scene.replaced(**update), self.loaded, [self.layer.name])
         for step in steps.once:
             if step.makes not in self.shared:
                 self.shared[step.makes] = step.make(self.shared)

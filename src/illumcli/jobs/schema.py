@@ -8,9 +8,11 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from illumcli.description import spread
+from illumcli.description import Description
 from illumcli.docstrings import field_docs, summary
 from illumcli.scene.spec import Scene
+from illumcli.values import spread
+from illumcli.variants import members
 
 EXTENDS = {
     "description": "Scenes that this one extends, by path from its own folder: mappings merge, anything else "
@@ -27,29 +29,59 @@ def run() -> str:
 
 
 def schema() -> dict[str, Any]:
-    """The schema, all members of the open families included."""
-    made = Scene.model_json_schema(schema_generator=_Schema)
+    """The schema of scenes, all members of the open families included."""
+    made = schema_of(Scene)
     made["properties"] = {"extends": EXTENDS, **made["properties"]}
     return {"$schema": GenerateJsonSchema.schema_dialect, **made, "title": "illum scene"}
+
+
+def schema_of(cls: type[Description]) -> dict[str, Any]:
+    """The schema of one description; those it is made of are under `$defs`."""
+    return _Schema().generate(_named(cls.core_schema()))
+
+
+def _named(part: Any) -> Any:
+    """A schema of pydantic's core in which every description has a name to be referred to by."""
+    if isinstance(part, list):
+        return [_named(each) for each in part]
+    if not isinstance(part, dict):
+        return part
+    made = {key: value if key == "metadata" else _named(value) for key, value in part.items()}
+    return {**made, "ref": made["cls"].__name__} if "cls" in made else made
 
 
 class _Schema(GenerateJsonSchema):
     """pydantic's schema with our texts, without titles that only repeat a key."""
 
-    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        made, cls = super().model_schema(schema), schema["cls"]
-        made["description"] = summary(cls)
+    def typed_dict_schema(self, schema: core_schema.TypedDictSchema) -> JsonSchemaValue:
+        cls = schema["cls"]
         docs = field_docs(cls)
-        for name, part in made["properties"].items():
+        properties, required = {}, []
+        for name, field in schema["fields"].items():
+            part = properties[name] = self.generate_inner(field)
             if name in docs:
                 part["description"] = docs[name]
-            if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:
+            if part.get("default") == {}:  # what is described by all its defaults
+                del part["default"]
+            says_what = isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT
+            if says_what:
                 part.pop("default", None)
-                made["required"] = sorted({name, *made.get("required", ())})
-        return made
+            if says_what or field["required"]:
+                required.append(name)
+        made: JsonSchemaValue = {
+            "type": "object",
+            "title": cls.__name__,
+            "description": summary(cls),
+            "properties": properties,
+            "additionalProperties": False,
+        }
+        return {**made, "required": required} if required else made
 
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
+    def function_plain_schema(self, schema: core_schema.PlainValidatorFunctionSchema) -> JsonSchemaValue:
+        """Any member of an open family."""
+        family = schema["metadata"]["family"]
+        choices = [self.generate_inner(_named(each.core_schema())) for each in members(family.package)]
+        return {"oneOf": choices, "discriminator": {"propertyName": family.tag}}
 
     def tuple_schema(self, schema: core_schema.TupleSchema) -> JsonSchemaValue:
         """A list of equal parts says so once."""
@@ -71,3 +103,9 @@ class _Schema(GenerateJsonSchema):
         if schema["function"]["function"] is spread:
             return {"anyOf": [made["items"], made]}
         return made
+
+    def function_after_schema(self, schema: core_schema.AfterValidatorFunctionSchema) -> JsonSchemaValue:
+        """A text of a form."""
+        made = super().function_after_schema(schema)
+        form = schema.get("metadata", {}).get("form")
+        return {**made, "pattern": form} if form else made

@@ -130,7 +130,7 @@ def chosen(
     """
     loaded = load(path, overrides)
     if seed is not None:
-        loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": seed}))
+        loaded = replace(loaded, scene=loaded.scene.replaced(seed=seed))
     steps = plan(loaded.scene, loaded, only)
     means = [layer for layer in steps.layers if not layer.data]
     if not means:

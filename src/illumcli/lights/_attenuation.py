@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from illumcli.arrays import Lanes
-from illumcli.description import Description, NonNegative, Positive
+from illumcli.description import Description
+from illumcli.values import By, NonNegative, Positive
 
 
 class NoLaw(Description):
@@ -29,11 +29,10 @@ class Polynomial(Description):
     c2: NonNegative = 0.0
     c3: NonNegative = 0.0
 
-    @model_validator(mode="after")
-    def _some(self) -> Polynomial:
+    def check(self) -> None:
+        """Something must divide."""
         if not (self.c1 or self.c2 or self.c3):
             raise ValueError("c1, c2 and c3 must not all be 0")
-        return self
 
     def factor(self, distance: Lanes) -> Lanes:
         """(N,) 1 / (c1 + c2 d + c3 d^2)."""
@@ -76,6 +75,4 @@ class Windowed(Description):
         return np.square(1 - np.square(np.square(share))) / np.square(distance)
 
 
-Law: TypeAlias = Annotated[
-    NoLaw | Polynomial | InverseSquare | InverseSquareFlux | Windowed, Field(discriminator="law")
-]
+Law: TypeAlias = Annotated[NoLaw | Polynomial | InverseSquare | InverseSquareFlux | Windowed, By("law")]

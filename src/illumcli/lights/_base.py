@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field
 
 from illumcli.arrays import Lanes, Vectors, columns, length
 from illumcli.description import Description
 from illumcli.frame import Frame
+from illumcli.values import Name
 
 NEAREST = 1e-6
 """Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""
@@ -28,7 +28,7 @@ class Arriving:
 class Light(Description):
     """A light of the scene."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][\w-]*$")] | None = None
+    name: Name | None = None
     """Names the light's layers; by default its type and number, as in `point1`."""
     shadows: bool = True
     """False: the light passes through everything and no shadow ray is cast for it."""
@@ -42,7 +42,7 @@ class Light(Description):
 
     def placed(self) -> Self:
         """This light with neither colour nor name: all that `arriving` depends on."""
-        return self.model_copy(update={self.power: (1.0, 1.0, 1.0), "name": None, "shadows": True})
+        return self.replaced(**{self.power: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
     def arriving(self, position: Vectors, frame: Frame) -> Arriving:
         """Light at `position` [(N, 3), radii from the scene's centre]."""

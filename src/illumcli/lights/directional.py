@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator
 
 from illumcli.arrays import Vectors
-from illumcli.description import Color, Vector, nonzero
 from illumcli.frame import Frame
 from illumcli.lights._base import Arriving, Light
+from illumcli.values import Color, Direction
 
 
 class Directional(Light):
     light: Literal["directional"]
-    direction: Annotated[Vector, AfterValidator(nonzero)]
+    direction: Direction
     """Where the light goes; any length."""
     irradiance: Color = (1.0, 1.0, 1.0)
     """[W/m^2] on a surface that faces the light."""

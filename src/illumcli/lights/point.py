@@ -7,10 +7,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Vectors
-from illumcli.description import Color, Vector
+from illumcli.description import written
 from illumcli.frame import Frame
-from illumcli.lights._attenuation import InverseSquare, Law
+from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Arriving, Light, towards
+from illumcli.values import Color, Vector
 
 
 class Point(Light):
@@ -19,7 +20,7 @@ class Point(Light):
     """[scene units]"""
     intensity: Color = (1.0, 1.0, 1.0)
     """[W/sr] under the inverse square; a plain factor under the other laws."""
-    attenuation: Law = InverseSquare(law="inverse_square")
+    attenuation: Law = written({"law": "inverse_square"})
     """Distance law."""
 
     power: ClassVar[str] = "intensity"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from illumcli.arrays import Vectors
-from illumcli.description import Color, Vector
+from illumcli.description import written
 from illumcli.frame import Frame
-from illumcli.lights._attenuation import InverseSquare, Law
+from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Arriving, Light, towards
+from illumcli.values import Color, Share, Vector, Within
 
 
 class Spot(Light):
@@ -20,22 +20,21 @@ class Spot(Light):
     """[scene units]"""
     target: Vector = (0.0, 0.0, 0.0)
     """A point on the axis [scene units]."""
-    angle: Annotated[float, Field(gt=0, le=180)] = 30.0
+    angle: Annotated[float, Within(gt=0, le=180)] = 30.0
     """Half the cone's opening: nothing arrives beyond it [degrees]."""
-    softness: Annotated[float, Field(ge=0, le=1)] = 0.2
+    softness: Share = 0.2
     """Share of the cone over which the intensity falls smoothly to 0 at the rim."""
     intensity: Color = (1.0, 1.0, 1.0)
     """On the axis [W/sr]."""
-    attenuation: Law = InverseSquare(law="inverse_square")
+    attenuation: Law = written({"law": "inverse_square"})
     """Distance law."""
 
     power: ClassVar[str] = "intensity"
 
-    @model_validator(mode="after")
-    def _aimed(self) -> Spot:
+    def check(self) -> None:
+        """The axis must have a direction."""
         if self.position == self.target:
             raise ValueError("position and target must differ")
-        return self
 
     def arriving(self, position: Vectors, frame: Frame) -> Arriving:
         """Light at `position`; strength f(d) times the cone's smooth step."""

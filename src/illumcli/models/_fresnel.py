@@ -15,12 +15,12 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from illumcli.arrays import Lanes, Vectors, like
 from illumcli.description import Description
 from illumcli.models._lobes import channels
 from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
+from illumcli.values import By
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -112,7 +112,7 @@ MATERIALS: dict[str, tuple[float, float, float]] = {
 """Reflectance at normal incidence, linear R, G, B. `glass` is a dense flint; crown glass (1.5) has 0.04."""
 
 
-class Dielectric(Description, defer_build=True):
+class Dielectric(Description):
     """A clear boundary: glass, water, plastic, lacquer."""
 
     F: Literal["dielectric"] = "dielectric"
@@ -125,7 +125,7 @@ class Dielectric(Description, defer_build=True):
         return dielectric(c, eta)
 
 
-class Conductor(Description, defer_build=True):
+class Conductor(Description):
     """A metal, by its complex index in each channel."""
 
     F: Literal["conductor"] = "conductor"
@@ -139,7 +139,7 @@ class Conductor(Description, defer_build=True):
         return conductor(c, channels(c, self.n), channels(c, self.k))
 
 
-class Schlick(Description, defer_build=True):
+class Schlick(Description):
     """Schlick's curve from the reflectance at normal incidence."""
 
     F: Literal["schlick"] = "schlick"
@@ -151,7 +151,7 @@ class Schlick(Description, defer_build=True):
         return schlick(c, channels(c, self.f0))
 
 
-class Material(Description, defer_build=True):
+class Material(Description):
     """A material by name, from the table of its reflectance at normal incidence."""
 
     F: Literal["material"] = "material"
@@ -167,7 +167,7 @@ class Material(Description, defer_build=True):
         return schlick(c, f0) if self.curve == "schlick" else dielectric(c, eta_from_f0(f0))
 
 
-class Shifted(Description, defer_build=True):
+class Shifted(Description):
     """Cook and Torrance's shift of colour, from the material's at the normal to the light's at grazing."""
 
     F: Literal["shifted"] = "shifted"
@@ -186,7 +186,7 @@ class Shifted(Description, defer_build=True):
         return color_shift(c, eta, channels(c, self.color), grazing)
 
 
-class Constant(Description, defer_build=True):
+class Constant(Description):
     """The same reflectance at every angle."""
 
     F: Literal["constant"] = "constant"
@@ -198,6 +198,4 @@ class Constant(Description, defer_build=True):
         return channels(c, self.value)
 
 
-Fresnel: TypeAlias = Annotated[
-    Dielectric | Conductor | Schlick | Material | Shifted | Constant, Field(discriminator="F")
-]
+Fresnel: TypeAlias = Annotated[Dielectric | Conductor | Schlick | Material | Shifted | Constant, By("F")]

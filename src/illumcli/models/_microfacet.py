@@ -21,12 +21,12 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field
 
 from illumcli.arrays import Lanes, like
 from illumcli.description import Description
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
+from illumcli.values import By
 
 
 def gaussian(n_h: Any, sin2_h: Any, m: Any) -> Any:
@@ -109,7 +109,7 @@ def vgroove_over_4ab(n_l: Any, n_v: Any, s_s: Any) -> Any:
     return 1 / np.maximum(4 * n_l * n_v, np.maximum(blocked, np.finfo(blocked.dtype).tiny))
 
 
-class Gaussian(Description, defer_build=True):
+class Gaussian(Description):
     """Torrance and Sparrow's Gaussian of the angle, by its width."""
 
     D: Literal["gaussian"] = "gaussian"
@@ -124,7 +124,7 @@ class Gaussian(Description, defer_build=True):
         return c * gaussian(n_h, sin2_h, m)
 
 
-class Beckmann(Description, defer_build=True):
+class Beckmann(Description):
     """Beckmann's distribution of a surface with Gaussian slopes."""
 
     D: Literal["beckmann"] = "beckmann"
@@ -138,7 +138,7 @@ class Beckmann(Description, defer_build=True):
         return density * np.pi if printed else density
 
 
-class Blinn(Description, defer_build=True):
+class Blinn(Description):
     """Blinn's power of the cosine, by its half-height angle."""
 
     D: Literal["blinn"] = "blinn"
@@ -152,7 +152,7 @@ class Blinn(Description, defer_build=True):
         return power_cosine(n_h, sin2_h, exponent) * height
 
 
-class PowerCosine(Description, defer_build=True):
+class PowerCosine(Description):
     """Blinn's power of the cosine, by its exponent; about 2 / m^2 - 2 matches Beckmann."""
 
     D: Literal["power"] = "power"
@@ -165,7 +165,7 @@ class PowerCosine(Description, defer_build=True):
         return power_cosine(n_h, sin2_h, exponent) * ((exponent + 2) / (2 * np.pi))
 
 
-class TorranceSparrow(Description, defer_build=True):
+class TorranceSparrow(Description):
     """Torrance and Sparrow's Gaussian of the angle, by its half-height angle."""
 
     D: Literal["torrance_sparrow"] = "torrance_sparrow"
@@ -179,7 +179,7 @@ class TorranceSparrow(Description, defer_build=True):
         return c * gaussian(n_h, sin2_h, m)
 
 
-class TrowbridgeReitz(Description, defer_build=True):
+class TrowbridgeReitz(Description):
     """Trowbridge and Reitz's ellipsoids, by their half-height angle."""
 
     D: Literal["trowbridge_reitz"] = "trowbridge_reitz"
@@ -193,7 +193,7 @@ class TrowbridgeReitz(Description, defer_build=True):
         return density * (np.pi * np.square(alpha)) if printed else density
 
 
-class GGX(Description, defer_build=True):
+class GGX(Description):
     """Walter's GGX: Trowbridge and Reitz by roughness."""
 
     D: Literal["ggx"] = "ggx"
@@ -208,5 +208,5 @@ class GGX(Description, defer_build=True):
 
 Distribution: TypeAlias = Annotated[
     Gaussian | Beckmann | Blinn | PowerCosine | TorranceSparrow | TrowbridgeReitz | GGX,
-    Field(discriminator="D"),
+    By("D"),
 ]

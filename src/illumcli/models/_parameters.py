@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Discriminator, Tag
-
-from illumcli import description
-from illumcli.description import Description, Three, Within
+from illumcli import values
+from illumcli.description import Description
+from illumcli.values import By, Tag, Three, Within
 
 
 class Texture(Description):
@@ -41,14 +40,14 @@ def _kind(value: Any) -> str:
 T = TypeVar("T")
 Varying: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
-    Discriminator(_kind),
+    By(_kind),
 ]
 
-Color: TypeAlias = Varying[description.Color]
-Albedo: TypeAlias = Varying[description.Albedo]
-Share: TypeAlias = Varying[description.Share]
-Positive: TypeAlias = Varying[description.Positive]
-NonNegative: TypeAlias = Varying[description.NonNegative]
+Color: TypeAlias = Varying[values.Color]
+Albedo: TypeAlias = Varying[values.Albedo]
+Share: TypeAlias = Varying[values.Share]
+Positive: TypeAlias = Varying[values.Positive]
+NonNegative: TypeAlias = Varying[values.NonNegative]
 
 # a slope; below 1e-4 single precision holds no lobe
 Roughness: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=10)]]

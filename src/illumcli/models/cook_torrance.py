@@ -25,11 +25,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, like
-from illumcli.description import Description
+from illumcli.description import Description, written
 from illumcli.models._base import IlluminationModel, Lobe
-from illumcli.models._fresnel import Dielectric, Fresnel, Shifted
+from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
-from illumcli.models._microfacet import Beckmann, Distribution, vgroove_over_4ab
+from illumcli.models._microfacet import Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Albedo, Share
 
 WHITE = (1.0, 1.0, 1.0)
@@ -43,9 +43,9 @@ class CookTorrance(IlluminationModel):
     """kd, the share of diffuse reflection; left out, 1 - ks."""
     specular_weight: Share = 0.5
     """ks, the share of specular reflection."""
-    distribution: Distribution = Beckmann()
+    distribution: Distribution = written({"D": "beckmann"})
     """D, how facets are spread about the normal."""
-    fresnel: Fresnel = Dielectric()
+    fresnel: Fresnel = written({"F": "dielectric"})
     """F, what a facet reflects at each angle."""
     convention: Literal["microfacet", "printed"] = "microfacet"
     """Constants: normalised D over 4 n_l n_v, or those of the texts over pi n_l n_v."""

@@ -18,14 +18,14 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from illumcli.arrays import Lanes, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
+from illumcli.values import Within
 
-Weight = Varying[Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1, le=1)]]
+Weight = Varying[Annotated[float, Within(ge=-1, le=1)]]
 
 
 class Lafortune(IlluminationModel):

@@ -6,15 +6,16 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic_core import ValidationError
 
+from illumcli.description import Description
 from illumcli.scene.source import Path, short
 from illumcli.variants import suggestion
 
 Fault = tuple[Path, str]  # which part, what is wrong
 
 
-def faults(error: ValidationError, tree: Any, classes: Mapping[int, type[BaseModel]]) -> Iterator[Fault]:
+def faults(error: ValidationError, tree: Any, classes: Mapping[int, type[Description]]) -> Iterator[Fault]:
     """Each fault once, in the order of the fields.
 
     Parameters
@@ -29,7 +30,7 @@ def faults(error: ValidationError, tree: Any, classes: Mapping[int, type[BaseMod
     return iter(dict.fromkeys(_faults(error, tree, classes)))
 
 
-def _faults(error: ValidationError, tree: Any, classes: Mapping[int, type[BaseModel]]) -> Iterator[Fault]:
+def _faults(error: ValidationError, tree: Any, classes: Mapping[int, type[Description]]) -> Iterator[Fault]:
     lengths = _short_lists(error, tree)
     for fault in error.errors(include_url=False):
         kind, loc = fault["type"], fault["loc"]
@@ -42,7 +43,7 @@ def _faults(error: ValidationError, tree: Any, classes: Mapping[int, type[BaseMo
         elif kind == "extra_forbidden":
             path, name = written(loc, tree), str(loc[-1])
             owner = classes.get(id(part_at(path[:-1], tree)))
-            way = f"; {suggestion(name, tuple(owner.model_fields))}" if owner else ""
+            way = f"; {suggestion(name, tuple(owner.fields()))}" if owner else ""
             yield path, f"unknown key '{short(name)}'{way}"
         elif kind != "too_short" or len(fault["input"]) < fault["ctx"]["min_length"]:
             yield written(loc, tree), fact(kind, fault["input"], fault.get("ctx", {}), fault["msg"])

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic_core import ValidationError
 
+from illumcli.description import Description
 from illumcli.errors import InputError
 from illumcli.scene import source
 from illumcli.scene.faults import Fault, faults, shown
@@ -197,11 +198,11 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
 def _validated(tree: Node, problems: list[Problem]) -> Scene | None:
     """The scene, or None after adding what is wrong with it to `problems`."""
     plain = tree.plain()
-    classes: dict[int, type[BaseModel]] = {}
+    classes: dict[int, type[Description]] = {}
     found: list[Fault] = []
     scene = None
     try:
-        scene = Scene.model_validate(plain, context=classes)
+        scene = Scene.validated(plain, classes)
     except ValidationError as error:
         found = [*faults(error, plain, classes), *reference_faults(plain)]
     known = {problem.place for problem in problems}

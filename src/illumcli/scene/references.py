@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic_core import ValidationError
 
+from illumcli.description import Description
 from illumcli.scene.faults import Fault, faults
 from illumcli.variants import member, suggestion
 
@@ -53,18 +54,18 @@ def _default_name(kind: str, thing: Any, number: int) -> str:
 
 def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:
     """Faults of the overrides alone; those of the material itself are found where it stands."""
-    if isinstance(own, BaseModel):
-        base = {name: getattr(own, name) for name in own.model_fields_set} | {"model": _get(own, "model")}
+    if isinstance(own, Description):
+        base = dict(own)
     else:
         base = own if isinstance(own, dict) else {"model": "lambert"}
     try:
         model = member("illumcli.models", base["model"])
     except (LookupError, TypeError):
         return
-    classes: dict[int, type[BaseModel]] = {}
+    classes: dict[int, type[Description]] = {}
     merged = {**base, **override}
     try:
-        model.model_validate(merged, context=classes)
+        model.validated(merged, classes)
     except ValidationError as error:
         for path, fact in faults(error, merged, classes):
             if path[:1] and path[0] in override:

@@ -7,41 +7,37 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Tag,
-    ValidationError,
-    model_validator,
-)
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from illumcli.description import (
-    Color,
-    Description,
-    NonNegative,
-    Number,
-    Positive,
-    Share,
-    Vector,
-    nonzero,
-    spread,
-)
+from illumcli.description import Description, written
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
 from illumcli.scene.references import reference_faults
+from illumcli.values import (
+    Before,
+    By,
+    Color,
+    Direction,
+    Many,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
+    Tag,
+    Vector,
+    Whole,
+    Within,
+    spread,
+)
 from illumcli.visibility.falloffs import AnyFalloff
 
-Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z_][\w-]*$")]
 Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
-Count: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=2**31 - 1)]
-Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Field(strict=False)]
+Count: TypeAlias = Annotated[int, Whole(ge=1, le=2**31 - 1)]
+Row: TypeAlias = tuple[Number, Number, Number, Number]
 
-
-DEFAULTS: Any = Field(default_factory=dict, validate_default=True)  # a description with all its defaults
+NOTHING: Any = written({})  # a mapping without a key: a description with all its defaults
 
 
 class Normals(Description):
@@ -51,7 +47,7 @@ class Normals(Description):
     """`file`: the file's own where it has them, computed ones elsewhere."""
     weights: Literal["angle", "area", "equal"] = "angle"
     """What each polygon counts for in a vertex normal."""
-    crease: Annotated[float, Field(ge=0, le=180)] | None = None
+    crease: Annotated[float, Within(ge=0, le=180)] | None = None
     """Polygons that meet at more than this keep their edge sharp [degrees]."""
     polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
     """How a polygon's own normal is found."""
@@ -62,7 +58,7 @@ class MeshFile(Description):
 
     file: str
     """Path, from the scene's folder."""
-    normals: Normals = DEFAULTS
+    normals: Normals = NOTHING
     materials: bool = False
     """True: import the materials that the file's own library describes."""
     obscurance: str | None = None
@@ -80,14 +76,14 @@ def _mesh_kind(value: Any) -> str:
 
 
 MeshSource: TypeAlias = Annotated[
-    Annotated[MeshFile, Tag("file")] | Annotated[AnyShape, Tag("shape")], Discriminator(_mesh_kind)
+    Annotated[MeshFile, Tag("file")] | Annotated[AnyShape, Tag("shape")], By(_mesh_kind)
 ]
 
 
 class Transform(Description):
     """Where an object stands: scaled, rotated, fitted, translated, in this order, then the matrix."""
 
-    scale: Annotated[Vector, BeforeValidator(spread)] = (1.0, 1.0, 1.0)
+    scale: Annotated[Vector, Before(spread)] = (1.0, 1.0, 1.0)
     """One factor, or one per axis; negative ones mirror."""
     rotate: Vector = (0.0, 0.0, 0.0)
     """About x, then y, then z [degrees]."""
@@ -96,49 +92,48 @@ class Transform(Description):
     centred on the y axis [scene units]."""
     translate: Vector = (0.0, 0.0, 0.0)
     """[scene units]"""
-    matrix: Annotated[tuple[Row, Row, Row, Row], Field(strict=False)] | None = None
+    matrix: tuple[Row, Row, Row, Row] | None = None
     """Four rows, applied last to column vectors."""
 
 
 class Grain(Description):
     """Grain in rings about an axis, as on a turned or brushed disc."""
 
-    axis: Annotated[Vector, AfterValidator(nonzero)] = (0.0, 1.0, 0.0)
+    axis: Direction = (0.0, 1.0, 0.0)
     centre: Vector = (0.0, 0.0, 0.0)
     """A point on the axis, in the object's own coordinates before its transform."""
+
+
+NameOrMesh: TypeAlias = Annotated[
+    Annotated[str, Tag("name")] | Annotated[MeshSource, Tag("mesh")],
+    By(lambda value: "name" if isinstance(value, str) else "mesh"),
+]
+NameOrMaterial: TypeAlias = Annotated[
+    Annotated[str, Tag("name")] | Annotated[AnyModel, Tag("material")],
+    By(lambda value: "name" if isinstance(value, str) else "material"),
+]
+AnyGrain: TypeAlias = Annotated[
+    Annotated[Direction, Tag("direction")] | Annotated[Grain, Tag("radial")],
+    By(lambda value: "radial" if isinstance(value, dict | Grain) else "direction"),
+]
 
 
 class Object(Description):
     """A mesh with a material in a place."""
 
-    mesh: Annotated[
-        Annotated[str, Tag("name")] | Annotated[MeshSource, Tag("mesh")],
-        Discriminator(lambda value: "name" if isinstance(value, str) else "mesh"),
-    ]
+    mesh: NameOrMesh
     """The name of a mesh, the path of a mesh file, or a mesh described in place."""
     name: Name | None = None
     """By default `object1` and so on."""
-    material: (
-        Annotated[
-            Annotated[str, Tag("name")] | Annotated[AnyModel, Tag("material")],
-            Discriminator(lambda value: "name" if isinstance(value, str) else "material"),
-        ]
-        | None
-    ) = None
+    material: NameOrMaterial | None = None
     """The name of a material, or one described in place; by default the materials that the mesh file
     selects by name, and light grey Lambert for what selects none."""
-    override: dict[str, Any] = Field(default_factory=dict)
+    override: dict[str, Any] = NOTHING
     """Parameters of the material that this object has otherwise."""
-    transform: Transform = DEFAULTS
+    transform: Transform = NOTHING
     shading: Rate | None = None
     """By default the scene's."""
-    grain: (
-        Annotated[
-            Annotated[Vector, AfterValidator(nonzero), Tag("direction")] | Annotated[Grain, Tag("radial")],
-            Discriminator(lambda value: "radial" if isinstance(value, dict | Grain) else "direction"),
-        ]
-        | None
-    ) = None
+    grain: AnyGrain | None = None
     """Tangent of anisotropic materials: a direction the grain follows, or rings about an axis;
     by default the direction of growing u."""
 
@@ -147,25 +142,24 @@ class _Camera(Description):
     position: Vector = (1.8, 1.9, 3.6)
     """[scene units]; the default looks at an object fitted to radius 1."""
     target: Vector = (0.0, 0.75, 0.0)
-    up: Annotated[Vector, AfterValidator(nonzero)] = (0.0, 1.0, 0.0)
+    up: Direction = (0.0, 1.0, 0.0)
     """Any vector not along the line of sight; where it is, another axis is taken."""
     width: Count | None = None
     """[pixels]; by default the film's."""
     height: Count | None = None
     samples: Count | None = None
 
-    @model_validator(mode="after")
-    def _looking(self) -> _Camera:
+    def check(self) -> None:
+        """The line of sight must have a direction."""
         if self.position == self.target:
             raise ValueError("position and target must differ")
-        return self
 
 
 class Perspective(_Camera):
     """A pinhole camera."""
 
     projection: Literal["perspective"] = "perspective"
-    fov: Annotated[float, Field(gt=0, lt=180)] = 35.0
+    fov: Annotated[float, Within(gt=0, le=None, lt=180)] = 35.0
     """Vertical field of view [degrees]."""
 
 
@@ -179,14 +173,13 @@ class Orthographic(_Camera):
 
 Camera: TypeAlias = Annotated[
     Annotated[Perspective, Tag("perspective")] | Annotated[Orthographic, Tag("orthographic")],
-    Discriminator(
+    By(
         lambda value: (
             value.get("projection", "perspective")
             if isinstance(value, dict)
             else getattr(value, "projection", "perspective")
         ),
-        custom_error_type="projection_unknown",
-        custom_error_message="no such projection; there are: perspective, orthographic",
+        unknown="no such projection; there are: perspective, orthographic",
     ),
 ]
 
@@ -208,7 +201,7 @@ class Adaptive(Description):
 
     first: Count = 4
     """Samples that every pixel gets."""
-    difference: Annotated[float, Field(gt=0, le=1)] = 0.1
+    difference: Annotated[float, Within(gt=0, le=1)] = 0.1
     """How far light may differ among them, as a share of the brightest."""
 
 
@@ -223,15 +216,13 @@ class Film(Description):
     height: Count = 720
     samples: Count = 4
     """Per pixel; 1 looks through the pixel's centre."""
-    adaptive: (
-        Annotated[Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)] | None
-    ) = None
+    adaptive: Annotated[Adaptive, Before(_adaptive, written=Adaptive | Count)] | None = None
     """Take all samples only where fewer differ; a number says how many every pixel gets. By default every
     pixel gets all."""
-    filter: Filter = DEFAULTS
+    filter: Filter = NOTHING
     background: Color | None = None
     """Behind everything; by default nothing, with alpha 0."""
-    exposure: Annotated[float, Field(ge=-64, le=64)] = 0.0
+    exposure: Annotated[float, Within(ge=-64, le=64)] = 0.0
     """Of 8-bit pictures [stops]; EXR keeps the light as it is."""
 
 
@@ -271,19 +262,18 @@ class DepthCue(Description):
     color: Color = (0.0, 0.0, 0.0)
     """What it fades into: black, or the background's colour, as haze does."""
 
-    @model_validator(mode="after")
-    def _ordered(self) -> DepthCue:
+    def check(self) -> None:
+        """Something must lie between."""
         if self.near >= self.far:
             raise ValueError(f"near must be below far, is {self.near:g} with far {self.far:g}")
-        return self
 
 
 class Obscurance(Description):
     """w(p) by Monte Carlo: how open each point is to the ambient light."""
 
-    samples: Annotated[int, Field(strict=True, ge=1, le=65536)] = 64
+    samples: Annotated[int, Whole(ge=1, le=65536)] = 64
     """Rays per pixel sample."""
-    falloff: AnyFalloff = Field(default={"falloff": "step"}, validate_default=True)
+    falloff: AnyFalloff = written({"falloff": "step"})
     """By default every occluder counts fully: ambient occlusion."""
     sampler: Literal["spiral", "owen", "random"] = "spiral"
     """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
@@ -323,8 +313,8 @@ Layer: TypeAlias = Literal[
 class Outputs(Description):
     """What is written."""
 
-    layers: Annotated[tuple[Layer, ...], Field(min_length=1, strict=False)] = ("beauty",)
-    files: Annotated[tuple[str, ...], Field(min_length=1, strict=False)] = ("{scene}.{camera}.png",)
+    layers: Annotated[tuple[Layer, ...], Many(least=1)] = ("beauty",)
+    files: Annotated[tuple[str, ...], Many(least=1)] = ("{scene}.{camera}.png",)
     """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
     file per layer (`{layer}` in its name when there are several)."""
     colour: Literal["half", "float"] = "half"
@@ -338,34 +328,33 @@ class Scene(Description):
     """Version of the scene format."""
     camera: Camera | None = None
     """The one camera, named `main`."""
-    cameras: dict[Name, Camera] = Field(default_factory=dict)
+    cameras: dict[Name, Camera] = NOTHING
     """Several cameras by name; instead of `camera`."""
-    film: Film = DEFAULTS
+    film: Film = NOTHING
     shading: Rate = "phong"
     """How often the model is evaluated."""
-    ambient: Annotated[Ambient, BeforeValidator(_ambient, json_schema_input_type=AmbientText)] = DEFAULTS
+    ambient: Annotated[Ambient, Before(_ambient, written=AmbientText)] = NOTHING
     """Colour, form or both of the light from everywhere."""
     obscurance: Obscurance | None = None
     """By default w = 1 and no ray is cast for it."""
     depth_cue: DepthCue | None = None
     """Fade the beauty with the distance from the eye; by default not."""
-    meshes: dict[Name, MeshSource] = Field(default_factory=dict)
-    materials: dict[Name, AnyModel] = Field(default_factory=dict)
-    objects: Annotated[tuple[Object, ...], Field(strict=False)] = ()
-    lights: Annotated[tuple[AnyLight, ...], Field(strict=False)] = ()
-    outputs: Outputs = DEFAULTS
-    seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = 0
+    meshes: dict[Name, MeshSource] = NOTHING
+    materials: dict[Name, AnyModel] = NOTHING
+    objects: tuple[Object, ...] = ()
+    lights: tuple[AnyLight, ...] = ()
+    outputs: Outputs = NOTHING
+    seed: Annotated[int, Whole(ge=0, le=2**32 - 1)] = 0
     """Of every random number."""
 
-    @model_validator(mode="after")
-    def _names_exist(self) -> Scene:
+    def check(self) -> None:
+        """Names must lead somewhere."""
         found = [
             InitErrorDetails(type=PydanticCustomError("name", "{fact}", {"fact": fact}), loc=path, input=None)
             for path, fact in reference_faults(self)
         ]
         if found:
             raise ValidationError.from_exception_data("Scene", found)
-        return self
 
     def material_of(self, thing: Object) -> AnyModel | None:
         """The object's own material with its overrides; None where the mesh selects materials."""
@@ -374,8 +363,7 @@ class Scene(Description):
         if not thing.override:
             return model
         base = model if model is not None else default_material()
-        said = {name: getattr(base, name) for name in base.model_fields_set}
-        return type(base).model_validate({**said, **thing.override})
+        return type(base).validated({**dict(base), **thing.override})
 
     def named_cameras(self) -> dict[str, Perspective | Orthographic]:
         """The cameras by name, at least one."""

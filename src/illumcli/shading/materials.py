@@ -128,7 +128,7 @@ def imported_model(description: Mapping[str, Any]) -> IlluminationModel:
         else value
         for name, value in description.items()
     }
-    return member("illumcli.models", str(keys["model"])).model_validate(keys)
+    return member("illumcli.models", str(keys["model"])).validated(keys)
 
 
 def colors_at(table: Sequence[Any], material: Ids) -> Vectors:

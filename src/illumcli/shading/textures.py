@@ -21,6 +21,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import surface
 from illumcli.shading.materials import Materials, colors_at
+from illumcli.values import LARGEST, Three, Within, marks
 
 Floats: TypeAlias = NDArray[np.float32]
 
@@ -98,12 +99,10 @@ def parameter_range(model: IlluminationModel, path: str) -> Range:
     owner: Any = model
     for part in parts:
         owner = getattr(owner, part)
-    found = type(owner).model_json_schema()["properties"][name]
-    while choices := found.get("anyOf") or found.get("oneOf"):  # optional, varying: the value comes first
-        found = choices[0]
-    number = found["prefixItems"][0] if found["type"] == "array" else found
-    low = number.get("minimum", number.get("exclusiveMinimum", 0.0) + float(np.finfo(F).tiny))
-    return Range(len(found.get("prefixItems", "1")), low, number["maximum"])
+    found = next(mark for mark in marks(type(owner).fields()[name].kind) if isinstance(mark, Within | Three))
+    width, number = (3, found.each) if isinstance(found, Three) else (1, found)
+    low = (number.gt or 0.0) + float(np.finfo(F).tiny) if number.ge is None else number.ge
+    return Range(width, low, LARGEST if number.le is None else number.le)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

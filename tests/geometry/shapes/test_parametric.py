@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+from pydantic_core import ValidationError
 
 from illumcli.errors import InputError
 from illumcli.geometry.shapes.parametric import Parametric
@@ -18,7 +18,7 @@ SPHERE = {
 
 
 def made(**scene):
-    return Parametric.model_validate(scene).mesh()
+    return Parametric.validated(scene).mesh()
 
 
 def corners(mesh):

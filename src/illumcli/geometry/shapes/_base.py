@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, TypeAlias
 
-from pydantic import Field
-
 from illumcli.description import Description
 from illumcli.geometry.mesh import Mesh
+from illumcli.values import Whole
 
 MAX_TRIANGLES = 20_000_000
 """No shape makes more; the ranges below keep to it."""
 
-Segments: TypeAlias = Annotated[int, Field(ge=3, le=4096)]
-Rings: TypeAlias = Annotated[int, Field(ge=1, le=2048)]
-Cells: TypeAlias = Annotated[int, Field(ge=1, le=3000)]
-CellsByCells: TypeAlias = Annotated[tuple[Cells, Cells], Field(strict=False)]
+Segments: TypeAlias = Annotated[int, Whole(ge=3, le=4096)]
+Rings: TypeAlias = Annotated[int, Whole(ge=1, le=2048)]
+Cells: TypeAlias = Annotated[int, Whole(ge=1, le=3000)]
+CellsByCells: TypeAlias = tuple[Cells, Cells]
 
 
 class Shape(Description):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
-from illumcli.description import Positive
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
+from illumcli.values import Positive, Whole
 
 FACES = (  # direction to the right and upwards, seen from outside
     ((0, 0, -1), (0, 1, 0)),  # +x
@@ -23,9 +22,9 @@ FACES = (  # direction to the right and upwards, seen from outside
 
 class Box(Shape):
     shape: Literal["box"] = "box"
-    size: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] = (2.0, 2.0, 2.0)
+    size: tuple[Positive, Positive, Positive] = (2.0, 2.0, 2.0)
     """Extent along x, y and z."""
-    resolution: Annotated[int, Field(ge=1, le=1024)] = 1
+    resolution: Annotated[int, Whole(ge=1, le=1024)] = 1
     """Quads along each edge."""
 
     def mesh(self) -> Mesh:

@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.description import Positive
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Rings, Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
+from illumcli.values import Positive
 
 
 class Disc(Shape):

@@ -13,19 +13,20 @@ Gibson, S. F. F. (1998). Constrained elastic surface nets. MICCAI '98. Here proj
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from illumcli.arrays import Vectors, dot, length, unit
-from illumcli.description import Vector
+from illumcli.description import checks
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.formula import MAX_LENGTH, Formula, checked, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import MAX_TRIANGLES, Shape
+from illumcli.values import After, Text, Vector, Whole
 
 XYZ = ("x", "y", "z")
 LANES = 2**20  # grid nodes evaluated at once
@@ -33,9 +34,7 @@ CONVERGED = 1e-13  # of a cell's edge
 OFF = 0.1180339887  # of a cell's edge, no simple fraction
 NEWTON_STEPS = 12  # quadratic convergence: four are usual, creases of f take more
 
-FormulaText: TypeAlias = Annotated[
-    str, AfterValidator(partial(checked, variables=XYZ)), Field(max_length=MAX_LENGTH)
-]
+FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=XYZ))]
 
 
 class Implicit(Shape):
@@ -43,18 +42,16 @@ class Implicit(Shape):
     f: FormulaText
     """Formula of x, y and z: + - * / **, pi, e, sin cos tan sinh cosh tanh exp log sqrt abs atan2 min max."""
     low: Vector = (-1.0, -1.0, -1.0)
-    high: Vector = Field((1.0, 1.0, 1.0), validate_default=True)
+    high: Vector = (1.0, 1.0, 1.0)
     """Corners of the box that is searched."""
-    resolution: Annotated[int, Field(ge=2, le=512)] = 64
+    resolution: Annotated[int, Whole(ge=2, le=512)] = 64
     """Cubic cells along the longest edge of the box; parts thinner than a cell may be missed."""
 
-    @field_validator("high")
-    @classmethod
-    def _above_low(cls, high: tuple[float, float, float], info: ValidationInfo) -> tuple[float, float, float]:
-        low = info.data.get("low", high)
-        if "low" in info.data and not all(a < b for a, b in zip(low, high, strict=True)):
+    @checks("high")
+    def _above_low(high: tuple[float, float, float], before: Mapping[str, Any]) -> None:
+        low = before.get("low", high)
+        if "low" in before and not all(a < b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"must be above low, {list(low)}, along every axis, is {list(high)}")
-        return high
 
     def mesh(self) -> Mesh:
         """Quads; without uv.

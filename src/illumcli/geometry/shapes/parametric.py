@@ -5,30 +5,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, field_validator
 
 from illumcli.arrays import Vectors, length, unit
-from illumcli.description import Number
+from illumcli.description import checks
 from illumcli.errors import InputError
 from illumcli.geometry.formula import MAX_LENGTH, checked, parametric_normal, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, turned, vertex_numbers, woven
+from illumcli.values import After, Number, Text
 
 UV = ("u", "v")
 WELD = 1e-9  # of the surface's extent: nodes on a seam or at a pole that are as near are one vertex
 FAINT = 1e-12  # of the longest normal: no direction left
 INWARDS = 1e-7  # of a parameter's range: where the limit of the normal at a pole is read
 
-FormulaText: TypeAlias = Annotated[
-    str, AfterValidator(partial(checked, variables=UV)), Field(max_length=MAX_LENGTH)
-]
-Range: TypeAlias = Annotated[tuple[Number, Number], Field(strict=False)]
+FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=UV))]
+Range: TypeAlias = tuple[Number, Number]
 
 
 class Parametric(Shape):
@@ -44,12 +43,10 @@ class Parametric(Shape):
     flip: bool = False
     """Outside is the other side, -(d/du x d/dv)."""
 
-    @field_validator("u", "v")
-    @classmethod
-    def _grows(cls, span: tuple[float, float]) -> tuple[float, float]:
+    @checks("u", "v")
+    def _grows(span: tuple[float, float], before: Mapping[str, Any]) -> None:
         if not span[0] < span[1]:
             raise ValueError(f"must run from low to high, is {list(span)}; `flip` turns the surface round")
-        return span
 
     def mesh(self) -> Mesh:
         """Quads; where the surface closes on itself or shrinks to a point, vertices are shared.

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
-from illumcli.description import Positive
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, vertex_numbers, woven
+from illumcli.values import Positive
 
 
 class Plane(Shape):
     shape: Literal["plane"] = "plane"
-    size: Annotated[tuple[Positive, Positive], Field(strict=False)] = (2.0, 2.0)
+    size: tuple[Positive, Positive] = (2.0, 2.0)
     """Extent along x and z."""
     resolution: CellsByCells = (1, 1)
     """Quads along x and z."""

@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
 
-from illumcli.description import Positive
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
+from illumcli.values import Positive, Whole
 
 
 class Sphere(Shape):
@@ -22,7 +21,7 @@ class Sphere(Shape):
     radius: Positive = 1.0
     segments: Segments = 96
     """Facets around."""
-    rings: Annotated[int, Field(ge=2, le=2048)] = 48
+    rings: Annotated[int, Whole(ge=2, le=2048)] = 48
     """Facets from pole to pole."""
 
     def mesh(self) -> Mesh:

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
 
-from illumcli.description import Positive
+from illumcli.description import checks
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
+from illumcli.values import Positive, Whole
 
 
 class Torus(Shape):
     shape: Literal["torus"] = "torus"
     major: Positive = 0.75
     """R, from the centre to the middle of the tube."""
-    minor: Positive = Field(0.25, validate_default=True)
+    minor: Positive = 0.25
     """r, radius of the tube, below R."""
     segments: Segments = 96
     """Facets around the axis."""
-    sides: Annotated[int, Field(ge=3, le=2048)] = 48
+    sides: Annotated[int, Whole(ge=3, le=2048)] = 48
     """Facets around the tube."""
 
-    @field_validator("minor")
-    @classmethod
-    def _has_a_hole(cls, minor: float, info: ValidationInfo) -> float:
-        if minor >= info.data.get("major", np.inf):
-            raise ValueError(f"must be smaller than major, {info.data['major']}; the torus would cut itself")
-        return minor
+    @checks("minor")
+    def _has_a_hole(minor: float, before: Mapping[str, Any]) -> None:
+        if minor >= before.get("major", np.inf):
+            raise ValueError(f"must be smaller than major, {before['major']}; the torus would cut itself")
 
     def mesh(self) -> Mesh:
         """Quads; v runs around the tube from its inner equator."""

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic_core import ValidationError
 
+from illumcli.description import Description
 from illumcli.errors import InputError, OutputError
 from illumcli.jobs.brdf import views
 from illumcli.models._base import IlluminationModel
@@ -76,7 +77,7 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
     problems += map(str, read)
     models: dict[str, IlluminationModel] = {}
     applied: set[str] = set()
-    fields: list[str] = []
+    parameters: list[str] = []
     for place, name in enumerate(names, start=1):
         title = name if names.count(name) == 1 else f"{name} {place}"
         try:
@@ -85,14 +86,14 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
             problems.append(f"no model '{name}'; {error}")
             applied |= {text for text, change in changes if change.steps[0] in (name, str(place))}
             continue
-        fields += [field for field in Model.model_fields if field != "model"]
+        parameters += [name for name in Model.fields() if name != "model"]
         mine = [(text, own) for text, change in changes if (own := _for(change, name, place, Model, names))]
         applied |= {text for text, _ in mine}
         made, found = _described(Model, mine)
         problems += [f"{title}: {fact}" if not fact.startswith("-D ") else fact for fact in found]
         if made is not None:
             models[title] = made
-    known = tuple(dict.fromkeys([*names, *fields]))
+    known = tuple(dict.fromkeys([*names, *parameters]))
     for text, change in changes:
         if text not in applied:
             way = suggestion(change.steps[0], known)
@@ -103,13 +104,13 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
 
 
 def _for(
-    change: Override, name: str, place: int, Model: type[BaseModel], names: Sequence[str]
+    change: Override, name: str, place: int, Model: type[Description], names: Sequence[str]
 ) -> tuple[tuple[str, ...], Any] | None:
     """Steps within the model and the value, where the override is meant for it."""
     first, *rest = change.steps
     if first in (name, str(place)) and rest:
         return tuple(rest), change.value.plain()
-    if first in Model.model_fields and first != "model" and first not in names:
+    if first in Model.fields() and first != "model" and first not in names:
         return change.steps, change.value.plain()
     return None
 
@@ -118,7 +119,7 @@ def _described(
     Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
 ) -> tuple[IlluminationModel | None, list[str]]:
     """The model with its changes, or None and what is wrong, after the override that it comes from."""
-    keys: dict[str, Any] = {"model": Model.model_fields["model"].default}
+    keys: dict[str, Any] = {"model": Model.model}
     said: dict[tuple[str, ...], str] = {}
     for text, (steps, value) in changes:
         here = keys
@@ -130,9 +131,9 @@ def _described(
                 ]
         here[steps[-1]] = value
         said[steps] = text
-    classes: dict[int, type[BaseModel]] = {}
+    classes: dict[int, type[Description]] = {}
     try:
-        return Model.model_validate(keys, context=classes), []
+        return Model.validated(keys, classes), []
     except ValidationError as error:
         found = []
         for path, fact in faults(error, keys, classes):

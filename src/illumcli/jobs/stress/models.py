@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import columns, cross, dot, unit
+from illumcli.jobs.schema import schema_of
 from illumcli.jobs.stress.outcome import Row
-from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate
 from illumcli.variants import members
 
@@ -22,16 +22,16 @@ MEASURED = "file"
 def rows(quick: bool) -> list[Row]:
     """One row per model."""
     lanes, draws = (256, 20) if quick else (4096, 400)
-    models = [Model for Model in members("illumcli.models") if MEASURED not in Model.model_fields]
+    models = [Model for Model in members("illumcli.models") if MEASURED not in Model.fields()]
     return [_row(Model, lanes, draws) for Model in models]
 
 
-def _row(Model: type[IlluminationModel], lanes: int, draws: int) -> Row:
+def _row(Model: type[Any], lanes: int, draws: int) -> Row:
     random = np.random.default_rng(1)
     wrong: list[str] = []
     values = sets = 0
     for said in parameters(Model, random, draws):
-        model = Model.model_validate(said)
+        model = Model.validated(said)
         sets += 1
         for dtype in (np.float32, np.float64):
             given = directions(sets, lanes, dtype)
@@ -48,15 +48,15 @@ def _row(Model: type[IlluminationModel], lanes: int, draws: int) -> Row:
                     bad = np.count_nonzero(~np.isfinite(lobe) | (lobe < 0))
                     wrong.append(f"{said}: {name} wrong in {bad} values of {dtype.__name__}")
     check = f"{sets} sets of parameters, {values:,} values: finite, not negative"
-    return Row(f"model: {Model.model_fields['model'].default}", check, wrong[0] if wrong else "-", not wrong)
+    return Row(f"model: {Model.model}", check, wrong[0] if wrong else "-", not wrong)
 
 
 def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Iterator[dict[str, Any]]:
     """Values for every field: each number at each of its ends with the others at their defaults, then all
     fields drawn at once from ends, middles and choices."""
-    schema = Model.model_json_schema()
+    schema = schema_of(Model)
     defs = schema.get("$defs", {})
-    tag = {"model": Model.model_fields["model"].default}
+    tag = {"model": Model.model}
     own = {
         name: field
         for name, field in schema["properties"].items()
@@ -90,7 +90,7 @@ def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
     if field.get("type") == "boolean":
         return [False, True]
     if field.get("type") == "array":
-        ends = _ends(field["prefixItems"][0], defs)
+        ends = _ends(field["items"], defs)
         return [[end] * 3 for end in ends] + [[ends[0], ends[-1], ends[0]]]
     low = field.get("minimum", field.get("exclusiveMinimum", 0.0))
     least = np.nextafter(low, np.inf) if "exclusiveMinimum" in field else low

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Tag, WithJsonSchema
-
 from illumcli.arrays import Lanes
-from illumcli.description import LARGEST, Description, Positive
+from illumcli.description import Description
+from illumcli.values import LARGEST, After, By, Positive, Tag
 
 
 def _radii(text: str) -> str:
@@ -21,12 +20,10 @@ def _radii(text: str) -> str:
 
 
 RADII = r"([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]{1,3})?)r"
-Radii: TypeAlias = Annotated[
-    str, AfterValidator(_radii), WithJsonSchema({"type": "string", "pattern": f"^{RADII}$"})
-]
+Radii: TypeAlias = Annotated[str, After(_radii, form=f"^{RADII}$")]
 Distance: TypeAlias = Annotated[
     Annotated[Positive, Tag("units")] | Annotated[Radii, Tag("radii")],
-    Discriminator(lambda value: "radii" if isinstance(value, str) else "units"),
+    By(lambda value: "radii" if isinstance(value, str) else "units"),
 ]
 
 

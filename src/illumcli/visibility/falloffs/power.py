@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from illumcli.arrays import Lanes
-from illumcli.description import Positive
+from illumcli.values import Positive
 from illumcli.visibility.falloffs._base import Distance, Falloff
 
 

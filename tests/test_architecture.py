@@ -19,6 +19,7 @@ LEAVES = {
     "variants",
     "description",
     "values",
+    "records",
     "frame",
     "pixels",
     "docstrings",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
+from illumcli.records import Value
 
-@dataclass(frozen=True, slots=True)
-class Recipe:
+
+class Recipe(Value):
     """A function, the buffer it makes, and the buffer behind each of its parameters."""
 
     makes: str

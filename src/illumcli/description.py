@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple, Self, dataclass_transform, get_ori
 
 from pydantic_core import CoreConfig, CoreSchema, SchemaValidator, ValidationError, core_schema
 
+from illumcli.records import Frozen
 from illumcli.values import schema_of
 
 REQUIRED: Any = object()
@@ -22,7 +23,7 @@ class Field(NamedTuple):
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
-class Description:
+class Description(Frozen):
     """A frozen part of a scene; unknown keys are refused, text is never read as a number.
 
     Its fields are the annotated names of its class and of those it stands on.
@@ -109,20 +110,8 @@ class Description:
     def __iter__(self) -> Iterator[tuple[str, Any]]:
         return iter(vars(self).items())
 
-    def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and vars(self) == vars(other)
-
-    def __hash__(self) -> int:
-        return hash((type(self), *vars(self).values()))
-
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self)})"
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError(f"{type(self).__name__} is frozen; use `replaced`")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"{type(self).__name__} is frozen; use `replaced`")
 
 
 def written(value: Any) -> Any:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.records import Value
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+
+class Frame(Value):
     """The scene's centre and radius: inside the renderer every position is in radii from the centre.
 
     Float32 rays then lose the same few ulp whatever the scale and place of a scene.

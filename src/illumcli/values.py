@@ -7,11 +7,12 @@ is equal, but to load what makes it takes a quarter of a small render.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 from pydantic_core import CoreSchema, core_schema
+
+from illumcli.records import Value
 
 LARGEST = 1e18  # squares and products of three such numbers stay finite in float32's exponent range
 
@@ -56,8 +57,7 @@ _PLAIN: dict[Any, CoreSchema] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Within:
+class Within(Value):
     """A number: finite, in its range, never read from text."""
 
     ge: float | None = None
@@ -71,8 +71,7 @@ class Within:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Whole:
+class Whole(Value):
     """A whole number in its range."""
 
     ge: int
@@ -82,8 +81,7 @@ class Whole:
         return core_schema.int_schema(strict=True, ge=self.ge, le=self.le)
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
+class Text(Value):
     """Text of a form, or up to a length."""
 
     pattern: str | None = None
@@ -93,8 +91,7 @@ class Text:
         return core_schema.str_schema(pattern=self.pattern, max_length=self.longest)
 
 
-@dataclass(frozen=True, slots=True)
-class Many:
+class Many(Value):
     """A list of at least and at most so many parts."""
 
     least: int
@@ -107,8 +104,7 @@ class Many:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Three:
+class Three(Value):
     """Three numbers in a list; where `spread`, one number stands for three equal ones."""
 
     each: Within
@@ -124,8 +120,7 @@ def spread(value: Any) -> Any:
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-@dataclass(frozen=True, slots=True)
-class Before:
+class Before(Value):
     """A short form is written out, by a function, before what it stands for is looked at."""
 
     function: Callable[[Any], Any]
@@ -139,8 +134,7 @@ class Before:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class After:
+class After(Value):
     """A function has the last word: it returns the value, or raises ValueError."""
 
     function: Callable[[Any], Any]
@@ -153,8 +147,7 @@ class After:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Tag:
+class Tag(Value):
     """Names one choice of a union that is told apart by `By`."""
 
     tag: str
@@ -163,8 +156,7 @@ class Tag:
         return schema_of(of)
 
 
-@dataclass(frozen=True, slots=True)
-class By:
+class By(Value):
     """Tells the choices of a union apart: by a key that each has with its own value, or by a function."""
 
     key: str | Callable[[Any], str | None]

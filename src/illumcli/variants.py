@@ -7,7 +7,6 @@ a run what its scene uses. Nothing is registered and no list is kept.
 from __future__ import annotations
 
 import pkgutil
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from illumcli.description import Description
+from illumcli.records import Value
 
 
 @cache
@@ -59,8 +59,7 @@ def suggestion(word: str, known: tuple[str, ...]) -> str:
     return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
 
 
-@dataclass(frozen=True, slots=True)
-class Tagged:
+class Tagged(Value):
     """Annotation of a field that takes any member of a family, told apart by its key `tag`."""
 
     package: str

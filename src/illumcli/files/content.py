@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 
 from illumcli.errors import InputError
+from illumcli.records import Value
 
 
 def _alone(path: Path) -> Iterable[Path]:
     return ()
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(Value):
     """The content of a file and of those beside it that it names; equal contents have equal `repr`.
 
     It is read when it is asked for.

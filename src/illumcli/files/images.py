@@ -11,7 +11,6 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TypeAlias
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import Part
 from illumcli.pixels import from_srgb, refuse_nonfinite
+from illumcli.records import Record, Value
 
 LARGEST_HALF = 65504.0
 SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
@@ -60,8 +60,7 @@ def layers(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(Value):
     """An image that is on disk under its name."""
 
     path: Path
@@ -244,8 +243,7 @@ class ImageWriter:
             raise self._failure("what was read back differs from what was written")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Image:
+class Image(Record):
     """An image as its file has it."""
 
     width: int

@@ -20,7 +20,6 @@ import struct
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -29,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.files import atomic
+from illumcli.records import Record, Value
 
 SUFFIX = ".illum"
 LIMIT = 4 << 30
@@ -48,8 +48,7 @@ class Refused(Exception):
     """A file of the folder is not a sound entry; the text says why."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Value):
     """A file of the store."""
 
     path: Path
@@ -61,8 +60,7 @@ class Entry:
         return self.path.stem
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Stored:
+class Stored(Record):
     """An entry that was read and is sound. Arrays are read-only."""
 
     about: Mapping[str, Any]

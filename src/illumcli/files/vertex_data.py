@@ -6,7 +6,7 @@ import hashlib
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.files.atomic import Part
+from illumcli.records import Record
 
 SUFFIXES = (".npz", ".ply", ".glb")
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
@@ -24,8 +25,7 @@ _VERTICES, _INDICES = 34962, 34963  # glTF targets of a buffer view
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Baked:
+class Baked(Record):
     """Obscurance of V vertices, in their file's own order."""
 
     obscurance: NDArray[np.float32]  # (V,) 1 where open
@@ -56,8 +56,7 @@ class Baked:
         return found if self.bent_normal is None else {**found, "bent_normal": self.bent_normal}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class Shape(Record):
     """One object as it is written: polygons over vertices that keep their order and count."""
 
     name: str

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
+from illumcli.records import Value
 
 
-@dataclass(frozen=True, slots=True)
-class Layer:
+class Layer(Value):
     """A layer of the picture."""
 
     name: str

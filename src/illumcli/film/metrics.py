@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from illumcli.records import Value
 
 RELATIVE_FLOOR = 0.01
 """Added to the reference's square in `relative_mse`, so that black pixels count, and finitely."""
@@ -15,8 +16,7 @@ RELATIVE_FLOOR = 0.01
 _BAND = 1 << 20  # values in float64 at once
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(Value):
     """What `difference` found. d = other - reference, r = reference, mean over values finite in both.
 
     Values that are equal differ by 0, infinite ones too. A value that is NaN in either image, or infinite in

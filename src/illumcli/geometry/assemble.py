@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from illumcli.frame import Frame
 from illumcli.geometry.faults import Fault, faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.triangulate import triangulate
+from illumcli.records import Record
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class Placed(Record):
     """One object of the scene: a mesh, where it stands, and its numbers in the World."""
 
     mesh: Mesh
@@ -29,8 +29,7 @@ class Placed:
     first_triangle: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Standing:
+class Standing(Record):
     """Where every object stands: known before any of them is cut in triangles."""
 
     matrices: tuple[NDArray[np.float64], ...]  # (4, 4) each, object to scene
@@ -40,8 +39,7 @@ class Standing:
     frame: Frame
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class World:
+class World(Record):
     """All triangles of the scene, in radii from its centre. Arrays are read-only."""
 
     frame: Frame
@@ -210,8 +208,7 @@ def _joined(arrays: list[NDArray[Any]], empty: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate(arrays) if arrays else empty
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CornerVectors:
+class CornerVectors(Record):
     """A vector per corner of the World, kept once where corners share it."""
 
     values: NDArray[np.float32]  # (K, 3) or (K, 2)

@@ -5,17 +5,15 @@ Indices that name no vertex and coordinates that are not finite never get here: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
+from illumcli.records import Value
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(Value):
     """One class of faults of one mesh."""
 
     what: str

@@ -12,13 +12,13 @@ import ast
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import Vectors, cross
+from illumcli.records import Value
 
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
@@ -30,8 +30,7 @@ _FOREIGN = re.compile(r"[^0-9A-Za-z_.+\-*/(), ]")
 _GLUED = re.compile(r"(?<![\w.])(?>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?=[A-Za-z_])")
 
 
-@dataclass(frozen=True, slots=True)
-class Dual:
+class Dual(Value):
     """A value and its derivatives; a variable that is missing from `slopes` has derivative 0."""
 
     value: NDArray[np.float64]
@@ -78,8 +77,7 @@ _UNARY: dict[type[ast.unaryop], _Parts] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Formula:
+class Formula(Value):
     """A checked formula of the given variables; made by `parse`."""
 
     text: str

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.records import Record
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
+
+class Mesh(Record):
     """Polygons over vertices in the file's own order and count; nothing is merged.
 
     Polygon p owns the corners ``starts[p]:starts[p + 1]``, counter-clockwise seen from outside. Normals and
@@ -37,8 +38,7 @@ class Mesh:
     """What was wrong and put right while reading: class -> count."""
 
     def __post_init__(self) -> None:
-        arrays = [getattr(self, name) for name in self.__slots__]
-        for array in [*arrays, *self.attributes.values()]:
+        for array in [*vars(self).values(), *self.attributes.values()]:
             if isinstance(array, np.ndarray):
                 array.setflags(write=False)
 

@@ -17,7 +17,6 @@ Theoharis, T. et al. (2008). Graphics and Visualization, eq. 12.31 to 12.33.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -25,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import Lanes, Vectors, cross, dot, length, rows, unit
 from illumcli.geometry.mesh import Mesh
+from illumcli.records import Record
 
 PolygonMethod: TypeAlias = Literal["cross", "edge_average", "newell", "plane"]
 Weights: TypeAlias = Literal["equal", "area", "angle"]
@@ -33,8 +33,7 @@ EPS = np.finfo(np.float64).eps
 SAME_ANGLE = 1e-9  # [rad] polygons that meet at exactly the crease angle are still averaged
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CornerNormals:
+class CornerNormals(Record):
     """Unit normals and which of them each corner has. Arrays are read-only."""
 
     normals: Vectors  # (K, 3) float64; rows that no corner names may be zero

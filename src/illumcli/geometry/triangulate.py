@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import Vectors, cross, dot, rows
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors, corner_crosses
+from illumcli.records import Record
 
 CLEARLY = (
     1 - 1e-9
@@ -19,8 +19,7 @@ CLEARLY = (
 FLAT = 1e-9  # of the polygon's area: a corner that turns by less counts as straight
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Triangulation:
+class Triangulation(Record):
     """Triangles over the corners of a mesh, in the order and orientation of their polygons; read-only."""
 
     corners: NDArray[np.int32]  # (T, 3) corner numbers

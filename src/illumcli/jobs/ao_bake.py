@@ -36,6 +36,7 @@ from illumcli.jobs.ao_bake_points import Vertices, vertex_points
 from illumcli.jobs.render import peak_memory, refuse_repairs
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
+from illumcli.records import Value
 from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.visibility.horizon import Horizon
@@ -48,8 +49,7 @@ GROUND_GAP = 1e-4
 GROUND_SIZE = 1e3
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(Value):
     """What a bake is asked for."""
 
     samples: int = 256
@@ -205,8 +205,7 @@ def bare(path: Path, overrides: Sequence[str]) -> Loaded:
 
 def parameters(settings: Settings) -> dict[str, Any]:
     """What a value depends on besides the scene, as JSON has it."""
-    said = {name: getattr(settings, name) for name in Settings.__dataclass_fields__}
-    return {**said, "falloff": dict(settings.falloff), "occluders": list(settings.occluders)}
+    return {**vars(settings), "falloff": dict(settings.falloff), "occluders": list(settings.occluders)}
 
 
 def content_hash(scene: Scene, hashes: Sequence[str], settings: Settings) -> str:

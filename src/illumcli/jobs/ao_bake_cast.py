@@ -21,6 +21,7 @@ from illumcli.geometry.order import compact
 from illumcli.jobs.ao_bake_points import Points
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.rays.tracer import Tracer
+from illumcli.records import Record, Value
 from illumcli.visibility.horizon import Horizon
 from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
 
@@ -38,8 +39,7 @@ FEWEST_SAMPLES, MOST_SAMPLES = 8, 65536
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Occluders:
+class Occluders(Record):
     """What the points of an object may be hidden by."""
 
     tracer: Tracer
@@ -47,8 +47,7 @@ class Occluders:
     facets: NDArray[np.float32] | None = None  # (T, 3) unit normals, where back faces are told apart
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cast:
+class Cast(Record):
     """What was found at M points; those that are known to be open have w = 1 and no unevenness."""
 
     w: NDArray[np.float32]
@@ -56,8 +55,7 @@ class Cast:
     bent: NDArray[np.float32] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Value):
     """A unit of work: a function of the points it names and its own fields alone."""
 
     lanes: NDArray[np.int64]

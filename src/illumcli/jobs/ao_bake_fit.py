@@ -12,7 +12,6 @@ Kavan, L., Bargteil, A. W. and Sloan, P.-P. (2011). Least squares vertex baking.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from illumcli.arrays import F
 from illumcli.geometry.assemble import World
 from illumcli.jobs.ao_bake_cast import Caster, Occluders
 from illumcli.jobs.ao_bake_points import AreaPoints, Vertices, area_points, vertex_points
+from illumcli.records import Record
 from illumcli.visibility.obscurance import Method
 
 RAYS_PER_POINT = 16
@@ -32,8 +32,7 @@ are few."""
 STEPS, ENOUGH = 500, 1e-6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class Fit(Record):
     """Vertex values by least squares and what it took."""
 
     w: NDArray[np.float32]
@@ -84,8 +83,7 @@ def fitted(
     return Fit(value, error, len(lanes), int(is_open.sum()), vertices)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class System:
+class System(Record):
     """The normal equations of the fit: symmetric, a 3 by 3 block per triangle, never stored as a matrix."""
 
     corner: NDArray[np.int64]  # (T, 3) unknown at each corner

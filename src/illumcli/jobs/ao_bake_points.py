@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from illumcli.arrays import F, Ids, Vectors, columns, cross, dot, length, rows, 
 from illumcli.geometry.assemble import World
 from illumcli.rays.offsets import lifted
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
+from illumcli.records import Record
 
 SEAM = np.cos(np.radians(60.0))
 """Copies of a vertex whose normals stand within 60 degrees share one normal."""
@@ -19,8 +19,7 @@ MOST_COPIES = 31
 """Copies are compared with as many that follow them."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Points:
+class Points(Record):
     """M points that cast rays."""
 
     origins: Vectors  # (M, 3) float32 off the surface, in radii
@@ -33,8 +32,7 @@ class Points:
         return Points(rows(self.origins, lanes), rows(self.n, lanes), self.number[lanes], self.thing[lanes])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Vertices:
+class Vertices(Record):
     """The vertices of a world that cast rays, and which of them each vertex takes its value from."""
 
     points: Points
@@ -141,8 +139,7 @@ def _runs(same: NDArray[np.bool_]) -> Iterator[tuple[int, NDArray[np.int64]]]:
         yield shift, lanes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AreaPoints:
+class AreaPoints(Record):
     """Points spread evenly over triangles, for values that are fitted to them."""
 
     points: Points

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.store import Entry, Refused, Store, described, size_of
 from illumcli.jobs.render import opened_store
+from illumcli.records import Value
 
 
-@dataclass(frozen=True, slots=True)
-class Listing:
+class Listing(Value):
     """The entries of the store and how much they may take."""
 
     folder: Path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from illumcli.errors import InputError, ThresholdError
 from illumcli.files.images import ChannelType, Image, ImageWriter, flip, layers, read_image
 from illumcli.film.heat import heat
 from illumcli.film.metrics import Difference, absolute_difference, difference
+from illumcli.records import Value
 from illumcli.variants import suggestion
 
 LIMITS = {
@@ -27,8 +27,7 @@ LIMITS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class LayerDifference:
+class LayerDifference(Value):
     """One layer of two images."""
 
     name: str
@@ -55,8 +54,7 @@ class LayerDifference:
         return column, row, self.channels[channel]
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Value):
     """What `run` found."""
 
     reference: Path

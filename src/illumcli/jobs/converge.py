@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from statistics import median
 from typing import Any, Literal, TypeAlias
@@ -24,6 +24,7 @@ from illumcli.jobs.render import opened_store, versions
 from illumcli.jobs.sampled import Sampler, Sampling, Subject, subject
 from illumcli.plan.keys import Keys, code, digest
 from illumcli.rays.sampling import stream
+from illumcli.records import Value
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 
@@ -37,8 +38,7 @@ FINER: dict[Vary, tuple[int, int]] = {"obscurance": (1, 4), "pixels": (4, 1), "b
 """How many times the samples and the rays each of the finest run a half of the reference has."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(Value):
     """What errors are measured against: the mean of two independent halves."""
 
     sampling: Sampling  # of each half, but for the seed
@@ -47,8 +47,7 @@ class Reference:
     reused: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(Value):
     """One picture."""
 
     repeat: int
@@ -59,8 +58,7 @@ class Run:
     """Against the reference, its own error taken off."""
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(Value):
     """All repeats at one sampling."""
 
     pixel: int
@@ -73,8 +71,7 @@ class Point:
     runs: tuple[Run, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
+class Curve(Value):
     """A sampler's points and the line log rmse = constant + slope * log count through its runs."""
 
     sampler: Sampler
@@ -90,8 +87,7 @@ class Curve:
         return math.exp((math.log(rmse) - self.constant) / self.slope)
 
 
-@dataclass(frozen=True, slots=True)
-class Convergence:
+class Convergence(Value):
     """What `run` found."""
 
     scene: str

@@ -31,6 +31,7 @@ from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
 from illumcli.plan.recipes import View
 from illumcli.plan.stages import MOST
 from illumcli.plan.unseen import unseen_objects, without
+from illumcli.records import Value
 from illumcli.scene.load import Loaded, load
 from illumcli.scene.spec import Scene
 
@@ -41,8 +42,7 @@ Progress = Callable[[str, int, int], None]
 """Called with what is going on, how much is done and how much there is."""
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(Value):
     """One file of an image set and the layers it holds."""
 
     path: Path
@@ -108,8 +108,7 @@ class ErrorSums:
         return {"mean": self.total / self.pixels, "rms": math.sqrt(self.square / self.pixels)}
 
 
-@dataclass(frozen=True, slots=True)
-class Work:
+class Work(Value):
     """A scene to render: its plan and the files it is to fill."""
 
     loaded: Loaded

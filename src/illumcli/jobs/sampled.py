@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -17,14 +17,14 @@ from illumcli.plan.execute import Tally, at_pixels, bands
 from illumcli.plan.plan import Plan, plan
 from illumcli.plan.recipes import View
 from illumcli.rays.sampling import stream
+from illumcli.records import Record, Value
 from illumcli.scene.load import Loaded
 from illumcli.scene.spec import Scene
 
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
 
 
-@dataclass(frozen=True, slots=True)
-class Sampling:
+class Sampling(Value):
     """How finely a picture is sampled, and by which random numbers."""
 
     pixel: int  # samples per pixel; 1 looks through the pixel's centre
@@ -38,8 +38,7 @@ class Sampling:
         return self.pixel * self.obscurance
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Subject:
+class Subject(Record):
     """A view of a scene and one of its layers, with the buffers that no sampling changes."""
 
     loaded: Loaded

@@ -22,22 +22,21 @@ from illumcli.files.names import check_unique
 from illumcli.geometry.formula import parse as formula
 from illumcli.jobs.render import Progress, Report, Work, is_kept, opened_store, prepared, rendered
 from illumcli.plan.artifacts import Memory
+from illumcli.records import Value
 from illumcli.scene.load import load
 
 MOST = 100_000
 """Variants of one sweep."""
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
+class Axis(Value):
     """One path of the scene and the values it takes, as YAML."""
 
     path: str
     values: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Variant:
+class Variant(Value):
     """One picture of a sweep: the value of every path that varies, and the frame."""
 
     values: Mapping[str, str]

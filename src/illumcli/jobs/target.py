@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from illumcli.jobs.sampled import Sampling, Subject, subject
 from illumcli.plan.plan import plan
 from illumcli.plan.recipes import views
 from illumcli.rays.sampling import stream
+from illumcli.records import Record, Value
 from illumcli.scene.load import load
 
 PIXELS, SHARE = 4000, 50
@@ -43,8 +44,7 @@ STEEPEST, FLATTEST = 2.0, 1.0
 """What a fitted variance may fall by: with the square of the count, or as that of independent samples."""
 
 
-@dataclass(frozen=True, slots=True)
-class Law:
+class Law(Value):
     """variance = at_one * count ** -power"""
 
     at_one: float
@@ -64,8 +64,7 @@ class Law:
         return float(self.at_one * count**-self.power)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Choice:
+class Choice(Record):
     """Counts for a target, and what chose them."""
 
     target: float

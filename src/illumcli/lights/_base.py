@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
@@ -10,14 +9,14 @@ import numpy as np
 from illumcli.arrays import Lanes, Vectors, columns, length
 from illumcli.description import Description
 from illumcli.frame import Frame
+from illumcli.records import Record
 from illumcli.values import Name
 
 NEAREST = 1e-6
 """Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Arriving:
+class Arriving(Record):
     """Light arriving at N points if nothing stood between."""
 
     l: Vectors  # (N, 3) unit, from the point to the light

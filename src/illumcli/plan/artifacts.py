@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -25,6 +25,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.plan.keys import Keys, code
 from illumcli.plan.stages import Repairs, Tile
 from illumcli.rays.surface import Hits
+from illumcli.records import Record, Value
 from illumcli.shading.materials import Numbering
 from illumcli.shading.rates import Points, as_they_are
 
@@ -53,8 +54,7 @@ def worth(seconds: float, size: int) -> bool:
 # --- buffers of a view, tile by tile --------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Kind:
+class Kind(Value):
     """How one value per sample, or several, lie in an artifact of a whole picture."""
 
     dtype: Any
@@ -106,8 +106,7 @@ def kind_of(name: str) -> Kind | None:
     return KINDS.get(name.partition(":")[0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class Picture(Record):
     """An artifact of a whole picture: (height, planes, samples of a row), truth values in bits."""
 
     kind: Kind
@@ -211,9 +210,9 @@ def arrays_in(value: Any) -> Iterator[NDArray[Any]]:
     elif isinstance(value, Mapping):
         for part in value.values():
             yield from arrays_in(part)
-    elif hasattr(value, "__dataclass_fields__"):
-        for name in value.__dataclass_fields__:
-            yield from arrays_in(getattr(value, name))
+    elif isinstance(value, Value):
+        for part in vars(value).values():
+            yield from arrays_in(part)
 
 
 @dataclass(slots=True)
@@ -408,7 +407,7 @@ def encode(value: Any, arrays: list[NDArray[Any]], seen: dict[int, int]) -> Any:
         return {"dict": [[key, encode(part, arrays, seen)] for key, part in value.items()]}
     if type(value).__name__ not in CLASSES:
         raise TypeError(f"{type(value).__name__} is not among what is kept")
-    parts = {each.name: encode(getattr(value, each.name), arrays, seen) for each in fields(value)}
+    parts = {name: encode(part, arrays, seen) for name, part in vars(value).items()}
     return {"class": type(value).__name__, "fields": parts}
 
 

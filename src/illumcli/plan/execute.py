@@ -22,6 +22,7 @@ from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import SHAPE, View
 from illumcli.plan.stages import MOST, Scattered, Tile
 from illumcli.rays.tracer import Interrupted
+from illumcli.records import Record
 from illumcli.visibility.arriving import Lit
 
 Planes: TypeAlias = dict[str, NDArray[np.float32]]  # layer -> (rows, columns, channels)
@@ -54,8 +55,7 @@ class Tally:
                 self.spared[name] += count
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Band:
+class Band(Record):
     """Finished rows of a picture."""
 
     y: int

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -29,14 +29,14 @@ from illumcli.plan.recipes import (
     views,
 )
 from illumcli.plan.stages import tile_side
+from illumcli.records import Value
 from illumcli.scene.spec import Scene
 
 LARGEST_SIDE = 1 << 16
 MOST_RAYS = 10**11
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+class Plan(Value):
     """What will run for a scene, in order, and what will not."""
 
     views: tuple[View, ...]

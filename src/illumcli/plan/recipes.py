@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
 from illumcli.plan import stages
 from illumcli.plan.doubled import error_recipes
+from illumcli.records import Value
 from illumcli.scene.load import resolve
 from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
 from illumcli.shading.materials import DEFAULT, Token
@@ -29,8 +30,7 @@ GIVEN = ("view", "tile")
 SMOOTH = ("gouraud", "phong", "quadratic")
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(Value):
     """One picture: a camera and the size and sampling of its film."""
 
     name: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from illumcli.rays.camera import camera_rays, film_points
 from illumcli.rays.offsets import lifted
 from illumcli.rays.surface import Facets, Hits
 from illumcli.rays.tracer import Tracer
+from illumcli.records import Record, Value
 from illumcli.scene.spec import DepthCue, Obscurance
 from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
@@ -107,8 +108,7 @@ def frame(standing: Standing) -> Frame:
     return standing.frame
 
 
-@dataclass(frozen=True, slots=True)
-class Repairs:
+class Repairs(Value):
     """What was wrong with meshes and put right."""
 
     repairs: Mapping[str, int]
@@ -136,8 +136,7 @@ def facet_normals(world: World) -> Vectors:
     return columns(unit(cross(v1 - v0, v2 - v0)), F)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BakedValues:
+class BakedValues(Record):
     """Obscurance that was baked at the world's vertices."""
 
     values: NDArray[np.float32]  # (V,) NaN on meshes that have none
@@ -247,8 +246,7 @@ def materials_of(
     return materials(numbering, found, libraries)
 
 
-@dataclass(frozen=True)
-class Images:
+class Images(Value):
     """Reads the textures of a scene, each once."""
 
     contents: Mapping[str, Content]
@@ -290,8 +288,7 @@ def tile_side(samples: int, pixels: int) -> int:
     return max(8, min(shared, math.isqrt(MOST // samples)) // 8 * 8)
 
 
-@dataclass(frozen=True, slots=True)
-class Tile:
+class Tile(Value):
     """A rectangle of pixels."""
 
     x: int
@@ -311,7 +308,6 @@ class Tile:
         return Tile(x, y, right - x, lower - y)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Scattered(Tile):
     """Pixels that need not lie together, as a tile of one row."""
 
@@ -327,8 +323,7 @@ class Scattered(Tile):
         return self.columns, self.rows
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(Record):
     """The samples of a tile, pixel by pixel, row by row from the top: sample s of pixel p is lane
     p * per_pixel + s."""
 
@@ -353,8 +348,7 @@ def samples(seed: int, view: Any, tile: Tile) -> Samples:
     return Samples(x, y, points, view.samples, view.first)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rays:
+class Rays(Record):
     """Primary rays of a tile."""
 
     origins: Vectors

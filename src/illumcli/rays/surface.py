@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +11,10 @@ from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length,
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
 from illumcli.rays.offsets import effective_edge
 from illumcli.rays.tracer import Closest
+from illumcli.records import Record
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Hits:
+class Hits(Record):
     """The samples of a tile that see a surface; every surface buffer has these M lanes."""
 
     lane: Ids  # (M,) which sample of the tile
@@ -33,8 +32,7 @@ def seen(closest: Closest) -> Hits:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Facets:
+class Facets(Record):
     """Where hits lie on their triangles, and the triangles' own planes."""
 
     position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees

@@ -13,6 +13,7 @@ from pydantic_core import ValidationError
 
 from illumcli.description import Description
 from illumcli.errors import InputError
+from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.faults import Fault, faults, shown
 from illumcli.scene.override import Override, assign, parse
@@ -29,8 +30,7 @@ CHOICES = ("model", "shape", "falloff", "law")  # keys that say what a mapping i
 PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides an object's `mesh`
 
 
-@dataclass(frozen=True)
-class Loaded:
+class Loaded(Value):
     """A valid scene and what was written to get it."""
 
     scene: Scene

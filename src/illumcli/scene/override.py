@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.faults import shown
 from illumcli.scene.source import MAX_DEPTH, Node, Place, Problem
@@ -20,8 +21,7 @@ NAMED = {
 """Parts of a scene that its author names, and what one of them is called."""
 
 
-@dataclass(frozen=True, slots=True)
-class Override:
+class Override(Value):
     """A value for the part of a scene at `steps`: keys, and numbers or names of list elements."""
 
     steps: tuple[str, ...]

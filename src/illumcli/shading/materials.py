@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.geometry.assemble import World
 from illumcli.models._base import IlluminationModel
+from illumcli.records import Record
 
 Token: TypeAlias = tuple[str, ...]
 """Which material it is, whatever its parameters are: `("material", name)` of the scene, `("object", name)` of
@@ -21,8 +21,7 @@ one object, `("mesh", mesh, name)` of a mesh's own library, or `("default",)`.""
 DEFAULT: Token = ("default",)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Numbering:
+class Numbering(Record):
     """The material numbers of every object or, where meshes select several, triangle."""
 
     tokens: tuple[Token, ...]  # by number
@@ -81,8 +80,7 @@ def numbering(
     return Numbering(tuple(tokens), of_object, of_triangle if several else None)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Materials:
+class Materials(Record):
     """Models by number."""
 
     models: tuple[IlluminationModel, ...]

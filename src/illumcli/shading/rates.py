@@ -9,7 +9,6 @@ quadratic  once per sample, normals interpolated quadratically (van Overveld and
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,12 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, rows
 from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.rays.surface import Facets, Hits, facing, interpolated, quadratic
+from illumcli.records import Record
 
 RATES = ("constant", "gouraud", "phong", "quadratic")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Points:
+class Points(Record):
     """Where models are evaluated, E points on triangles, and how values return to the M samples seen."""
 
     triangle: Ids  # (E,)
@@ -57,8 +56,8 @@ def points(
         group = np.flatnonzero(of_sample == number)
         if group.size:
             groups.append(group)
-            some = Hits(*(getattr(hits, field).take(group) for field in Hits.__slots__))
-            own = Facets(*(rows(getattr(facet, field), group) for field in Facets.__slots__))
+            some = Hits(*(values.take(group) for values in vars(hits).values()))
+            own = Facets(*(rows(values, group) for values in vars(facet).values()))
             parts.append(_POINTS[name](world, some, own, normals, centres, polygon_normals))
     if not parts:
         return _samples(hits, facet, facet.ng)

@@ -8,7 +8,7 @@ pixel average what the pixel covers, so a picture of fine textures wants more of
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,6 +20,7 @@ from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import surface
+from illumcli.records import Record, Value
 from illumcli.shading.materials import Materials, colors_at
 from illumcli.values import LARGEST, Three, Within, marks
 
@@ -84,8 +85,7 @@ def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:
 # --- what varies, read once ------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
+class Range(Value):
     """What a parameter may be."""
 
     width: int  # 3 for a colour, 1 for a number
@@ -105,8 +105,7 @@ def parameter_range(model: IlluminationModel, path: str) -> Range:
     return Range(width, low, LARGEST if number.le is None else number.le)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Map:
+class Map(Record):
     """An image that a parameter is looked up in, within the parameter's range."""
 
     image: Floats  # (H, W, C)
@@ -115,16 +114,14 @@ class Map:
     within: Range
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Attribute:
+class Attribute(Record):
     """Values at the World's vertices that a parameter is interpolated from, within its range."""
 
     values: Floats  # (V, C)
     within: Range
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Varying:
+class Varying(Record):
     """What the materials' parameters vary by."""
 
     of_material: tuple[Mapping[str, Map | Attribute], ...] = ()  # by material number, by path
@@ -268,8 +265,7 @@ def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, int]) 
 # --- at points ------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Parameters:
+class Parameters(Record):
     """Values of the varying parameters at E points, each where its material is."""
 
     of_material: tuple[tuple[tuple[str, int], ...], ...]  # by number: path and width of what varies

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Ids, Lanes, Vectors, dot, rows
 from illumcli.frame import Frame
 from illumcli.lights._base import Light
+from illumcli.records import Record
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lit:
+class Lit(Record):
     """The lanes that a light reaches if nothing stands between, and what arrives there."""
 
     lane: Ids  # (K,) lanes with n.l > 0 and some light

@@ -8,7 +8,6 @@ asked about together. So on a convex surface of any fineness a group looks at so
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from illumcli.geometry.assemble import World
 from illumcli.geometry.order import compact
 from illumcli.rays.offsets import SHARE
 from illumcli.rays.surface import facets, facing
+from illumcli.records import Record
 
 FAN = 8
 GROUP = 64  # points asked about together
@@ -33,8 +33,7 @@ PROBES = 64
 CLEARLY = 1e-5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Slabs:
+class Slabs(Record):
     """A level of the tree: K round slabs."""
 
     centre: NDArray[np.float64]  # (K, 3)
@@ -44,8 +43,7 @@ class Slabs:
     width: NDArray[np.float64]  # (K,) radius across the axis
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Groups:
+class Groups(Record):
     """Planes that are nearly the same: those of group g hold every plane of its points.
 
     For a point o with normal n, and any x: n.(x - o) <= axis.(x - centre) + spread |x - centre| + room.

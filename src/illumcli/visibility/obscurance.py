@@ -8,7 +8,6 @@ own without splitting its rays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Lanes, Vectors, columns, dot, repeated, rows
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.rays.tracer import Tracer
+from illumcli.records import Record, Value
 from illumcli.visibility.falloffs._base import Falloff
 
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
@@ -29,8 +29,7 @@ MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Method:
+class Method(Record):
     """How w is estimated."""
 
     samples: int
@@ -46,8 +45,7 @@ class Method:
         return self.falloff.step and self.faces == "count"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Estimates:
+class Estimates(Record):
     """w at M points and what was seen on the way."""
 
     w: NDArray[np.float32]  # (M,) in [0, 1]
@@ -238,8 +236,7 @@ def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:
     return frame
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
+class Errors(Value):
     """The error law of a bake: standard error of w = sqrt(still + slope * unevenness) / samples.
 
     It is fitted to pairs of independent scrambles: half the squared difference of two estimates is an

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.readers._polygons import Ints
+from illumcli.records import Value
 
 PIECE = 1 << 22  # bytes cut into words at a time: Python's words need ten times the memory of their text
 PADDING = 8  # bytes that may be read behind the start of the last line
@@ -23,8 +23,7 @@ _COMMENT = re.compile(rb"#[^\n]*")
 _BLANKS = re.compile(rb"[ \t\r\v\f]*")
 
 
-@dataclass(frozen=True)
-class Text:
+class Text(Value):
     """The lines of a file that hold something: comments are left out, continued lines are joined.
 
     What is taken out is replaced by as many blanks, so an offset here is an offset in the file.
@@ -101,8 +100,7 @@ def keyword(word: bytes) -> int:
     return int.from_bytes(word, "little")
 
 
-@dataclass(frozen=True)
-class Block:
+class Block(Value):
     """Some lines of a text, one after the other."""
 
     text: Text

@@ -25,6 +25,7 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers._files import beside, content
 from illumcli.geometry.readers._polygons import Ints, check_range, polygons, starts_of, strip
+from illumcli.records import Value
 
 MOST_CORNERS = 1 << 28  # over all nodes: a mesh may be placed many times, and each is written out
 
@@ -112,8 +113,7 @@ def _shared(document: _Document, parts: list[_Part]) -> dict[str, NDArray[Any]]:
     return shared
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
+class _Part(Value):
     """One primitive at one node."""
 
     vertices: NDArray[np.float64]  # (V, 3) in world space

@@ -18,7 +18,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from illumcli.geometry.readers._color import linear
 from illumcli.geometry.readers._files import beside, content
 from illumcli.geometry.readers._polygons import Ints, polygons
 from illumcli.geometry.readers._text import Block, Text, keyword
+from illumcli.records import Value
 
 # statements that hold no polygons and change none; free-form geometry is counted in `repairs`
 _STATE = (
@@ -91,8 +92,7 @@ def read(path: Path) -> Mesh:
 _NAMES = {b"v": "vertices", b"vt": "texture coordinates", b"vn": "normals"}
 
 
-@dataclass(frozen=True)
-class _Statements:
+class _Statements(Value):
     """What the lines say that are neither vertices nor faces: (line, name) each, in order."""
 
     materials: list[tuple[int, str]] = field(default_factory=list)
@@ -234,8 +234,7 @@ def _place(faces: Block, corner: int) -> str:
     return faces.place(int(np.searchsorted(np.cumsum(faces.counts), corner, side="right")))
 
 
-@dataclass(frozen=True)
-class _Rows:
+class _Rows(Value):
     """What a face refers to: the lines that define the rows, how many, and what they are called."""
 
     lines: NDArray[np.intp]

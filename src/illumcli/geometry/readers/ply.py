@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import re
 import struct
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from illumcli.geometry.readers._color import linear
 from illumcli.geometry.readers._files import content
 from illumcli.geometry.readers._polygons import Ints, check_range, polygons, runs, starts_of, strip
 from illumcli.geometry.readers._text import Text
+from illumcli.records import Value
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -51,8 +51,7 @@ _COLOR = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_bl
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
-@dataclass(frozen=True, slots=True)
-class Lists:
+class Lists(Value):
     """A list property: the values of all rows one after the other, and how many each row has."""
 
     values: NDArray[Any]
@@ -62,15 +61,13 @@ class Lists:
 Column = NDArray[Any] | Lists
 
 
-@dataclass(frozen=True, slots=True)
-class Property:
+class Property(Value):
     name: str
     type: np.dtype[Any]
     count_type: np.dtype[Any] | None  # of a list's length; None for a single value
 
 
-@dataclass(frozen=True, slots=True)
-class Element:
+class Element(Value):
     name: str
     count: int
     properties: list[Property]

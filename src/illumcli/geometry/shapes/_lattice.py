@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors
 from illumcli.geometry.mesh import Mesh
+from illumcli.records import Record
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lattice:
+class Lattice(Record):
     """Nodes of R rows and C columns, each with its own normal and uv; equal numbers are one vertex.
 
     Normals stand to the side from which columns run to the right and rows upwards.

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._lattice import Lattice, around, vertex_numbers, woven
+from illumcli.records import Record
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Profile:
+class Profile(Record):
     """A curve in the half plane of the axis, travelled so that its outside lies to the right."""
 
     radius: NDArray[np.float64]  # (M,) 0 where the curve meets the axis, exactly

@@ -6,21 +6,20 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from illumcli.errors import ThresholdError
 from illumcli.jobs.stress import meshes, models, rays, scale, scenes
 from illumcli.jobs.stress.outcome import Room, Row
+from illumcli.records import Value
 
 __all__ = ["Result", "as_data", "as_table", "check", "run"]
 
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
+class Result(Value):
     """Every row, and what was looked at."""
 
     rows: tuple[Row, ...]
@@ -90,8 +89,8 @@ def summary(result: Result) -> str:
 
 def as_data(result: Result) -> dict[str, Any]:
     """The same for JSON."""
-    data = {name: getattr(result, name) for name in Result.__slots__ if name != "rows"}
-    cases = [{name: getattr(row, name) for name in Row.__slots__} for row in result.rows]
+    data = {name: value for name, value in vars(result).items() if name != "rows"}
+    cases = [vars(row) for row in result.rows]
     return {**data, "failed": result.failed, "cases": cases}
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import IllumError, InputError, LimitError
+from illumcli.records import Value
 
 LAYERS = (
     "beauty", "ambient", "diffuse", "specular", "lights", "shadows", "obscurance", "alpha", "depth",
@@ -24,8 +24,7 @@ SIGNED = ("P", "N", "Ng", "uv")
 Channels = dict[str, NDArray[np.float32]]
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+class Row(Value):
     """One line of the table."""
 
     case: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,13 +11,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from illumcli.arrays import Lanes, Vectors, columns
 from illumcli.errors import InputError
+from illumcli.records import Value
 from illumcli.variants import suggestion
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Inputs:
+class Inputs(Value):
     """The inputs of a case by key; what is missing or of the wrong kind is an InputError at `place`.
 
     `dtype` is the precision of every array handed out. The keys in `rounded` pass through float32 first, so

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.jobs.verify.vectors import Case
+from illumcli.records import Record, Value
 
 STANDARD_ERRORS = 4.5
 """An estimate further off than this many of its own standard errors fails; one in 150 000 does by chance."""
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(Value):
     """A Monte Carlo value and its own standard error."""
 
     value: float
     standard_error: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class Outcome(Record):
     """A case's error, and the largest that passes, in the same unit."""
 
     case: Case
@@ -39,8 +37,7 @@ class Outcome:
         return self.error <= self.allowed
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Row:
+class Row(Record):
     """One case type: its outcomes, summed up."""
 
     type: str

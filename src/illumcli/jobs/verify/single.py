@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from illumcli.jobs.verify.outcome import Outcome, judge
 from illumcli.jobs.verify.vectors import Case
+from illumcli.records import Record
 
 FINE = 1e-5
 """Relative error that float32 keeps where nothing cancels."""
@@ -19,8 +19,7 @@ Evaluate = Callable[..., Any]
 """Case and precision to values."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Loss:
+class Loss(Record):
     """A case that float32 gets wrong by more than `FINE`."""
 
     outcome: Outcome
@@ -31,8 +30,7 @@ class Loss:
     """What matters of the case's inputs, in short."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SingleRow:
+class SingleRow(Record):
     """One case type in float32."""
 
     type: str

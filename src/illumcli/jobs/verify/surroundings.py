@@ -9,12 +9,12 @@ so a ray that hits the surface it started from would show.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.jobs.verify.inputs import Inputs
+from illumcli.records import Record
 
 ENDLESS = 1e5  # size of walls without an end, in distances to the wall
 LONG = 1e2  # length of walls of a finite height: what is missing shrinks with the third power
@@ -22,8 +22,7 @@ WIDE = 3e2  # half width of plates without an end, in heights; they get side wal
 SIDES = 256  # corners of the polygon that stands for a circle
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
+class Surroundings(Record):
     """Triangles around a receiver at the origin that faces +z."""
 
     vertices: NDArray[np.float64]  # (V, 3)

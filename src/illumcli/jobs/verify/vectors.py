@@ -11,7 +11,6 @@ import gzip
 import json
 import lzma
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.records import Record
 from illumcli.variants import suggestion
 
 PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
@@ -30,8 +30,7 @@ SHOWN = 10
 OPENERS: dict[str, Callable[..., Any]] = {".xz": lzma.open, ".gz": gzip.open}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Case:
+class Case(Record):
     """One set of inputs and what must come out."""
 
     id: str

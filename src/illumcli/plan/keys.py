@@ -7,6 +7,7 @@ itself says that a colour changes no hit, and that a lamp's place changes that l
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib import import_module
@@ -67,11 +68,14 @@ def code() -> str:
     """
     features: dict[str, bool] = import_module("numpy._core._multiarray_umath").__cpu_features__
     digest = hashlib.blake2b(digest_size=16)
-    root = Path(__file__).parents[1]
+    root = os.path.dirname(os.path.dirname(__file__))
     for name in MAKERS:
-        place = root / name
-        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes())
+        place = os.path.join(root, name)
+        found = [os.path.join(folder, each) for folder, _, files in os.walk(place) for each in files]
+        for path in sorted(found or [place]):
+            if path.endswith(".py"):
+                with open(path, "rb", buffering=0) as source:
+                    digest.update(f"{path[len(root) :]}\0".encode() + source.read())
     libraries = [numpy.__version__, *_installed("embreex")]
     digest.update(repr((libraries, sorted(name for name, has in features.items() if has))).encode())
     return digest.hexdigest()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
 
 from pydantic_core import CoreSchema, core_schema
 
@@ -173,7 +173,7 @@ class By(Value):
 
     def _tag(self, part: Any) -> str:
         if isinstance(self.key, str):
-            return get_args(get_type_hints(part)[self.key])[0]
+            return str(get_args(part.fields()[self.key].kind)[0])
         return next(mark.tag for mark in part.__metadata__ if isinstance(mark, Tag))
 
 

@@ -74,8 +74,19 @@ def everywhere(light, frame, position, n=None):
     return arriving.Lit(lane, len(position), got.l, got.distance, strength)
 
 
-def dimmed(lit, shadow):
+def asked(light, frame, points, shadow):
+    """Every lane that is not in shadow, those that get nothing with strength 0."""
+    lit = everywhere(light, frame, points.position, points.n)
+    free = np.flatnonzero(shadow)
+    lane, l, distance, strength = (
+        arriving.rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength)
+    )
+    return arriving.Lit(lane, lit.count, l, distance, strength)
+
+
+def dimmed(light, frame, points, shadow):
     """Every lit point is evaluated, those in shadow with strength 0."""
+    lit = arriving.lit(light, frame, points.position, points.n)
     return replace(lit, strength=lit.strength * shadow.take(lit.lane))
 
 
@@ -96,7 +107,7 @@ plan_module = import_module("illumcli.plan.plan")
 AMBIENT = ((recipes, "is_ambient", yes), (plan_module, "is_ambient", yes))
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
-    Skip("points a light does not reach", (), ((stages, "lit_lanes", everywhere),)),
+    Skip("points a light does not reach", (), ((stages, "lit_lanes", everywhere), (stages, "free", asked))),
     Skip("points in shadow", (), ((stages, "free", dimmed),)),
     Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),

@@ -401,7 +401,7 @@ def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) ->
     opened = []
     if at_samples and light.shadows:  # what lies in shadow is not evaluated at all
         arriving, way = f"free:{name}", {}
-        opened = [Recipe.of(stages.free, arriving, lit=lit, shadow=shadow)]
+        opened = [Recipe.of(partial(stages.free, place), arriving, shadow=shadow)]
     return [
         *opened,
         Recipe.of(partial(stages.lit, place), lit),

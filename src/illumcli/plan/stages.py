@@ -36,7 +36,7 @@ from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
 from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
-from illumcli.visibility.arriving import Lit, among
+from illumcli.visibility.arriving import Lit, reaching
 from illumcli.visibility.arriving import lit as lit_lanes
 from illumcli.visibility.horizon import OpenFacets
 from illumcli.visibility.obscurance import Method, estimates
@@ -449,9 +449,12 @@ def same(lit: Lit) -> Lit:
     return lit
 
 
-def free(lit: Lit, shadow: Lanes) -> Lit:
-    """The lit points that are not in shadow, where points are samples."""
-    return among(lit, np.flatnonzero(shadow.take(lit.lane)))
+def free(light: Light, frame: Frame, points: Points, shadow: Lanes) -> Lit:
+    """The points that a light reaches and that are not in shadow, where points are samples.
+
+    The shadow alone says which: it is 0 where the light does not reach.
+    """
+    return reaching(light, frame, points.position, np.flatnonzero(shadow != 0))
 
 
 def shadow_origins(world: World, hits: Hits, facets: Facets, normals: CornerVectors | None = None) -> Vectors:

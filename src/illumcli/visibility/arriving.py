@@ -31,19 +31,17 @@ def lit(light: Light, frame: Frame, position: Vectors, n: Vectors | None = None)
     reached = arriving.strength > 0
     if n is not None:
         reached &= dot(n, arriving.l) > 0
-    everywhere = Lit(
-        np.arange(len(position), dtype=np.int32),
-        len(position),
-        arriving.l,
-        arriving.distance,
-        arriving.strength,
-    )
-    return among(everywhere, np.flatnonzero(reached))
+    count = len(position)
+    if reached.all():
+        lane = np.arange(count, dtype=np.int32)
+        return Lit(lane, count, arriving.l, arriving.distance, arriving.strength)
+    lane = np.flatnonzero(reached).astype(np.int32)
+    parts = (rows(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
+    return Lit(lane, count, *parts)
 
 
-def among(lit: Lit, which: NDArray[np.intp]) -> Lit:
-    """Some of the lit lanes, by their row in `lit`."""
-    if len(which) == len(lit.lane):
-        return lit
-    parts = rows(lit.l, which), lit.distance.take(which), lit.strength.take(which)
-    return Lit(lit.lane.take(which), lit.count, *parts)
+def reaching(light: Light, frame: Frame, position: Vectors, lanes: NDArray[np.intp]) -> Lit:
+    """These lanes, which are known to be lit, in ascending order."""
+    count = len(position)
+    arriving = light.arriving(position if len(lanes) == count else rows(position, lanes), frame)
+    return Lit(lanes.astype(np.int32), count, arriving.l, arriving.distance, arriving.strength)

@@ -26,13 +26,15 @@ def from_srgb(display: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     return np.where(display <= 0.04045, display / 12.92, ((bright + 0.055) / 1.055) ** 2.4)
 
 
-def refuse_nonfinite(band: NDArray[Any], channels: Sequence[str], place: str, y0: int = 0) -> None:
+def refuse_nonfinite(
+    band: NDArray[Any], channels: Sequence[str], place: str, y0: int = 0, x0: int = 0
+) -> None:
     """Nothing, where all of `band` is finite.
 
     Parameters
     ----------
     band : (h, W, C) float
-        Whole rows of an image, `y0` the number of the first.
+        Of an image, `y0` and `x0` the numbers of its first row and column.
     channels : C names
     place : str
         What the error begins with, such as a file name.
@@ -49,7 +51,7 @@ def refuse_nonfinite(band: NDArray[Any], channels: Sequence[str], place: str, y0
     for c, channel in enumerate(channels):
         rows, places = np.nonzero(wrong[..., c])
         if len(rows):
-            first = f"the first at x {places[0]}, y {y0 + rows[0]}"
+            first = f"the first at x {x0 + places[0]}, y {y0 + rows[0]}"
             facts.append(f"{place}: channel {channel}: NaN or infinite in {len(rows)} pixels, {first}")
     facts[-1] += "; nothing is written: render the layers one by one (--only) to find where they come from"
     raise IllumError("\n".join(facts))

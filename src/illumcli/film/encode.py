@@ -14,7 +14,12 @@ NAMES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 
 def picture(
-    band: NDArray[np.float32], exposure: float = 0.0, bits: int = 8, place: str = "picture", y0: int = 0
+    band: NDArray[np.float32],
+    exposure: float = 0.0,
+    bits: int = 8,
+    place: str = "picture",
+    y0: int = 0,
+    x0: int = 0,
 ) -> NDArray[np.unsignedinteger[Any]]:
     """(h, W, C) uint8, or uint16 for 16 bits: `band` as a PNG stores it.
 
@@ -27,8 +32,8 @@ def picture(
         Linear; C is 1 (Y), 2 (Y A), 3 (R G B) or 4 (R G B A), premultiplied where there is an alpha.
     exposure : float
         Light is multiplied by 2**exposure [stops].
-    place, y0
-        Name of the picture and number of the band's first row, for the error.
+    place, y0, x0
+        Name of the picture and numbers of the band's first row and column, for the error.
 
     Raises
     ------
@@ -36,14 +41,18 @@ def picture(
         NaN or Inf in `band`.
     """
     names = NAMES[band.shape[-1]]
-    refuse_nonfinite(band, names, place, y0)
+    refuse_nonfinite(band, names, place, y0, x0)
     encode = srgb8 if bits == 8 else srgb16
-    if names[-1] != "A":
-        return encode(exposed(band, exposure))
-    alpha = np.clip(band[..., -1:], 0, 1)
-    color = encode(exposed(unpremultiplied(band[..., :-1], alpha), exposure))
-    top = np.iinfo(color.dtype).max
-    return np.concatenate([color, np.rint(alpha * top).astype(color.dtype)], axis=-1)
+    out = np.empty(band.shape, np.uint8 if bits == 8 else np.uint16)
+    color = band
+    if names[-1] == "A":
+        alpha = np.clip(band[..., -1:], 0, 1)
+        color = unpremultiplied(band[..., :-1], alpha)
+        out[..., -1] = np.rint(alpha[..., 0] * np.iinfo(out.dtype).max)
+    light = exposed(color, exposure)
+    for c in range(light.shape[-1]):  # layers are kept channel by channel
+        out[..., c] = encode(light[..., c])
+    return out
 
 
 def exposed(linear: NDArray[np.float32], stops: float) -> NDArray[np.float32]:
@@ -68,8 +77,9 @@ def srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     so one comparison with the next border decides.
     """
     steps, borders = _tables()
-    step = steps[np.ascontiguousarray(linear, np.float32).view(np.uint32) >> 16]
-    return step + (linear >= borders[step])
+    linear = np.ascontiguousarray(linear, np.float32)
+    interval = (linear.view(np.uint32) >> 16).astype(np.intp)
+    return steps.take(interval, mode="wrap") + (linear >= borders.take(interval, mode="wrap"))
 
 
 def srgb16(linear: NDArray[np.float32]) -> NDArray[np.uint16]:
@@ -79,10 +89,10 @@ def srgb16(linear: NDArray[np.float32]) -> NDArray[np.uint16]:
 
 @cache
 def _tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """(65536,) step at the lower end of each interval; (256,) the smallest float32 of each next step."""
+    """(65536,) step at the lower end of each interval, and the smallest float32 of the step after it."""
     exact = from_srgb((np.arange(1, 256) - 0.5) / 255)
     near = exact.astype(np.float32)
     borders = np.where(near < exact, np.nextafter(near, np.float32(np.inf)), near)
     ends = (np.arange(65536, dtype=np.uint32) << 16).view(np.float32)
     steps = np.searchsorted(borders, np.fmax(ends, 0), side="right").astype(np.uint8)
-    return steps, np.append(borders, np.float32(np.nan))  # after 255 comes nothing
+    return steps, np.append(borders, np.float32(np.nan)).take(steps)  # after 255 comes nothing

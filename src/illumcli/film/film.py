@@ -25,14 +25,14 @@ def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: in
     Summed in float64; a pixel's samples always stand together, so that tiles change nothing.
     """
     values = values if values.ndim == 2 else values[:, None]
-    if samples == 1:
-        out = np.zeros((pixels, values.shape[1]), F)
-        out[lane] = values
-        return out
-    planes = values.T
+    planes = np.asarray(values.T, F)
     if len(lane) < pixels * samples:
         planes = np.zeros((values.shape[1], pixels * samples), F)
-        planes[:, lane] = values.T
+        where = lane.astype(np.intp)
+        for plane, seen in zip(planes, values.T, strict=True):
+            plane[where] = seen
+    if samples == 1:
+        return planes.T
     by_pixel = planes.reshape(len(planes), pixels, samples)
     return by_pixel.mean(axis=2, dtype=np.float64).T.astype(F)
 

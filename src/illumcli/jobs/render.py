@@ -25,11 +25,11 @@ from illumcli.film.film import Layer
 from illumcli.film.preview import viewable
 from illumcli.jobs.limits import refuse_disk, refuse_memory
 from illumcli.plan.artifacts import Artifacts, Memory
-from illumcli.plan.execute import Band, Tally, bands, run_once
+from illumcli.plan.execute import Planes, Tally, bands, run_once
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
 from illumcli.plan.recipes import View
-from illumcli.plan.stages import MOST
+from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
 from illumcli.scene.load import Loaded, load
@@ -351,12 +351,17 @@ def _render_view(
     """Write one view's files band by band; how many values were beyond half's range."""
     from illumcli.files.images import ImageWriter
 
+    frame = shared["frame"]
     done, pixels = 0, view.width * view.height
 
     def advance(count: int) -> None:
         nonlocal done
         done += count
         progress(view.name, done, pixels)
+
+    def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
+        made = {str(target.path): pixels_of(scene, target, tile, layers, frame) for target in targets}
+        return made | ({"error": layers["error"]} if "error" in layers else {})
 
     with ExitStack() as files:
         writers = [
@@ -367,12 +372,12 @@ def _render_view(
             )
             for target in targets
         ]
-        for band in bands(steps, shared, view, threads, tally, advance, artifacts=artifacts):
+        for band in bands(steps, shared, view, threads, tally, advance, None, artifacts, develop):
             start = time.perf_counter()
             if "error" in band.layers:
                 sums.add(band.layers["error"])
             for target, writer in zip(targets, writers, strict=True):
-                writer.write_band(band.y, pixels_of(scene, target, band, shared["frame"]))
+                writer.write_band(band.y, band.layers[str(target.path)])
             tally.add({"write": time.perf_counter() - start}, {})
         start = time.perf_counter()
         clamped = sum(writer.close().clamped for writer in writers)
@@ -405,16 +410,17 @@ def _channels(scene: Any, layer: Layer) -> tuple[str, ...]:
     )
 
 
-def pixels_of(scene: Any, target: Target, band: Band, frame: Any) -> NDArray[Any]:
-    """(rows, width, channels) of one file, as its writer takes them."""
-    parts = {layer.name: composed(scene, layer, band) for layer in target.layers}
+def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any) -> NDArray[Any]:
+    """(rows, columns, channels) of one file's tile, as its writer takes them."""
+    parts = {layer.name: composed(scene, layer, layers) for layer in target.layers}
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]
         camera = target.view.camera
         distance = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
         scale = frame.radius if layer.name == "position" else distance
         shown = viewable(layer.name, parts[layer.name], scale, frame.centre)
-        return picture(shown, 0.0 if layer.data else scene.film.exposure, 8, str(target.path), band.y)
+        exposure = 0.0 if layer.data else scene.film.exposure
+        return picture(shown, exposure, 8, str(target.path), tile.y, tile.x)
     seen: dict[str, NDArray[np.float32]] = {}
     for layer in _beauty_first(target.layers):
         for k, name in enumerate(_channels(scene, layer)):
@@ -422,15 +428,17 @@ def pixels_of(scene: Any, target: Target, band: Band, frame: Any) -> NDArray[Any
     return np.stack(list(seen.values()), axis=-1)
 
 
-def composed(scene: Any, layer: Layer, band: Band) -> NDArray[np.float32]:
-    """The layer's rows; the beauty over its background, or with its alpha where there is none."""
-    values = band.layers[layer.name]
+def composed(scene: Any, layer: Layer, layers: Planes) -> NDArray[np.float32]:
+    """The layer's pixels; the beauty over its background, or with its alpha where there is none."""
+    values = layers[layer.name]
     if layer.buffer != "beauty":
         return values
-    alpha = band.layers["alpha"]
+    alpha = layers["alpha"]
     if scene.film.background is None:
         return np.concatenate([values, alpha], axis=-1)
-    return values + (1 - alpha) * np.asarray(scene.film.background, np.float32)
+    background = np.asarray(scene.film.background, np.float32)
+    behind = background[:, None, None] * (1 - alpha[..., 0])  # channel by channel, as layers are kept
+    return values + np.moveaxis(behind, 0, -1)
 
 
 def metadata(scene: Any, target: Target) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, columns
+from illumcli.arrays import columns
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.film import pixel_means, pixel_nearest
 from illumcli.memory import keep_freed_memory
@@ -27,6 +27,8 @@ from illumcli.visibility.arriving import Lit
 
 Planes: TypeAlias = dict[str, NDArray[np.float32]]  # layer -> (rows, columns, channels)
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
+Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
+"""A tile and its layers to what is wanted of it, (rows, columns, channels) by name; any thread."""
 
 
 @dataclass(slots=True)
@@ -59,7 +61,25 @@ class Band(Record):
     """Finished rows of a picture."""
 
     y: int
-    layers: Mapping[str, NDArray[np.float32]]  # layer -> (rows, width, channels)
+    layers: Mapping[str, NDArray[Any]]  # layer, or what was made of them -> (rows, width, channels)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Common:
+    """What the tiles of a picture have in common."""
+
+    plan: Plan
+    shared: Mapping[str, Any]
+    view: View
+    tally: Tally
+    stop: threading.Event
+    keeper: Keeper
+    develop: Develop
+    last_use: Mapping[str, int]
+
+
+def _as_they_are(tile: Tile, layers: Planes) -> Planes:
+    return layers
 
 
 def run_once(plan: Plan, tally: Tally, artifacts: Artifacts | None = None) -> dict[str, Any]:
@@ -89,11 +109,13 @@ def bands(
     done: Callable[[int], None] = lambda pixels: None,
     side: int | None = None,
     artifacts: Artifacts | None = None,
+    develop: Develop = _as_they_are,
 ) -> Iterator[Band]:
     """A view's picture as bands of rows from the top, each as soon as its tiles are done.
 
-    The pixels do not depend on `threads`, `side` or `artifacts`, where what is worth it is kept. When the
-    consumer stops or is interrupted, tiles in flight end at their next step.
+    Bands hold the layers, or what `develop` makes of them tile by tile. The pixels do not depend on
+    `threads`, `side` or `artifacts`, where what is worth it is kept. When the consumer stops or is
+    interrupted, tiles in flight end at their next step.
     """
     adaptive = view.is_adaptive
     side = plan.tile_side(view.coarse() if adaptive else view, side)
@@ -106,33 +128,25 @@ def bands(
         for y in range(0, view.height, side)
     ]
     ahead = threads + 1
-    last_use = plan.last_use()
-    covered = any(step.makes == "alpha" for step in plan.tile)
     keeper = Keeper(artifacts or Artifacts(), {} if adaptive else plan.keeps, view)
+    common = _Common(plan, shared, view, tally, stop, keeper, develop, plan.last_use())
     make = _adaptive_tile if adaptive else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
-            pending: list[tuple[Tile, Future[tuple[Planes, Kept]]]] = []
+            pending: list[tuple[Tile, Future[tuple[Mapping[str, NDArray[Any]], Kept]]]] = []
             queue = iter([tile for row in tiles for tile in row])
 
             def submit() -> None:
                 for tile in queue:
-                    pending.append(
-                        (tile, pool.submit(make, plan, shared, view, tile, last_use, tally, stop, keeper))
-                    )
+                    pending.append((tile, pool.submit(make, common, tile)))
                     if len(pending) >= ahead + len(tiles[0]):
                         break
 
             submit()
             for row in tiles:
                 height = row[0].height
-                whole = {
-                    layer.name: np.empty((height, view.width, len(layer.channels)), F)
-                    for layer in plan.layers
-                }
-                if covered:
-                    whole.setdefault("alpha", np.empty((height, view.width, 1), F))
+                whole: dict[str, NDArray[Any]] = {}
                 kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
@@ -141,6 +155,8 @@ def bands(
                         pass
                     layers, others = future.result()
                     for name, values in layers.items():
+                        if name not in whole:
+                            whole[name] = np.empty((height, view.width, values.shape[2]), values.dtype)
                         whole[name][:, tile.x : tile.x + tile.width] = values
                     for name, packed in others.items():
                         kept[name].append(packed)
@@ -167,13 +183,11 @@ def at_pixels(
     """Layer -> (K, channels) at K pixels of a view: what `bands` makes there, and nothing else is made."""
     some = max(1, MOST // view.samples)
     tiles = [Scattered.at(x[a : a + some], y[a : a + some]) for a in range(0, len(x), some)]
-    last_use, keeper = plan.last_use(), Keeper(Artifacts(), {}, view)
-    stop = threading.Event()
+    stop, keeper = threading.Event(), Keeper(Artifacts(), {}, view)
+    common = _Common(plan, shared, view, tally, stop, keeper, _as_they_are, plan.last_use())
     with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
         try:
-            made = [
-                pool.submit(_tile, plan, shared, view, tile, last_use, tally, stop, keeper) for tile in tiles
-            ]
+            made = [pool.submit(_tile, common, tile) for tile in tiles]
             parts = [future.result()[0] for future in made]
         finally:
             stop.set()
@@ -181,42 +195,24 @@ def at_pixels(
     return {name: np.concatenate([part[name][0] for part in parts]) for name in parts[0]}
 
 
-def _tile(
-    plan: Plan,
-    shared: Mapping[str, Any],
-    view: View,
-    tile: Tile,
-    last_use: Mapping[str, int],
-    tally: Tally,
-    stop: threading.Event,
-    keeper: Keeper,
-) -> tuple[Planes, Kept]:
-    """Every layer of one tile, (rows, columns, channels) each, and what is kept of its buffers."""
-    buffers, kept = _made(plan, shared, view, tile, last_use, tally, stop, keeper)
+def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
+    """What is wanted of one tile, and what is kept of its buffers."""
+    buffers, kept = _made(common, common.view, tile)
     start = time.perf_counter()
-    out = _pixels(plan, buffers, view, tile)
-    tally.add({"film": time.perf_counter() - start}, {})
+    out = common.develop(tile, _pixels(common.plan, buffers, common.view, tile))
+    common.tally.add({"film": time.perf_counter() - start}, {})
     return out, kept
 
 
-def _made(
-    plan: Plan,
-    shared: Mapping[str, Any],
-    view: View,
-    tile: Tile,
-    last_use: Mapping[str, int],
-    tally: Tally,
-    stop: threading.Event,
-    keeper: Keeper,
-) -> tuple[dict[str, Any], Kept]:
-    """The buffers of one tile that the film reads, and what is kept of them all."""
-    buffers: dict[str, Any] = {**shared, "view": view, "tile": tile}
+def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
+    """The buffers of one tile that the film reads, and what is kept of them all; `view` has its samples."""
+    buffers: dict[str, Any] = {**common.shared, "view": view, "tile": tile}
     tracer = None
-    if "tracer" in shared:
-        tracer = buffers["tracer"] = shared["tracer"].counting(stop)
+    if "tracer" in common.shared:
+        tracer = buffers["tracer"] = common.shared["tracer"].counting(common.stop)
     seconds, rays, lanes, kept = {}, {}, {}, {}
-    for number, step in enumerate(plan.tile):
-        if stop.is_set():
+    for number, step in enumerate(common.plan.tile):
+        if common.stop.is_set():
             raise Interrupted
         start, before = time.perf_counter(), tracer.rays if tracer else 0
         made = buffers[step.makes] = step.make(buffers)
@@ -225,33 +221,25 @@ def _made(
             rays[step.makes] = tracer.rays - before
         if isinstance(made, Lit):
             lanes[step.makes] = made.count - len(made.lane)
-        if step.makes in keeper.names:
-            kept[step.makes] = keeper.take(step.makes, buffers, tile)
+        if step.makes in common.keeper.names:
+            kept[step.makes] = common.keeper.take(step.makes, buffers, tile)
         for name in step.needs.values():
-            if last_use.get(name) == number:
+            if common.last_use.get(name) == number:
                 buffers.pop(name, None)
-    tally.add(seconds, rays, lanes)
+    common.tally.add(seconds, rays, lanes)
     return buffers, kept
 
 
-def _adaptive_tile(
-    plan: Plan,
-    shared: Mapping[str, Any],
-    view: View,
-    tile: Tile,
-    last_use: Mapping[str, int],
-    tally: Tally,
-    stop: threading.Event,
-    keeper: Keeper,
-) -> tuple[Planes, Kept]:
-    """Every layer of one tile: of few samples, and of all of them where it differs among these.
+def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
+    """What is wanted of one tile: of few samples, and of all of them where it differs among these.
 
     The few are taken of a border of one pixel too, so that a pixel sees the same neighbours in any tile. Each
     layer decides for itself, by the shapes seen and its own values: no layer depends on what others are asked
     for.
     """
+    plan, view, tally = common.plan, common.view, common.tally
     few, around = view.coarse(), tile.grown(view.width, view.height)
-    buffers, _ = _made(plan, shared, few, around, last_use, tally, stop, keeper)
+    buffers, _ = _made(common, few, around)
     start = time.perf_counter()
     own = (
         slice(tile.y - around.y, tile.y - around.y + tile.height),
@@ -268,7 +256,7 @@ def _adaptive_tile(
     for first in range(0, len(down), some):
         y, x = down[first : first + some], across[first : first + some]
         part = Scattered.at(x + tile.x, y + tile.y)
-        others, _ = _made(plan, shared, rest, part, last_use, tally, stop, keeper)
+        others, _ = _made(common, rest, part)
         start = time.perf_counter()
         pixel = (part.rows - around.y) * around.width + part.columns - around.x
         joined = _joined(plan, buffers, others, pixel)
@@ -281,7 +269,7 @@ def _adaptive_tile(
     tally.add({}, {}, {"samples": pixels * view.samples - taken})
     with tally.lock:
         tally.refined += refined
-    return out, {}
+    return common.develop(tile, out), {}
 
 
 def _joined(

@@ -73,7 +73,7 @@ def compared(what: str, scene: Path, *overrides: str) -> dict[str, Run]:
 
 def left(folder: Path, what: str, runs: dict[str, Run]) -> None:
     """Write pictures to look at."""
-    from illumcli.files.images import ImageWriter
+    from illumcli.files.writer import ImageWriter
     from illumcli.film.encode import picture
 
     full, adaptive, few = (

@@ -15,16 +15,8 @@ from hypothesis import strategies as st
 
 from illumcli.errors import IllumError, InputError, OutputError
 from illumcli.files import images
-from illumcli.files.images import (
-    ImageWriter,
-    channel_types,
-    flip,
-    layers,
-    read_image,
-    read_metadata,
-    read_texture,
-    write_sheet,
-)
+from illumcli.files.images import flip, layers, read_image, read_metadata, read_texture, write_sheet
+from illumcli.files.writer import ImageWriter, channel_types
 
 LAYERED = ("R", "G", "B", "A", "Z", "P.X", "P.Y", "P.Z", "N.X", "key.R", "objectId")
 
@@ -93,10 +85,9 @@ def test_png_gives_back_every_value(tmp_path, names, kind):
 @pytest.mark.parametrize("rows", [1, 7, 16, 40])
 def test_bands_make_the_same_file_as_the_whole(tmp_path, rows):
     pixels, types = noise(53, 31, len(LAYERED)), channel_types(LAYERED)
-    whole = write(tmp_path / "whole.exr", pixels, types)
-    bands = write(tmp_path / "bands.exr", pixels, types, rows)
+    write(tmp_path / "whole.exr", pixels, types)
+    write(tmp_path / "bands.exr", pixels, types, rows)
     assert (tmp_path / "whole.exr").read_bytes() == (tmp_path / "bands.exr").read_bytes()
-    assert whole.pixels == bands.pixels
     integers = (np.abs(pixels[..., :3]) * 50).astype(np.uint8)
     write(tmp_path / "whole.png", integers, dict.fromkeys("RGB", "uint8"))
     write(tmp_path / "bands.png", integers, dict.fromkeys("RGB", "uint8"), rows)
@@ -117,7 +108,6 @@ def test_what_was_written_is_reported(tmp_path):
     assert written.path == tmp_path / "a.exr"
     assert written.bytes == (tmp_path / "a.exr").stat().st_size
     assert written.clamped == 0
-    assert len(written.pixels) == 64
 
 
 def test_colour_beyond_half_is_clamped_and_counted(tmp_path):
@@ -245,20 +235,10 @@ def test_interrupt_leaves_no_debris(tmp_path, stop):
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize("silent", [True, False])
-def test_a_picture_that_is_given_up_says_nothing_by_itself(tmp_path, capfd, monkeypatch, silent):
-    if not silent:  # without a handle for it what libpng prints is heard
-
-        def refused(handle):
-            raise OSError(24, "Too many open files")
-
-        monkeypatch.setattr(images.os, "dup", refused)
-    ImageWriter(tmp_path / "a.png", 8, 8, {"Y": "uint8"}).discard()
-    monkeypatch.undo()
-    os.write(2, b"heard again\n")
-    said = capfd.readouterr().err
-    assert said.endswith("heard again\n")
-    assert (said == "heard again\n") == silent
+@pytest.mark.parametrize("name", ["a.exr", "a.png"])
+def test_a_picture_that_is_given_up_says_nothing_by_itself(tmp_path, capfd, name):
+    ImageWriter(tmp_path / name, 8, 8, {"Y": "uint8" if name == "a.png" else "half"}).discard()
+    assert capfd.readouterr().err == ""
     assert os.listdir(tmp_path) == []
 
 
@@ -371,7 +351,7 @@ FULL_DISK = """
     import os, resource, sys
     import numpy as np
     from illumcli.errors import OutputError
-    from illumcli.files.images import ImageWriter
+    from illumcli.files.writer import ImageWriter
 
     folder, name = sys.argv[1:]
     pixels, kind = np.random.default_rng(0).random((256, 256, 3)).astype(np.float32), "half"

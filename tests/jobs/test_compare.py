@@ -10,7 +10,8 @@ import OpenImageIO as oiio
 import pytest
 
 from illumcli.errors import InputError, ThresholdError
-from illumcli.files.images import ImageWriter, channel_types, read_image, read_metadata
+from illumcli.files.images import read_image, read_metadata
+from illumcli.files.writer import ImageWriter, channel_types
 from illumcli.jobs.compare import LIMITS, as_data, as_table, check, run
 
 NAMES = ("R", "G", "B", "A", "Z", "key.R", "key.G", "key.B")

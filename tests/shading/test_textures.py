@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.files.images import ImageWriter
+from illumcli.files.writer import ImageWriter
 from illumcli.jobs.check import run as check
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar

@@ -1,8 +1,8 @@
-"""Images on disk, through OpenImageIO: written by bands and read back, layers, metadata, textures, FLIP.
+"""Images through OpenImageIO: EXR written, any format read, layers, metadata, textures, FLIP.
 
 OpenImageIO says True for files that a full disk cut short, so an image counts as written only when every
-pixel, read back from the part file, hashes to what was handed over. Only EXR and PNG are written: the JPEG
-and TIFF libraries may end the process on a full disk. A process must not fork once this module has written.
+pixel, read back from the part file, hashes to what was handed over. The JPEG and TIFF libraries may end the
+process on a full disk: neither is written. A process must not fork once this module has written.
 """
 
 from __future__ import annotations
@@ -10,45 +10,29 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, Literal, Self
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import Part
-from illumcli.pixels import from_srgb, refuse_nonfinite
-from illumcli.records import Record, Value
+from illumcli.errors import InputError
+from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, no_utf8, shown
+from illumcli.pixels import from_srgb
+from illumcli.records import Record
 
-LARGEST_HALF = 65504.0
 SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
 READ_ROWS = 64  # rows held at once while reading back
-ChannelType: TypeAlias = Literal["half", "float", "uint8", "uint16"]
-Metadata: TypeAlias = Mapping[str, Any]
 
-_DTYPES = {"half": np.float16, "float": np.float32, "uint8": np.uint8, "uint16": np.uint16}
-_KINDS = {".exr": ("openexr", {"half", "float"}), ".png": ("png", {"uint8", "uint16"})}
-_HINTS: dict[str, Metadata] = {
+_HINTS: Mapping[str, Any] = {
     # measured on a render of 12 layers: zip at level 1 is as small as at 4 and as fast as none
+    "compression": "zip:1",
     # the colour space by the attribute the header keeps: oiio:ColorSpace costs 30 ms to look its name up
-    ".exr": {"compression": "zip:1", "colorInteropID": "lin_rec709_scene", "DateTime": ""},
-    ".png": {  # sRGB unless said otherwise
-        "png:compressionLevel": 1,
-        "png:filter": 16,  # differences to the left pixel
-        "oiio:UnassociatedAlpha": 1,  # values go to the file as they are
-        "DateTime": "",  # no time of day: equal renders are equal files
-    },
+    "colorInteropID": "lin_rec709_scene",
+    "DateTime": "",  # no time of day: equal renders are equal files
 }
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-
-
-def channel_types(names: Sequence[str], colour: Literal["half", "float"] = "half") -> dict[str, ChannelType]:
-    """Channel name -> its type in an EXR: `colour` for R G B A of any layer, float for all other data."""
-    return {name: colour if name.rpartition(".")[2] in tuple("RGBA") else "float" for name in names}
 
 
 def layers(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -60,187 +44,82 @@ def layers(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-class Written(Value):
-    """An image that is on disk under its name."""
-
-    path: Path
-    bytes: int
-    clamped: int  # values beyond the largest half, 65504, written as +-65504
-    pixels: str  # BLAKE2b-256 of every value as stored, row by row, channels in the order given
-
-
-class ImageWriter:
-    """Writes one image from top to bottom, holding no more of it than the band at hand.
+class ExrFile:
+    """Rows to an EXR file of one part.
 
     Parameters
     ----------
-    path
-        Ends in `.exr` or `.png`.
-    channels : mapping of name to type, in the order of the bands' last axis
-        EXR: half or float, any names. PNG: uint8 or uint16, one type, named Y, Y A, R G B or R G B A.
+    channels : mapping of name to `half` or `float`
     metadata : mapping of name to number, text or tuple of them
-        EXR keeps integers of 32 bits, floats in single precision, texts and tuples of one kind; larger
-        integers become text. PNG keeps text alone.
+        Integers of 32 bits, floats in single precision, texts and tuples of one kind stay what they are;
+        larger integers become text.
 
     Raises
     ------
-    InputError
-        Another suffix.
-    OutputError
-        Here, in `write_band` and in `close`: the file cannot be written. No part of it stays behind.
+    Refused
+        Here and in `write` and `close`: why the file cannot be written.
     """
 
     def __init__(
-        self,
-        path: str | os.PathLike[str],
-        width: int,
-        height: int,
-        channels: Mapping[str, ChannelType],
-        metadata: Metadata | None = None,
+        self, path: Path, width: int, height: int, channels: Mapping[str, str], metadata: Mapping[str, Any]
     ) -> None:
-        self._named = os.fspath(path)
-        suffix = Path(path).suffix.lower()
-        if suffix not in _KINDS:
-            raise InputError(f"{self._named}: images are written as .exr or .png; choose one of these")
-        self._format, allowed = _KINDS[suffix]
-        if not set(channels.values()) <= allowed or min(width, height) < 1:
-            raise ValueError(f"{self._named}: no {width} x {height} {self._format} image of {dict(channels)}")
-        self._width, self._height = width, height
-        self._channels = dict(channels)
-        self._halves = [c for c, kind in enumerate(self._channels.values()) if kind == "half"]
-        kinds = set(self._channels.values())
-        self._dtype: Any = _DTYPES[kinds.pop()] if len(kinds) == 1 else np.float32  # as written and read back
-        self._rows = 0
-        self._clamped = 0
+        self._path = path
+        self._names = tuple(channels)
         self._hash = hashlib.blake2b(digest_size=32)
-        self._written: Written | None = None
-        if _no_utf8(os.path.realpath(path)):
-            raise InputError(f"{_shown(os.path.realpath(path))}: {_NO_UTF8}")
-        output = oiio.ImageOutput.create(self._format)
+        self._dtype: Any = np.float32
+        output = oiio.ImageOutput.create("openexr")
         if output is None:
             reason = oiio.geterror()
             if not reason:  # a format that is built in
                 raise MemoryError
-            raise OutputError(f"{self._named}: {reason}; install one that writes {suffix}")
+            raise Refused(f"{reason}; install one that writes .exr")
         self._output = output
-        self._part = Part(path)
-        try:
-            spec = self._spec({**_HINTS[suffix], **(metadata or {})})
-            self._check(self._output.open(os.fspath(self._part.path), spec))
-        except BaseException:
-            self.discard()
-            raise
-
-    def write_band(self, y0: int, band: NDArray[Any]) -> None:
-        """Write the rows `y0` to ``y0 + h``; bands come in order and without gaps.
-
-        Parameters
-        ----------
-        band : (h, W, C)
-            float32 for EXR; the channels' own integers for PNG (`film.encode.picture` makes them).
-
-        Raises
-        ------
-        IllumError
-            NaN or Inf in the band; which channel, how many, where.
-        """
-        y1 = y0 + len(band)
-        if y0 != self._rows or y1 > self._height or band.shape[1:] != (self._width, len(self._channels)):
-            raise ValueError(f"{self._named}: a band {band.shape} at row {y0}, after {self._rows} rows")
-        if band.dtype.kind == "f":
-            refuse_nonfinite(band, list(self._channels), self._named, y0)
-        band = self._stored(band)
-        self._hash.update(band.data)
-        self._check(self._output.write_scanlines(y0, y1, 0, band))
-        self._rows = y1
-
-    def close(self) -> Written:
-        """Finish the file, read it back, give it its name; what was written."""
-        if self._written is not None:
-            return self._written
-        try:
-            if self._rows != self._height:
-                raise ValueError(f"{self._named}: closed after {self._rows} of {self._height} rows")
-            self._check(self._output.close())
-            self._compare()
-            size = self._part.path.stat().st_size
-            self._part.commit()
-        except BaseException:
-            self.discard()
-            raise
-        self._written = Written(Path(self._named), size, self._clamped, self._hash.hexdigest())
-        return self._written
-
-    def discard(self) -> None:
-        """Remove what was written so far."""
-        with _unheard():
-            self._output.close()
-        self._part.discard()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self.discard()
-
-    def _spec(self, metadata: Metadata) -> oiio.ImageSpec:
-        kinds = [oiio.TypeDesc(kind) for kind in self._channels.values()]
+        kinds = [oiio.TypeDesc(kind) for kind in channels.values()]
         widest = max(kinds, key=lambda kind: kind.size())
-        spec = oiio.ImageSpec(self._width, self._height, len(kinds), widest)
-        spec.channelnames = tuple(self._channels)
-        if len(set(self._channels.values())) > 1:
+        spec = oiio.ImageSpec(width, height, len(kinds), widest)
+        spec.channelnames = self._names
+        if len(set(channels.values())) > 1:
             spec.channelformats = tuple(kinds)
-        for name, value in metadata.items():
-            _set(spec, name, value, text_only=self._format == "png")
-        return spec
+        for name, value in {**_HINTS, **metadata}.items():
+            _set(spec, name, value)
+        self._rows = 0
+        self._check(self._output.open(os.fspath(path), spec))
 
-    def _stored(self, band: NDArray[Any]) -> NDArray[Any]:
-        """The band with the values the file will hold, rows contiguous."""
-        if not self._halves:
-            if band.dtype != self._dtype:
-                raise ValueError(f"{self._named}: a band of {band.dtype}, not {self._dtype.__name__}")
-            return np.ascontiguousarray(band)
-        colour = band[..., self._halves]
-        beyond = np.abs(colour) > LARGEST_HALF
-        if beyond.any():
-            self._clamped += int(np.count_nonzero(beyond))
-            colour = np.clip(colour, -LARGEST_HALF, LARGEST_HALF)
-        if self._dtype is np.float16:
-            return np.ascontiguousarray(colour, np.float16)
-        stored = np.array(band, np.float32, order="C")
-        stored[..., self._halves] = colour.astype(np.float16)
-        return stored
+    def write(self, band: NDArray[Any]) -> None:
+        """The next rows, (h, W, C) with the values the file will hold."""
+        band = np.ascontiguousarray(band)
+        self._dtype = band.dtype.type
+        self._hash.update(band.data)
+        self._check(self._output.write_scanlines(self._rows, self._rows + len(band), 0, band))
+        self._rows += len(band)
+
+    def close(self) -> None:
+        """The end of the file."""
+        self._check(self._output.close())
+
+    def is_as_written(self) -> bool:
+        """Does the closed file hold the pixels it was given? It is read back in bands."""
+        found = hashlib.blake2b(digest_size=32)
+        try:
+            with _Source(self._path) as source:
+                order = source.order(self._names)
+                for band in source.bands(self._dtype):
+                    found.update(np.ascontiguousarray(band if order is None else band[..., order]).data)
+        except InputError as error:
+            raise Refused(f"what was written cannot be read back ({error})") from error
+        return found.digest() == self._hash.digest()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        self._output.close()
 
     def _check(self, success: bool) -> None:
         """Neither the answer nor the message alone can be trusted to tell of a failure."""
         message = self._output.geterror()
         if not success or message:
-            self.discard()
             if "OUT_OF_MEMORY" in message or "bad_alloc" in message:
                 raise MemoryError
-            raise self._failure(message or "no reason given")
-
-    def _failure(self, fact: str) -> OutputError:
-        fact = " ".join(fact.split())
-        return OutputError(f"{self._named}: cannot be written: {fact}; free space or change the folder")
-
-    def _compare(self) -> None:
-        """Read the part file in bands and compare its hash with that of what was handed over."""
-        found = hashlib.blake2b(digest_size=32)
-        try:
-            with _Source(self._part.path) as source:
-                order = source.order(tuple(self._channels))
-                for band in source.bands(self._dtype):
-                    found.update(np.ascontiguousarray(band if order is None else band[..., order]).data)
-        except InputError as error:
-            raise self._failure(f"what was written cannot be read back ({error})") from error
-        if found.digest() != self._hash.digest():
-            raise self._failure("what was read back differs from what was written")
+            raise Refused(message or "no reason given")
 
 
 class Image(Record):
@@ -396,8 +275,8 @@ class _Source:
         self._path = path
         if not path.is_file():
             raise InputError(f"{path}: no such file" if not path.exists() else f"{path}: not a file")
-        if _no_utf8(os.fspath(path)):
-            raise InputError(f"{_shown(os.fspath(path))}: {_NO_UTF8}")
+        if no_utf8(os.fspath(path)):
+            raise InputError(f"{shown(os.fspath(path))}: {NO_UTF8}")
         raw = oiio.ImageSpec()
         raw.attribute("oiio:UnassociatedAlpha", 1)  # values as the file has them
         opened = oiio.ImageInput.open(os.fspath(path), raw)
@@ -475,48 +354,16 @@ class _Source:
         return InputError(f"{self._path}: cannot be read as an image: {fact}; make or fetch the file again")
 
 
-_NO_UTF8 = "the path is not UTF-8, which image files need; rename the file or its folder"
-
-
-def _no_utf8(path: str) -> bool:
-    """Does the path hold bytes that are not UTF-8?"""
-    return any("\udc80" <= c <= "\udcff" for c in path)
-
-
-def _shown(path: str) -> str:
-    """The path with such bytes as \\xNN."""
-    return os.fsencode(path).decode("utf-8", "backslashreplace")
-
-
-@contextmanager
-def _unheard() -> Iterator[None]:
-    """Whatever is printed to stderr is lost: libpng says of each unfinished file that it is unfinished."""
-    try:
-        kept = os.dup(2)
-    except OSError:  # no stderr, or no handle left: then it is heard
-        yield
-        return
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-
-
 def _ends_with(path: Path, tail: bytes) -> bool:
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - len(tail)))
         return file.read() == tail
 
 
-def _set(spec: oiio.ImageSpec, name: str, value: Any, text_only: bool) -> None:
-    """Give `spec` an attribute in a type its file format keeps."""
+def _set(spec: oiio.ImageSpec, name: str, value: Any) -> None:
+    """Give `spec` an attribute in a type that EXR keeps."""
     if isinstance(value, str):
         spec.attribute(name, value)
-    elif text_only and not name.startswith(("oiio:", "png:")):
-        spec.attribute(name, " ".join(map(str, value)) if isinstance(value, tuple) else str(value))
     elif isinstance(value, tuple):
         kind = "string" if isinstance(value[0], str) else "int" if isinstance(value[0], int) else "float"
         spec.attribute(name, oiio.TypeDesc(f"{kind}[{len(value)}]"), value)

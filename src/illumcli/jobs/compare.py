@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, ThresholdError
-from illumcli.files.images import ChannelType, Image, ImageWriter, flip, layers, read_image
+from illumcli.files.images import Image, flip, layers, read_image
+from illumcli.files.writer import ChannelType, ImageWriter
 from illumcli.film.heat import heat
 from illumcli.film.metrics import Difference, absolute_difference, difference
 from illumcli.records import Value

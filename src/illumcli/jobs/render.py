@@ -349,7 +349,7 @@ def _render_view(
     sums: ErrorSums,
 ) -> int:
     """Write one view's files band by band; how many values were beyond half's range."""
-    from illumcli.files.images import ImageWriter
+    from illumcli.files.writer import ImageWriter
 
     frame = shared["frame"]
     done, pixels = 0, view.width * view.height
@@ -387,7 +387,7 @@ def _render_view(
 
 def channels(scene: Any, target: Target) -> dict[str, Any]:
     """Channel name -> type of a file; the beauty's R G B A come first."""
-    from illumcli.files.images import channel_types
+    from illumcli.files.writer import channel_types
 
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]

@@ -17,6 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from illumcli.arrays import rows
 from illumcli.models._base import IlluminationModel
 from illumcli.plan import recipes, stages
 from illumcli.plan.artifacts import Artifacts
@@ -78,9 +79,7 @@ def asked(light, frame, points, shadow):
     """Every lane that is not in shadow, those that get nothing with strength 0."""
     lit = everywhere(light, frame, points.position, points.n)
     free = np.flatnonzero(shadow)
-    lane, l, distance, strength = (
-        arriving.rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength)
-    )
+    lane, l, distance, strength = (rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength))
     return arriving.Lit(lane, lit.count, l, distance, strength)
 
 

@@ -35,6 +35,11 @@ def rows(table: NDArray[Any], index: NDArray[Any]) -> NDArray[Any]:
     return table.T.take(index, axis=1, mode="wrap").T
 
 
+def some(table: NDArray[Any], lanes: NDArray[Any]) -> NDArray[Any]:
+    """The rows of these lanes, which ascend; `table` itself where they are all of them."""
+    return table if len(lanes) == len(table) else rows(table, lanes)
+
+
 def repeated(vectors: Vectors, count: int) -> Vectors:
     """(N * count, 3) each vector so many times in a row; by components, five times as fast as `np.repeat`."""
     out = np.empty((3, len(vectors), count), vectors.dtype)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, some
 from illumcli.demand import Recipe
 from illumcli.files.store import Store
 from illumcli.frame import Frame
@@ -138,14 +138,12 @@ def load_hits(picture: Picture, tile: Tile) -> Hits:
     """The samples of a tile that see a surface, as they were kept."""
     triangle, u, v = picture.tile(tile)
     lane = np.flatnonzero(triangle >= 0).astype(np.int32)
-    return Hits(lane, triangle.take(lane), u.take(lane).view(F), v.take(lane).view(F))
+    return Hits(lane, some(triangle, lane), some(u, lane).view(F), some(v, lane).view(F))
 
 
 def load_tile(picture: Picture, tile: Tile, hits: Hits) -> Any:
     """A buffer of a tile as it was kept, at the samples seen."""
-    planes = picture.tile(tile)
-    seen = planes if len(hits.lane) == planes.shape[1] else planes.take(hits.lane, axis=1)
-    return picture.kind.unpack(seen, hits)
+    return picture.kind.unpack(some(picture.tile(tile).T, hits.lane).T, hits)
 
 
 def spread_out(kind: Kind, packed: NDArray[Any], hits: Hits, tile: Tile, per_pixel: int) -> NDArray[Any]:

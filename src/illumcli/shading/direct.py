@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, rows
+from illumcli.arrays import F, Ids, Vectors, rows, some
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.shading.textures import Parameters
@@ -28,11 +28,6 @@ def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
 def pick(values: NDArray[Any], lanes: Ids | slice) -> NDArray[Any]:
     """Values of these lanes, without a copy where it is all of them."""
     return values if isinstance(lanes, slice) else rows(values, lanes)
-
-
-def at_lanes(values: NDArray[Any], lanes: Ids) -> NDArray[Any]:
-    """Values of these lanes, in ascending order; without a copy where it is all of them."""
-    return values if len(lanes) == len(values) else rows(values, lanes)
 
 
 def response(
@@ -72,7 +67,7 @@ def response(
     place = np.full(lit.count, count, np.intp)  # where each point's light is among them
     power = np.asarray(color, F)
     first = 0
-    for number, lanes in groups(at_lanes(material, lit.lane), len(models)):
+    for number, lanes in groups(some(material, lit.lane), len(models)):
         if not lobes[number]:
             continue
         at = pick(lit.lane, lanes)
@@ -80,7 +75,7 @@ def response(
         if parameters is not None and parameters.of_material[number]:
             own = parameters.model(models[number], number, at).lobes()
         wanted = words(own)
-        here = {word: at_lanes(given[word], at) for word in wanted if word in given}
+        here = {word: some(given[word], at) for word in wanted if word in given}
         here["l"] = pick(lit.l, lanes)
         if "light" in wanted:
             here["light"] = power / max(power.max(), np.finfo(F).tiny)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Ids, Lanes, Vectors, dot, rows
+from illumcli.arrays import Ids, Lanes, Vectors, dot, some
 from illumcli.frame import Frame
 from illumcli.lights._base import Light
 from illumcli.records import Record
@@ -31,17 +31,12 @@ def lit(light: Light, frame: Frame, position: Vectors, n: Vectors | None = None)
     reached = arriving.strength > 0
     if n is not None:
         reached &= dot(n, arriving.l) > 0
-    count = len(position)
-    if reached.all():
-        lane = np.arange(count, dtype=np.int32)
-        return Lit(lane, count, arriving.l, arriving.distance, arriving.strength)
     lane = np.flatnonzero(reached).astype(np.int32)
-    parts = (rows(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
-    return Lit(lane, count, *parts)
+    parts = (some(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
+    return Lit(lane, len(position), *parts)
 
 
 def reaching(light: Light, frame: Frame, position: Vectors, lanes: NDArray[np.intp]) -> Lit:
     """These lanes, which are known to be lit, in ascending order."""
-    count = len(position)
-    arriving = light.arriving(position if len(lanes) == count else rows(position, lanes), frame)
-    return Lit(lanes.astype(np.int32), count, arriving.l, arriving.distance, arriving.strength)
+    arriving = light.arriving(some(position, lanes), frame)
+    return Lit(lanes.astype(np.int32), len(position), arriving.l, arriving.distance, arriving.strength)

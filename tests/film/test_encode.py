@@ -118,6 +118,6 @@ def test_what_is_not_finite_is_refused(bad):
     band = np.zeros((4, 6, 4), np.float32)
     band[2, 5, 3] = bad
     with pytest.raises(
-        IllumError, match=r"a.png: channel A: NaN or infinite in 1 pixels, the first at x 5, y 12"
+        IllumError, match=r"a.png: channel A: NaN or infinite in 1 pixels, the first at x 25, y 12"
     ):
-        picture(band, place="a.png", y0=10)
+        picture(band, place="a.png", y0=10, x0=20)

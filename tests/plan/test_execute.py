@@ -40,12 +40,12 @@ def picture(tmp_path_factory):
     path = tmp_path_factory.mktemp("scene") / "scene.yaml"
     path.write_text(SCENE)
 
-    def render(*only, threads=1, side=None, overrides=()):
+    def render(*only, threads=1, side=None, overrides=(), **more):
         loaded = load(path, overrides)
         steps = plan(loaded.scene, loaded, only)
         tally = Tally()
         shared = run_once(steps, tally)
-        made = list(bands(steps, shared, steps.views[0], threads, tally, side=side))
+        made = list(bands(steps, shared, steps.views[0], threads, tally, side=side, **more))
         names = made[0].layers
         return {name: np.concatenate([band.layers[name] for band in made]) for name in names}
 
@@ -62,6 +62,22 @@ def test_threads_and_tiles_change_no_bit(picture, whole, threads, side):
     again = picture(*ALL, threads=threads, side=side)
     for name, values in whole.items():
         assert values.tobytes() == again[name].tobytes(), name
+
+
+@pytest.mark.parametrize("overrides", [(), ("film.samples=8", "film.adaptive={first: 4}")])
+def test_bands_hold_what_is_made_of_their_tiles(picture, overrides):
+    def develop(tile, layers):
+        x, y = np.meshgrid(range(tile.x, tile.x + tile.width), range(tile.y, tile.y + tile.height))
+        bright = layers["beauty"].max(axis=-1) > 0.5
+        return {"place": np.stack([x, y], axis=-1).astype(np.uint16), "bright": bright[..., None]}
+
+    plain = picture("beauty", overrides=overrides)["beauty"]
+    made = picture("beauty", side=13, threads=2, overrides=overrides, develop=develop)
+    assert set(made) == {"place", "bright"}
+    assert made["place"].dtype == np.uint16
+    rows, columns = np.indices(plain.shape[:2])
+    np.testing.assert_array_equal(made["place"], np.stack([columns, rows], axis=-1))
+    np.testing.assert_array_equal(made["bright"][..., 0], plain.max(axis=-1) > 0.5)
 
 
 @pytest.mark.parametrize("layer", ALL)

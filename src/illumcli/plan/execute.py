@@ -269,7 +269,10 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     tally.add({}, {}, {"samples": pixels * view.samples - taken})
     with tally.lock:
         tally.refined += refined
-    return common.develop(tile, out), {}
+    start = time.perf_counter()
+    developed = common.develop(tile, out)
+    tally.add({"film": time.perf_counter() - start}, {})
+    return developed, {}
 
 
 def _joined(

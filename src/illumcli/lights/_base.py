@@ -58,8 +58,8 @@ def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Lanes]:
     way = columns(light.astype(np.float64 if far else position.dtype) - position)
     if not far and np.abs(way).max(initial=0) < 1e-15:
         far, way = True, columns(way, np.float64)
-    distance = np.maximum(length(way), NEAREST)
     size = length(way)
+    distance = np.maximum(size, NEAREST)
     l = way * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
     if far:
         return columns(l, position.dtype), distance.astype(position.dtype)

@@ -64,8 +64,7 @@ class Band(Record):
     layers: Mapping[str, NDArray[Any]]  # layer, or what was made of them -> (rows, width, channels)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Common:
+class _Common(Record):
     """What the tiles of a picture have in common."""
 
     plan: Plan

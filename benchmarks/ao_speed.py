@@ -24,7 +24,7 @@ from ao_error import caster
 from illumcli.arrays import F
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.visibility import obscurance
-from illumcli.visibility.obscurance import about, patterns
+from illumcli.visibility.obscurance import about, directions
 
 REPEATS = 5
 SAMPLES = 256
@@ -45,7 +45,7 @@ def main() -> None:
         for first in range(0, len(order), at_once):
             part = bake.points.take(order[first : first + at_once])
             draws = np.stack([unit_interval(hashed(key, part.number)) for key in keys])
-            d = np.matmul(patterns(draws, bake.method), about(part.n, draws, bake.method)).reshape(-1, 3)
+            d = np.ascontiguousarray(directions(about(part.n, draws, bake.method), draws, bake.method))
             calls.append((np.repeat(np.ascontiguousarray(part.origins), SAMPLES, axis=0), d))
         return calls
 

@@ -43,11 +43,11 @@ def test_hashed_numbers_are_uniform():
 @pytest.mark.parametrize("count", [1, 5, 64, 100])
 def test_spiral_directions_are_unit_up_and_cosine_weighted(count):
     table = sampling.spiral_table(count).astype(float)
-    assert table.shape == (max(16, 16384 // count), count, 3)
-    np.testing.assert_allclose(np.linalg.norm(table, axis=2), 1, atol=1e-6)
-    assert (table[..., 2] > 0).all()
+    assert table.shape == (max(16, 16384 // count), 3, count)
+    np.testing.assert_allclose(np.linalg.norm(table, axis=1), 1, atol=1e-6)
+    assert (table[:, 2] > 0).all()
     # every ring of the disc, r^2 in [i/N, (i+1)/N), holds one point
-    ring = np.floor(np.square(table[..., :2]).sum(axis=2) * count * (1 - 1e-6))
+    ring = np.floor(np.square(table[:, :2]).sum(axis=1) * count * (1 - 1e-6))
     assert (np.sort(ring, axis=1) == np.arange(count)).all()
 
 

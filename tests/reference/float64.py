@@ -148,7 +148,7 @@ def render(setup):
             light[name][lit] = lobes[name] * (20 / distance[lit] ** 2 * delta[lit])[:, None]
 
     draws = dither(stream(0, "obscurance"), x[seen], y[seen], np.zeros(len(seen), int))
-    table = spiral_table(setup.rays).astype(float)
+    table = spiral_table(setup.rays).astype(float).transpose(0, 2, 1)
     pattern = table[(draws[1] * len(table)).astype(int)]
     frame = turned_frame(np.asfortranarray(ng.astype(np.float32)), (2 * np.pi * draws[0]).astype(np.float32))
     ways = np.matmul(pattern, frame.astype(float)).reshape(-1, 3)

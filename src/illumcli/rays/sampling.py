@@ -103,7 +103,7 @@ SPIRAL_POINTS = 1 << 14
 
 @lru_cache(maxsize=64)
 def spiral_table(count: int) -> NDArray[np.float32]:
-    """(phases, count, 3) unit directions about +z, cosine-weighted: golden-angle spirals on the disc.
+    """(phases, 3, count) unit directions about +z, cosine-weighted: golden-angle spirals on the disc.
 
     r^2 = (i + (k + 1/2) / phases) / count. Projected on the disc the cosine disappears; with the phase drawn
     at random every point is uniform in its own ring, so the mean is unbiased for any count. Phases are as
@@ -116,7 +116,7 @@ def spiral_table(count: int) -> NDArray[np.float32]:
     r2 = (i + phase) / count
     angle = 2 * np.pi * ((i * GOLDEN) % 1.0)
     r = np.sqrt(r2)
-    table = np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r2)], axis=-1).astype(F)
+    table = np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r2)], axis=1).astype(F)
     table.setflags(write=False)
     return table
 

@@ -163,9 +163,10 @@ def _checked(origins: Vectors, directions: Vectors) -> int:
     for name, array in (("origins", origins), ("directions", directions)):
         if array.ndim != 2 or array.shape[1] != 3 or array.dtype != F:
             raise ValueError(f"{name} must be (N, 3) float32, are {array.shape} {array.dtype}")
-        # a sum is three times faster than a look at each, and finite only where all of them are
+        # a sum of squares is three times faster than a look at each, and finite only where all of them are
+        flat = array.ravel(order="K")
         with np.errstate(invalid="ignore", over="ignore"):
-            total = array.sum()
+            total = flat @ flat
         if not np.isfinite(total) and not np.isfinite(array).all():
             bad = int(np.count_nonzero(~np.isfinite(array).all(axis=1)))
             raise IllumError(f"{bad} of {len(array)} rays have {name} that are not finite")

@@ -106,13 +106,14 @@ def estimates(
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, len(lane), at_once):
         part = lane[first : first + at_once]
-        d = np.matmul(patterns(draws[:, part], method), frames[part])
-        mu = seen(tracer, origins[part], d.reshape(-1, 3), method).reshape(len(part), -1)
+        d = directions(frames[part], draws[:, part], method)
+        mu = seen(tracer, rows(origins, part), d, method).reshape(len(part), -1)
         w[part] = shares(mu)
         if errors:
             uneven[part] = unevenness(mu, method.sampler)
         if mean is not None:
-            towards = np.matmul(mu[:, None, :].astype(F), d)[:, 0]
+            ways = d.T.reshape(3, len(part), -1).transpose(1, 0, 2)
+            towards = np.matmul(ways, mu.astype(F)[:, :, None])[:, :, 0]
             size = np.linalg.norm(towards, axis=1, keepdims=True)
             mean[part] = np.divide(towards, size, out=np.zeros_like(towards), where=size > 0)
     return Estimates(w, uneven, mean, count - len(lane))
@@ -190,8 +191,16 @@ def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> L
     return far
 
 
+def directions(frames: NDArray[np.float32], draws: NDArray[np.float64], method: Method) -> Vectors:
+    """(M * samples, 3) float32 the rays of each point, one point after the other, from `about`."""
+    out = np.empty((3, len(frames), method.samples), F)
+    # a long row per component: three times as fast as one of three numbers per ray
+    np.matmul(frames.transpose(0, 2, 1), patterns(draws, method), out=out.transpose(1, 0, 2))
+    return out.reshape(3, -1).T
+
+
 def patterns(draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
-    """(M, samples, 3) float32 cosine-weighted unit directions about the third axis."""
+    """(M, 3, samples) float32 cosine-weighted unit directions about the third axis."""
     if method.sampler == "spiral":
         table = spiral_table(method.samples)
         return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
@@ -205,7 +214,7 @@ def patterns(draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:
         ray = np.arange(method.samples, dtype=np.uint32)[None, :]
         u, v = (unit_interval(hashed(k, hashed(k + 7, seeds[k])[:, None] + ray)) for k in (0, 1))
     r, angle = np.sqrt(u), 2 * np.pi * v
-    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=-1).astype(F)
+    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=1).astype(F)
 
 
 def about(n: Vectors, draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:

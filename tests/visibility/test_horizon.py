@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.assemble import place
+from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.order import compact
 from illumcli.geometry.shapes.sphere import Sphere
 from illumcli.geometry.shapes.torus import Torus
@@ -111,6 +112,17 @@ def test_facets_that_few_samples_lie_on_are_not_looked_at():
     triangle = np.arange(len(world.triangles), dtype=np.int32)[:70]
     opened = OpenFacets(world).open(triangle, np.zeros(70, bool), 10)
     assert opened.tolist() == [True] * 64 + [False] * 6
+
+
+def test_a_world_without_open_facets_is_not_looked_through(monkeypatch):
+    y, x = (each.ravel() for each in np.mgrid[-1:1:40j, -1:1:40j])
+    corner = (np.arange(39)[:, None] * 40 + np.arange(39)).reshape(-1, 1)
+    halves = [corner + np.array(half) for half in ((0, 1, 41), (0, 41, 40))]
+    saddle = Mesh.of_triangles(np.stack([x, y, x * y], axis=1), np.concatenate(halves))
+    monkeypatch.setattr(OpenFacets, "_settle", lambda self, rows: pytest.fail("a row was looked at"))
+    triangle = np.arange(2 * len(corner), dtype=np.int32)
+    for behind in (False, True):
+        assert not OpenFacets(world_of(saddle)).open(triangle, np.full(len(triangle), behind), 1).any()
 
 
 def test_an_open_facet_does_not_depend_on_who_asks_first():

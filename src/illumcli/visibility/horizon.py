@@ -12,7 +12,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, dot, rows
+from illumcli.arrays import F, Ids, Vectors, columns, dot, rows
 from illumcli.geometry.assemble import World
 from illumcli.geometry.order import compact
 from illumcli.rays.offsets import SHARE
@@ -30,6 +30,8 @@ FEWEST = 64
 """Where the cheap tests leave fewer than one point in so many, the tree is not asked: to build it takes as
 long as a few rays from every vertex."""
 PROBES = 64
+TRIED = 64
+"""Rows of triangles, of either side, by which a world is judged."""
 CLEARLY = 1e-5
 
 
@@ -121,12 +123,21 @@ class Horizon:
 
         Planes through points of occluders, lifted a little.
         """
+        out = self._worth(o, n)
+        some = np.repeat(out.reshape(-1, GROUP).any(axis=1), GROUP)
+        if some.any():
+            out[some] &= self._below(o[some], n[some])
+        return out
+
+    def may_clear(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> bool:
+        """Do the cheap tests leave enough of these planes for `clear_planes` to be worth it?"""
+        return bool(self._worth(o, n).sum() * FEWEST >= len(o))
+
+    def _worth(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) the planes that the tree is asked about."""
         out = self._probed(o, n)
         groups = out.reshape(-1, GROUP)
         groups[groups.sum(axis=1) * 2 < GROUP] = False  # the tree tells little of what is mostly under others
-        some = np.repeat(groups.any(axis=1), GROUP)
-        if some.any():
-            out[some] &= self._below(o[some], n[some])
         return out
 
     def _probed(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -184,7 +195,8 @@ class OpenFacets:
     """Which triangles have nothing above their plane, on either side; safe to ask from threads.
 
     All samples of a triangle look up from one plane, so each is settled once, with 63 others in a row: an
-    answer depends on these alone, whoever asks first.
+    answer depends on these alone, whoever asks first. Where next to none of some rows spread over the world
+    is open, as on a scanned mesh, no other is looked at.
     """
 
     def __init__(self, world: World) -> None:
@@ -193,12 +205,16 @@ class OpenFacets:
         self._blocks = -(-len(world.triangles) // GROUP)  # of either side
         self._asked = np.zeros(2 * self._blocks, bool)
         self._clear = np.zeros(2 * self._blocks * GROUP, bool)
+        tried = np.arange(0, 2 * self._blocks, max(1, self._blocks // TRIED))
+        self._any = len(tried) > 0 and self._horizon.may_clear(*self._planes(tried))
 
     def open(self, triangle: Ids, behind: NDArray[np.bool_], worth: int) -> NDArray[np.bool_]:
         """(M,) True where nothing is above the triangle that a sample lies on, on the side that is seen.
 
         Rows of triangles that fewer than `worth` of the samples lie on are not looked at.
         """
+        if not self._any:
+            return np.zeros(len(triangle), bool)
         number = triangle + behind * np.int64(self._blocks * GROUP)
         block = number // GROUP
         seen = np.bincount(block, minlength=2 * self._blocks) >= worth
@@ -208,8 +224,12 @@ class OpenFacets:
         return self._clear.take(number) & seen.take(block)
 
     def _settle(self, blocks: NDArray[np.int64]) -> None:
-        numbers = (blocks[:, None] * GROUP + np.arange(GROUP)).ravel()
-        side, triangle = np.divmod(numbers, self._blocks * GROUP)
+        self._clear[_numbers(blocks)] = self._horizon.clear_planes(*self._planes(blocks))
+        self._asked[blocks] = True
+
+    def _planes(self, blocks: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origins and unit normals of the planes of these rows, (64 K, 3) each, lifted as rays are."""
+        side, triangle = np.divmod(_numbers(blocks), self._blocks * GROUP)
         triangle = np.minimum(triangle, len(self._world.triangles) - 1).astype(np.int32)
         zero = np.zeros(len(triangle), F)
         facet = facets(self._world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
@@ -220,8 +240,12 @@ class OpenFacets:
         # no ray starts lower: |ng|.|p| of `lifted` is at least the distance of the plane from the centre
         step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
         o = v0 + step[:, None] * n
-        self._clear[numbers] = self._horizon.clear_planes(np.ascontiguousarray(o), np.ascontiguousarray(n))
-        self._asked[blocks] = True
+        return np.ascontiguousarray(o), np.ascontiguousarray(n)
+
+
+def _numbers(blocks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(64 K,) what the rows of these numbers hold."""
+    return (blocks[:, None] * GROUP + np.arange(GROUP)).ravel()
 
 
 def clear_of_each_other(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -274,4 +298,5 @@ def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
     spread = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
     if not len(points):
         return points
-    return points[np.unique([int(np.argmax(points @ d)) for d in spread])].astype(F)
+    near, spread = columns(points, F), spread.astype(F)
+    return points[np.unique([int(np.argmax(near @ d)) for d in spread])].astype(F)

@@ -298,8 +298,8 @@ class Tile(Value):
 
     def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Column and row of every pixel, row by row from the top."""
-        y, x = np.divmod(np.arange(self.width * self.height), self.width)
-        return x + self.x, y + self.y
+        x, y = np.arange(self.x, self.x + self.width), np.arange(self.y, self.y + self.height)
+        return np.tile(x, self.height), np.repeat(y, self.width)
 
     def grown(self, width: int, height: int) -> Tile:
         """The rectangle and a border of one pixel, within a film of this size."""
@@ -545,7 +545,8 @@ def obscurance_origins(facets: Facets) -> Vectors:
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
     """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
     key = sampling.stream(seed, "obscurance")
-    pixel, sample = np.divmod(hits.lane, samples.per_pixel)
+    pixel = hits.lane // samples.per_pixel
+    sample = hits.lane - pixel * samples.per_pixel
     return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample + (samples.first or 0))
 
 

@@ -51,8 +51,10 @@ def camera_rays(
         x, y = slope * x, slope * y
         # right, up and forward are orthonormal: the length needs no vector
         scale = 1 / np.sqrt(1 + x * x + y * y)
-        d = _combined((scale, forward), (x * scale, right), (y * scale, up))
-        along = -(scale * (forward @ eye) + x * scale * (right @ eye) + y * scale * (up @ eye))
+        x *= scale
+        y *= scale
+        d = _combined((scale, forward), (x, right), (y, up))
+        along = -(scale * (forward @ eye) + x * (right @ eye) + y * (up @ eye))
         skipped = np.maximum(along - CLEAR, 0)
         start = (
             _combined((np.broadcast_to(1.0, len(x)), eye))

@@ -43,18 +43,22 @@ class Facets(Record):
 
 def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors) -> Facets:
     """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
-    v0, v1, v2 = (
+    v0, e1, e2 = (
         columns(rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64) for k in range(3)
     )
-    e1, e2 = v1 - v0, v2 - v0
-    position = v0 + u[:, None] * e1 + v[:, None] * e2
-    normal = cross(e1, e2)
-    ng = unit(normal)
-    behind = dot(ng, towards_eye) < 0
+    e1 -= v0
+    e2 -= v0
     sides = columns(e1, F), columns(e2, F), columns(e2 - e1, F)
-    edge = np.maximum(np.maximum(length(sides[0]), length(sides[1])), length(sides[2]))
-    edge = effective_edge(edge, length(normal))
-    return Facets(position, facing(columns(ng, F), behind), edge, behind)
+    edge = np.sqrt(np.maximum(np.maximum(*(dot(side, side) for side in sides[:2])), dot(sides[2], sides[2])))
+    normal = cross(e1, e2)
+    area = length(normal)
+    behind = dot(normal, towards_eye) < 0
+    scale = np.divide(1 - 2 * behind.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
+    normal *= scale[:, None]
+    position = v0
+    position += np.multiply(e1, u[:, None], out=e1)
+    position += np.multiply(e2, v[:, None], out=e2)
+    return Facets(position, columns(normal, F), effective_edge(edge, area.astype(F)), behind)
 
 
 def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:

@@ -65,7 +65,7 @@ def transform_matrix(transform: Any, mesh: Mesh) -> NDArray[np.float64]:
     for axis, degrees in enumerate(transform.rotate):
         matrix = rotation(axis, degrees) @ matrix
     if transform.fit is not None and len(mesh.corners):
-        low, high = bounds(mesh.vertices[used(mesh)] @ matrix[:3, :3].T)
+        low, high = bounds(among_used(mesh, mesh.vertices) @ matrix[:3, :3].T)
         size = transform.fit / (np.linalg.norm((high - low) / 2) or 1.0)
         matrix[:3, :3] *= size
         matrix[:3, 3] = -size * np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -90,7 +90,15 @@ def bounds(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     """Lowest and highest corner of the points' box; a point at the origin where there are none."""
     if not len(points):
         return np.zeros(3), np.zeros(3)
-    return points.min(axis=0), points.max(axis=0)
+    # a column at a time: along the other axis numpy goes three numbers at a time
+    low, high = ([reach(column) for column in points.T] for reach in (np.min, np.max))
+    return np.array(low), np.array(high)
+
+
+def among_used(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The points of those of the mesh's vertices that some polygon has."""
+    mask = used(mesh)
+    return points if mask.all() else points[mask]
 
 
 def used(mesh: Mesh) -> NDArray[np.bool_]:
@@ -104,9 +112,8 @@ def stand(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> St
     """Mesh i under matrix i; the frame's box holds them all, with its centre at 0 and half its diagonal 1."""
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
-        in_use = used(mesh)
-        if in_use.any():
-            low[number], high[number] = bounds(moved(mesh, matrix)[in_use])
+        if len(mesh.corners):
+            low[number], high[number] = bounds(among_used(mesh, moved(mesh, matrix)))
     lowest, highest = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
     if not np.isfinite(lowest).all():
         lowest, highest = np.zeros(3), np.zeros(3)
@@ -128,7 +135,7 @@ def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
     agree on one of its own axes, as those of a floor do."""
     if not mesh.polygon_count:
         return 0.0
-    low, high = bounds(mesh.vertices[used(mesh)])
+    low, high = bounds(among_used(mesh, mesh.vertices))
     across = low < high
     if not across.all() and (mesh.normals is None or not mesh.normals[:, across].any()):
         return 0.0

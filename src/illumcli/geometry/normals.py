@@ -230,12 +230,13 @@ def _corner_edges(mesh: Mesh) -> tuple[Vectors, Vectors]:
 
 def _fans(mesh: Mesh) -> tuple[Vectors, Vectors, NDArray[Any]]:
     """(F, 3) both edges of each fan triangle from its first corner, and (P + 1,) where the fans start."""
-    points = _corner_points(mesh)
     count = np.maximum(np.diff(mesh.starts) - 2, 0)
     fans = np.concatenate([[0], np.cumsum(count)])
     if (count == 1).all():
-        origin, second, third = points[::3], points[1::3], points[2::3]
+        vertices = np.asfortranarray(mesh.vertices)
+        origin, second, third = (rows(vertices, mesh.corners[k::3]) for k in range(3))
     else:
+        points = _corner_points(mesh)
         at = np.arange(fans[-1]) - np.repeat(fans[:-1] - mesh.starts[:-1] - 1, count)
         origin, second, third = (
             rows(points, np.repeat(mesh.starts[:-1], count)),

@@ -174,6 +174,23 @@ def test_upload_knows_its_place_in_memory():
     assert upload._handle(Elsewhere()) is None
 
 
+def test_upload_builds_the_tree(ball):
+    from embreex.rtcore_scene import EmbreeScene
+
+    vertices, faces = ball
+    scene = EmbreeScene(robust=True)
+    upload.upload(scene, vertices.astype(F), faces)
+    assert scene.is_committed
+
+
+def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch):
+    vertices, faces = ball
+    library = upload._library()
+    monkeypatch.setattr(library, "rtcGetDeviceError", lambda device: 4)
+    with pytest.raises(IllumError, match="failed to build: error 4"):
+        Tracer(vertices.astype(F), faces)
+
+
 class Elsewhere:
     """A scene of another layout."""
 

@@ -60,7 +60,7 @@ class Tracer:
             self._stop: threading.Event | None = None
             if len(triangles):
                 upload(self._scene, vertices, triangles)
-            # the first ray builds the tree, which must happen before threads ask
+            # the first ray builds the tree where it is not built yet, which must happen before threads ask
             probe = np.zeros((1, 3), F)
             self._scene.run(probe, probe + F(1), query="OCCLUDED")
         finally:

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.errors import IllumError
+
 HANDLE, COMMITTED, SIZE = 16, 24, 40
 """Offsets of the scene's handle and of `is_committed` in an EmbreeScene, and the object's size [bytes]."""
 ROBUST = 4  # RTC_SCENE_FLAG_ROBUST
@@ -26,7 +28,10 @@ TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
 
 
 def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
-    """Attach (V, 3) vertices and (T, 3) triangles to an EmbreeScene that is not committed yet."""
+    """Attach (V, 3) vertices and (T, 3) triangles to an EmbreeScene that is not committed yet.
+
+    The tree is built here and now, without the interpreter's lock, which embreex would hold meanwhile.
+    """
     library = _library()
     handle = _handle(scene) if library else None
     if library is None or handle is None or library.rtcGetSceneFlags(handle) != ROBUST:
@@ -46,7 +51,13 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
     library.rtcCommitGeometry(geometry)
     library.rtcAttachGeometry(handle, geometry)
     library.rtcReleaseGeometry(geometry)
+    library.rtcSetDeviceErrorFunction(device, None, None)  # embreex's own wants the lock
+    library.rtcCommitScene(handle)
+    error = library.rtcGetDeviceError(device)
     library.rtcReleaseDevice(device)
+    if error:
+        raise IllumError(f"the ray core failed to build: error {error} of Embree")
+    scene.is_committed = 1
 
 
 def _handle(scene: Any) -> int | None:
@@ -79,6 +90,9 @@ def _library() -> Any:
         "rtcSetNewGeometryBuffer": (pointer, [pointer, number, number, number, size, size]),
         "rtcCommitGeometry": (None, [pointer]),
         "rtcAttachGeometry": (number, [pointer, pointer]),
+        "rtcSetDeviceErrorFunction": (None, [pointer, pointer, pointer]),
+        "rtcCommitScene": (None, [pointer]),
+        "rtcGetDeviceError": (ctypes.c_int, [pointer]),
         "rtcReleaseGeometry": (None, [pointer]),
         "rtcReleaseDevice": (None, [pointer]),
     }

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from threading import Barrier, Event
+
 import numpy as np
 import pytest
 
+from illumcli.demand import Recipe
+from illumcli.errors import InputError
 from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
+from illumcli.plan.plan import Plan, plan
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
 
@@ -44,7 +48,7 @@ def picture(tmp_path_factory):
         loaded = load(path, overrides)
         steps = plan(loaded.scene, loaded, only)
         tally = Tally()
-        shared = run_once(steps, tally)
+        shared = run_once(steps, tally, threads=threads)
         made = list(bands(steps, shared, steps.views[0], threads, tally, side=side, **more))
         names = made[0].layers
         return {name: np.concatenate([band.layers[name] for band in made]) for name in names}
@@ -78,6 +82,42 @@ def test_bands_hold_what_is_made_of_their_tiles(picture, overrides):
     rows, columns = np.indices(plain.shape[:2])
     np.testing.assert_array_equal(made["place"], np.stack([columns, rows], axis=-1))
     np.testing.assert_array_equal(made["bright"][..., 0], plain.max(axis=-1) > 0.5)
+
+
+def only_once(*steps):
+    return Plan((), (), steps, (), {}, {})
+
+
+def test_what_does_not_need_each_other_is_made_at_once():
+    both = Barrier(2, timeout=20)
+    steps = only_once(
+        Recipe("a", lambda: 1, {}),
+        Recipe("b", lambda a: (both.wait(), a + 1)[1], {"a": "a"}),
+        Recipe("c", lambda a: (both.wait(), a + 2)[1], {"a": "a"}),
+        Recipe("d", lambda b, c: b + c, {"b": "b", "c": "c"}),
+    )
+    tally = Tally()
+    assert list(run_once(steps, tally, threads=2).items()) == [("a", 1), ("b", 2), ("c", 3), ("d", 5)]
+    assert set(tally.seconds) == set("abcd")
+
+
+def test_of_several_faults_the_plans_first_is_told():
+    late, order = Event(), []
+
+    def first():
+        late.wait(20)
+        order.append("first")
+        raise InputError("first")
+
+    def second():
+        order.append("second")
+        late.set()
+        raise InputError("second")
+
+    steps = only_once(Recipe("a", first, {}), Recipe("b", second, {}), Recipe("c", len, {"b": "b"}))
+    with pytest.raises(InputError, match="first"):
+        run_once(steps, Tally(), threads=2)
+    assert order == ["second", "first"]
 
 
 @pytest.mark.parametrize("layer", ALL)

@@ -204,7 +204,7 @@ def rendered(
     refuse_too_large(work, due)
     tally = Tally()
     first = Artifacts(store, memory)
-    numbers = unseen_objects(work.plan, first, tally) if due and not strict else ()
+    numbers = unseen_objects(work.plan, first, tally, threads) if due and not strict else ()
     steps = without(work.plan, work.loaded, numbers)
     if memory is not None and due:
         after = without(following.plan, following.loaded, numbers) if following is not None else None
@@ -218,7 +218,7 @@ def rendered(
             tally.add({"artifacts": time.perf_counter() - began}, {})
             report.reused[view.name] = dict(narrowed.reused)
             report.skipped = dict(narrowed.skipped)
-            shared = run_once(narrowed, tally, artifacts)
+            shared = run_once(narrowed, tally, artifacts, threads)
             report.repairs |= repairs(shared)
             report.repairs_first |= shared["repairs"].first
             if strict:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import columns
+from illumcli.demand import Recipe
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.film import pixel_means, pixel_nearest
 from illumcli.memory import keep_freed_memory
@@ -81,16 +82,33 @@ def _as_they_are(tile: Tile, layers: Planes) -> Planes:
     return layers
 
 
-def run_once(plan: Plan, tally: Tally, artifacts: Artifacts | None = None) -> dict[str, Any]:
-    """The buffers that no tile changes."""
-    buffers: dict[str, Any] = {}
-    for step in plan.once:
+def run_once(
+    plan: Plan, tally: Tally, artifacts: Artifacts | None = None, threads: int = 1
+) -> dict[str, Any]:
+    """The buffers that no tile changes; those that do not need each other are made beside each other.
+
+    Of several faults the one is raised that comes first in the plan.
+    """
+    pending: dict[str, Future[Any]] = {}
+
+    def make(step: Recipe) -> Any:
+        needs = {name: pending[name].result() for name in step.needs.values()}  # handed out before it
         start = time.perf_counter()
-        buffers[step.makes] = step.make(buffers)
+        made = step.make(needs)
         tally.add({step.makes: time.perf_counter() - start}, {})
-        if artifacts is not None and step.makes in plan.keeps:
-            name = step.makes
-            artifacts.keep_once(name, plan.keeps[name], buffers[name], _cost(plan, name, tally))
+        return made
+
+    buffers: dict[str, Any] = {}
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="once")
+    try:
+        for step in plan.once:
+            pending[step.makes] = pool.submit(make, step)
+        for name, future in pending.items():
+            buffers[name] = future.result()
+            if artifacts is not None and name in plan.keeps:
+                artifacts.keep_once(name, plan.keeps[name], buffers[name], _cost(plan, name, tally))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
     return buffers
 
 

@@ -42,7 +42,9 @@ def _reach(made: Plan, radius: float) -> float:
     return (made.scene.obscurance or Obscurance()).falloff.reach(radius)
 
 
-def unseen_objects(made: Plan, artifacts: Artifacts, tally: Tally, at_hand: bool = False) -> tuple[int, ...]:
+def unseen_objects(
+    made: Plan, artifacts: Artifacts, tally: Tally, threads: int = 1, at_hand: bool = False
+) -> tuple[int, ...]:
     """The numbers of the objects that can be left out of all views of a plan.
 
     What is made to know it is counted in `tally`, and at hand in `artifacts` from then on. With `at_hand`
@@ -51,7 +53,7 @@ def unseen_objects(made: Plan, artifacts: Artifacts, tally: Tally, at_hand: bool
     scene = made.scene
     if scene is None or why_all(made) is not None:
         return ()
-    standing: Standing | None = _asked(made, "standing", artifacts, tally, at_hand)
+    standing: Standing | None = _asked(made, "standing", artifacts, tally, threads, at_hand)
     if standing is None:
         return ()
     frame, film = standing.frame, scene.film
@@ -67,7 +69,7 @@ def unseen_objects(made: Plan, artifacts: Artifacts, tally: Tally, at_hand: bool
     reach = _reach(made, frame.radius) / frame.radius
     found = unseen(low, high, np.zeros(len(low)), views, lights, reach, frame)
     if found.any() and lights and set(rates(scene)) & set(SMOOTH):
-        lifts = _asked(made, "lifts", artifacts, tally, at_hand)
+        lifts = _asked(made, "lifts", artifacts, tally, threads, at_hand)
         if lifts is None:
             return ()
         found = unseen(low, high, lifts / frame.radius, views, lights, reach, frame)
@@ -87,7 +89,7 @@ def without(made: Plan, loaded: Any, numbers: tuple[int, ...]) -> Plan:
     return replace(fewer, views=made.views, skipped=skipped)
 
 
-def _asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, at_hand: bool) -> Any:
+def _asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, threads: int, at_hand: bool) -> Any:
     """A buffer of the whole scene, before the plan runs; None where it would have to be made and must not."""
     book = Book(made.book, made.views[0], artifacts)
     steps = order(book, [name], GIVEN)
@@ -100,6 +102,6 @@ def _asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, at_hand: b
     ]
     kept = {each: book.keys_of(each) for each in new if artifacts.keeps(each)}
     first = replace(made, once=tuple(steps), reused=artifacts.reused, keeps=kept)
-    buffers = run_once(first, tally, artifacts)
+    buffers = run_once(first, tally, artifacts, threads)
     artifacts.made.update((book.keys_of(each), value) for each, value in buffers.items())
     return buffers[name]

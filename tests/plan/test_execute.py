@@ -11,6 +11,7 @@ from illumcli.demand import Recipe
 from illumcli.errors import InputError
 from illumcli.plan.execute import Tally, bands, run_once
 from illumcli.plan.plan import Plan, plan
+from illumcli.plan.stages import FEWEST, tiles
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
 
@@ -82,6 +83,32 @@ def test_bands_hold_what_is_made_of_their_tiles(picture, overrides):
     rows, columns = np.indices(plain.shape[:2])
     np.testing.assert_array_equal(made["place"], np.stack([columns, rows], axis=-1))
     np.testing.assert_array_equal(made["bright"][..., 0], plain.max(axis=-1) > 0.5)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "side", "samples"),
+    [
+        (1280, 720, 192, 1),
+        (1280, 720, 128, 4),
+        (83, 61, 13, 3),
+        (64, 64, 64, 1),
+        (7, 300, 8, 16),
+        (5, 3, 8, 1),
+    ],
+)
+def test_tiles_cover_every_pixel_once_and_end_small(width, height, side, samples):
+    rows = tiles(width, height, side, samples)
+    seen = np.zeros((height, width), int)
+    for row in rows:
+        assert len({(tile.y, tile.height) for tile in row}) == 1  # a row is a band
+        for tile in row:
+            assert max(tile.width, tile.height) <= side
+            np.add.at(seen, tile.pixels()[::-1], 1)
+    assert (seen == 1).all()
+    last = [tile.width for tile in rows[-1]]
+    assert last == sorted(last, reverse=True)
+    if width * height * samples > 100 * FEWEST:
+        assert rows[-1][-1].width <= side / 4
 
 
 def only_once(*steps):

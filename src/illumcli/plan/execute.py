@@ -22,6 +22,7 @@ from illumcli.plan.artifacts import Artifacts, Keeper
 from illumcli.plan.plan import Plan
 from illumcli.plan.recipes import SHAPE, View
 from illumcli.plan.stages import MOST, Scattered, Tile
+from illumcli.plan.stages import tiles as cut
 from illumcli.rays.tracer import Interrupted
 from illumcli.records import Record
 from illumcli.visibility.arriving import Lit
@@ -135,15 +136,9 @@ def bands(
     interrupted, tiles in flight end at their next step.
     """
     adaptive = view.is_adaptive
-    side = plan.tile_side(view.coarse() if adaptive else view, side)
+    first = view.coarse() if adaptive else view
+    tiles = cut(view.width, view.height, plan.tile_side(first, side), first.samples)
     stop = threading.Event()
-    tiles = [
-        [
-            Tile(x, y, min(side, view.width - x), min(side, view.height - y))
-            for x in range(0, view.width, side)
-        ]
-        for y in range(0, view.height, side)
-    ]
     ahead = threads + 1
     keeper = Keeper(artifacts or Artifacts(), {} if adaptive else plan.keeps, view)
     common = _Common(plan, shared, view, tally, stop, keeper, develop, plan.last_use())

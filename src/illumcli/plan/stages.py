@@ -308,6 +308,22 @@ class Tile(Value):
         return Tile(x, y, right - x, lower - y)
 
 
+def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
+    """The tiles of a picture, row by row: squares, and the last of several rows ends in halves of what is
+    left of it, as long as they hold `FEWEST` samples, so that threads end together."""
+    out = []
+    for y in range(0, height, side):
+        own, last = min(side, height - y), 0 < y >= height - side
+        row, x = [], 0
+        while rest := width - x:
+            half = min(-(-rest // 16) * 8, rest)
+            ending = last and rest <= 2 * side and half * own * samples >= FEWEST
+            row.append(Tile(x, y, half if ending else min(side, rest), own))
+            x += row[-1].width
+        out.append(row)
+    return out
+
+
 class Scattered(Tile):
     """Pixels that need not lie together, as a tile of one row."""
 

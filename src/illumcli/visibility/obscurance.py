@@ -101,22 +101,24 @@ def estimates(
     count = len(origins)
     w, uneven = np.ones(count, F), np.zeros(count, F)
     mean = np.array(n, F, order="F") if bent else None
-    lane = np.arange(count) if known_open is None else np.flatnonzero(~known_open)
+    lane = np.flatnonzero(~known_open) if known_open is not None and known_open.any() else None
+    casting = count if lane is None else len(lane)
     frames = about(n, draws, method)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
-    for first in range(0, len(lane), at_once):
-        part = lane[first : first + at_once]
+    for first in range(0, casting, at_once):
+        some = slice(first, min(first + at_once, casting))
+        part = some if lane is None else lane[some]
         d = directions(frames[part], draws[:, part], method)
-        mu = seen(tracer, rows(origins, part), d, method).reshape(len(part), -1)
+        mu = seen(tracer, origins[part], d, method).reshape(-1, method.samples)
         w[part] = shares(mu)
         if errors:
             uneven[part] = unevenness(mu, method.sampler)
         if mean is not None:
-            ways = d.T.reshape(3, len(part), -1).transpose(1, 0, 2)
+            ways = d.T.reshape(3, len(mu), -1).transpose(1, 0, 2)
             towards = np.matmul(ways, mu.astype(F)[:, :, None])[:, :, 0]
             size = np.linalg.norm(towards, axis=1, keepdims=True)
             mean[part] = np.divide(towards, size, out=np.zeros_like(towards), where=size > 0)
-    return Estimates(w, uneven, mean, count - len(lane))
+    return Estimates(w, uneven, mean, count - casting)
 
 
 def shares(mu: NDArray[Any]) -> NDArray[np.float32]:

@@ -41,10 +41,8 @@ def some(table: NDArray[Any], lanes: NDArray[Any]) -> NDArray[Any]:
 
 
 def repeated(vectors: Vectors, count: int) -> Vectors:
-    """(N * count, 3) each vector so many times in a row; by components, five times as fast as `np.repeat`."""
-    out = np.empty((3, len(vectors), count), vectors.dtype)
-    out[...] = vectors.T[:, :, None]
-    return out.reshape(3, -1).T
+    """(N * count, 3) each vector so many times in a row; by components, which is much faster."""
+    return np.repeat(vectors.T, count, axis=1).T
 
 
 def dot(a: Vectors, b: Vectors) -> Lanes:

@@ -58,7 +58,7 @@ def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
-    return Facets(position, columns(normal, F), effective_edge(edge, area.astype(F)), behind)
+    return Facets(position, columns(normal, F), effective_edge(edge, area), behind)
 
 
 def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:

@@ -20,6 +20,7 @@ LEAVES = {
     "description",
     "values",
     "records",
+    "memory",
     "frame",
     "pixels",
     "docstrings",
@@ -101,6 +102,13 @@ def loaded_after(code: str) -> set[str]:
 def test_help_loads_nothing_heavy():
     code = "from illumcli.cli import illum\ntry:\n    illum(['--help'])\nexcept SystemExit: pass"
     assert not loaded_after(code) & {"numpy", "pydantic", "yaml", "embreex", "OpenImageIO"}
+
+
+def test_a_scene_is_validated_without_pydantics_own_models():
+    code = "import illumcli.jobs.render\nfrom illumcli.models.lambert import Lambert\nLambert()"
+    loaded = loaded_after(code)
+    assert "pydantic_core" in loaded
+    assert not loaded & {"pydantic", "annotated_types"}
 
 
 def test_plan_loads_no_ray_core(root):

@@ -1,8 +1,9 @@
-"""Freed memory stays with the process while arrays come and go."""
+"""Memory asked of the system: kept while arrays come and go, and asked for before it cannot be refused."""
 
 from __future__ import annotations
 
 import ctypes
+import mmap
 import sys
 from functools import cache
 
@@ -19,3 +20,14 @@ def keep_freed_memory() -> None:
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(MAP_THRESHOLD, 1 << 26)
         libc.mallopt(TRIM_THRESHOLD, 1 << 27)
+
+
+def refuse_little(size: int) -> None:
+    """Raise MemoryError where the process cannot have `size` more bytes.
+
+    Some libraries end the process where they find too little while they load.
+    """
+    try:
+        mmap.mmap(-1, size).close()
+    except OSError as error:
+        raise MemoryError from error

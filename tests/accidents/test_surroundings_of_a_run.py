@@ -83,7 +83,7 @@ runpy.run_module("illumcli", run_name="__main__")
 """
 
 
-@pytest.mark.parametrize("steps", [3, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("steps", [12, pytest.param(60, marks=pytest.mark.slow)])
 def test_little_memory_gives_the_right_picture_or_one_line(folder, steps):
     env = {**os.environ, "ILLUM_CACHE": str(folder / "cache")}
     whole, codes = None, []
@@ -96,6 +96,7 @@ def test_little_memory_gives_the_right_picture_or_one_line(folder, steps):
             capture_output=True,
             text=True,
             check=False,
+            timeout=60,
         )
         codes.append(done.returncode)
         if done.returncode == 0:
@@ -103,7 +104,7 @@ def test_little_memory_gives_the_right_picture_or_one_line(folder, steps):
             whole = whole or found
             assert found == whole, limit
         else:
-            assert done.returncode in (1, 4), (limit, done.returncode, done.stderr[-2000:])
+            assert done.returncode in (1, 4, 5), (limit, done.returncode, done.stderr[-2000:])
             assert "Traceback" not in done.stderr, (limit, done.stderr[-3000:])
             assert done.stderr.strip(), limit
     assert codes[0] == 0

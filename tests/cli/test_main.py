@@ -71,20 +71,6 @@ def test_a_second_signal_ends_at_once_and_leaves_no_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_metadata_of_packages_is_read_when_asked_for():
-    script = """
-import sys
-import illumcli.cli as cli
-cli._look_for_no_plugins()
-from illumcli.models.lambert import Lambert
-Lambert.validated({})
-assert "email" not in sys.modules
-from importlib.metadata import entry_points, version
-assert version("pydantic") and entry_points() is not None
-"""
-    subprocess.run([sys.executable, "-c", script], check=True)
-
-
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
 def test_output_that_cannot_be_printed_is_an_error():
     with open("/dev/full", "w") as full:

@@ -183,12 +183,14 @@ def test_upload_builds_the_tree(ball):
     assert scene.is_committed
 
 
-def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch):
+@pytest.mark.parametrize(("code", "error"), [(1, IllumError), (upload.OUT_OF_MEMORY, MemoryError)])
+def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch, code, error):
     vertices, faces = ball
     library = upload._library()
-    monkeypatch.setattr(library, "rtcGetDeviceError", lambda device: 4)
-    with pytest.raises(IllumError, match="failed to build: error 4"):
+    monkeypatch.setattr(library, "rtcGetDeviceError", lambda device: code)
+    with pytest.raises(error) as caught:
         Tracer(vertices.astype(F), faces)
+    assert ("error 1 of Embree" in str(caught.value)) == (code == 1)
 
 
 class Elsewhere:

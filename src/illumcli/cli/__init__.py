@@ -6,8 +6,9 @@ import gc
 import os
 import signal
 import sys
+from contextlib import suppress
 from importlib import import_module
-from types import FrameType, ModuleType
+from types import FrameType
 from typing import Any
 
 import click
@@ -82,16 +83,17 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # threads are ours: those of numpy's linear algebra would only spin beside them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    _look_for_no_plugins()
+    status = 1
     try:
-        status = illum.main(standalone_mode=False)
+        code = illum.main(standalone_mode=False)
         sys.stdout.flush()
+        status = code if isinstance(code, int) else 0
     except IllumError as error:
         click.echo(f"{error}", err=True)
-        sys.exit(error.exit_code)
+        status = error.exit_code
     except click.ClickException as error:
         error.show()
-        sys.exit(error.exit_code)
+        status = error.exit_code
     except _Stopped as stop:
         _die_by(stop.number)
     except BrokenPipeError:
@@ -99,41 +101,19 @@ def main() -> None:
     except OSError as error:  # an operating system that refuses what nobody expects it to
         place = f"{error.filename}: " if error.filename else ""
         click.echo(f"{place}{error.strerror or error}; check the disk and the permissions", err=True)
-        sys.exit(1)
     except ImportError as error:  # most often too little memory to map a library
         said = str(error).strip().splitlines()[-1:] or ["no reason given"]
         click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
-        sys.exit(1)
-    except MemoryError:
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "start new thread" not in str(error):  # it wants memory, too
+            raise
         click.echo("out of memory; make the film, the meshes or the samples smaller", err=True)
-        sys.exit(4)
-    # all is written: to take the interpreter apart costs an eighth of a small render
-    os._exit(status if isinstance(status, int) else 0)
-
-
-def _look_for_no_plugins() -> None:
-    """Keep pydantic from looking for plug-ins in every installed package, a tenth of a small start.
-
-    It takes `entry_points` from `importlib.metadata` all the same, which needs mail, sockets and archives:
-    that can wait until it is called.
-    """
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    sys.modules.setdefault(_Later.NAME, _Later(_Later.NAME))
-
-
-class _Later(ModuleType):
-    """Stands for a module until one of its functions is called or another attribute read."""
-
-    NAME = "importlib.metadata"
-
-    def entry_points(self, **words: Any) -> Any:
-        return self.__getattr__("entry_points")(**words)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):  # the import itself asks
-            raise AttributeError(name)
-        sys.modules.pop(self.NAME, None)
-        return getattr(import_module(self.NAME), name)
+        status = 4
+    with suppress(OSError):  # what was printed before an error
+        sys.stdout.flush()
+    # to take the interpreter apart costs an eighth of a small render, and after an error it may wait for
+    # threads of the ray core that could not start
+    os._exit(status)
 
 
 class _Stopped(BaseException):

@@ -14,13 +14,16 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, no_utf8, shown
+from illumcli.memory import refuse_little
 from illumcli.pixels import from_srgb
 from illumcli.records import Record
+
+refuse_little(1 << 26)  # OpenImageIO takes 46 MB and ends the process where it does not get them
+import OpenImageIO as oiio  # noqa: E402
 
 SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
 READ_ROWS = 64  # rows held at once while reading back

@@ -25,6 +25,7 @@ ROBUST = 4  # RTC_SCENE_FLAG_ROBUST
 INDEX, VERTEX = 0, 1  # RTC_BUFFER_TYPE_*
 UINT3, FLOAT3 = 0x5003, 0x9003  # RTC_FORMAT_*
 TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
+OUT_OF_MEMORY = 4  # RTC_ERROR_OUT_OF_MEMORY
 
 
 def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
@@ -55,6 +56,8 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
     library.rtcCommitScene(handle)
     error = library.rtcGetDeviceError(device)
     library.rtcReleaseDevice(device)
+    if error == OUT_OF_MEMORY:
+        raise MemoryError
     if error:
         raise IllumError(f"the ray core failed to build: error {error} of Embree")
     scene.is_committed = 1
@@ -70,7 +73,10 @@ def _handle(scene: Any) -> int | None:
         if flag.value != probe:
             scene.is_committed = 0
             return None
-    return ctypes.c_void_p.from_address(id(scene) + HANDLE).value
+    handle = ctypes.c_void_p.from_address(id(scene) + HANDLE).value
+    if handle is None:  # embreex goes on with the scene that Embree could not make
+        raise MemoryError
+    return handle
 
 
 @cache

@@ -1,8 +1,8 @@
 """How much faster is a render on two threads, and on all, than on one?
 
-Reference: the same render with `-t 1`, in the same process, with a scene read anew; obscurance-bound and
-bound by shading. A machine that does other things meanwhile shows less than there is: see the load, and the
-same ratio of sums that hold no lock, which is what the machine gives.
+Reference: the same render with `-t 1`, in the same process, with a scene read anew: the obscurance-bound one
+of `replay.py`, and one bound by shading. A machine that does other things meanwhile shows less than there is:
+see the load, and the same ratio of sums that hold no lock, which is what the machine gives.
 
     OPENBLAS_NUM_THREADS=1 PYTHONPATH=src python benchmarks/threads.py [--small]
 """
@@ -40,7 +40,7 @@ def main() -> None:
         folder = Path(name)
         os.chdir(folder)
         scenes = {
-            "obscurance": (ambient_scene(folder, *large, 2 if SMALL else 32), ["obscurance"]),
+            "obscurance": (ambient_scene(folder, *large, 2 if SMALL else 64), ["obscurance"]),
             "two lights": (lit_scene(folder, *large, 1 if SMALL else 4), ["beauty"]),
         }
         for title, (scene, only) in scenes.items():

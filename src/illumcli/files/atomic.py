@@ -55,7 +55,7 @@ class Part:
         self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
         folder, name = self.target.parent, self.target.name
         self.path = folder / f".{name}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
-        with _refusals(self._named):
+        with refusals(self._named):
             if self.target.exists() and not self.target.is_file():
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
             folder.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ class Part:
     def commit(self) -> None:
         """Force the part to disk and give it its name; the name's old file is replaced."""
         try:
-            with _refusals(self._named):
+            with refusals(self._named):
                 _force(self.path)
                 os.replace(self.path, self.target)
             _open.discard(self.path)
@@ -131,7 +131,8 @@ def refused(place: str, error: OSError) -> OutputError:
 
 
 @contextmanager
-def _refusals(place: str) -> Iterator[None]:
+def refusals(place: str) -> Iterator[None]:
+    """What the operating system refuses within is an OutputError about `place`."""
     try:
         yield
     except OSError as error:

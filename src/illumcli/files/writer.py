@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import Part, refused
+from illumcli.files.atomic import Part, refusals
 from illumcli.files.png import PngFile
 from illumcli.pixels import refuse_nonfinite
 from illumcli.records import Value
@@ -175,18 +175,14 @@ class ImageWriter:
     def _or_nothing(self) -> Iterator[None]:
         """Whatever goes wrong, no part stays behind; what the file refuses is an OutputError."""
         try:
-            yield
-        except Refused as error:
+            with refusals(self._named):
+                yield
+        except BaseException as error:
             self.discard()
-            fact = " ".join(str(error).split())
-            raise OutputError(
-                f"{self._named}: cannot be written: {fact}; free space or change the folder"
-            ) from error
-        except OSError as error:
-            self.discard()
-            raise refused(self._named, error) from error
-        except BaseException:
-            self.discard()
+            if isinstance(error, Refused):
+                fact = " ".join(str(error).split())
+                way = "free space or change the folder"
+                raise OutputError(f"{self._named}: cannot be written: {fact}; {way}") from error
             raise
 
 

@@ -153,6 +153,19 @@ def test_a_layer_alone_is_the_layer_among_all(picture, whole, layer):
         assert values.tobytes() == whole[name].tobytes(), name
 
 
+MIXED = [f"objects.{k}.shading={rate}" for k, rate in enumerate(["quadratic", "phong", "quadratic"])]
+
+
+def test_rates_that_evaluate_at_samples_mix_without_permuting_them(picture):
+    """On flat facets both rates are one; only a change of order could tell the pictures apart."""
+    flat = [f"objects.{k}.mesh={{shape: box}}" for k in range(1, 5)]
+    few = ["objects.3.shading=phong", "objects.4.shading=quadratic"]
+    alike = picture(*ALL, overrides=[*flat, *few, *(f"objects.{k}.shading=phong" for k in range(3))])
+    mixed = picture(*ALL, overrides=[*flat, *few, *MIXED])
+    for name, values in alike.items():
+        np.testing.assert_allclose(mixed[name], values, atol=1e-6, err_msg=name)
+
+
 def test_layers_add_up_to_the_beauty(whole):
     lights = whole["key"] + whole["rim"] + whole["sun"]
     np.testing.assert_allclose(whole["diffuse"] + whole["specular"], lights, atol=2e-6)

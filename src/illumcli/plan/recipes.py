@@ -21,6 +21,7 @@ from illumcli.records import Value
 from illumcli.scene.load import resolve
 from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
 from illumcli.shading.materials import DEFAULT, Token
+from illumcli.shading.rates import AT_SAMPLES
 from illumcli.shading.terms import words
 from illumcli.shading.textures import paths
 from illumcli.variants import suggestion
@@ -200,7 +201,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
-    at_samples = not {"constant", "gouraud"} & set(rate)
+    at_samples = AT_SAMPLES.issuperset(rate)
     grains = tuple(thing.grain for thing in scene.objects)
     by_uv = {"uv_tangents": "uv_tangents"} if None in grains else {}
     book = [

@@ -20,6 +20,8 @@ from illumcli.rays.surface import Facets, Hits, facing, interpolated, quadratic
 from illumcli.records import Record
 
 RATES = ("constant", "gouraud", "phong", "quadratic")
+AT_SAMPLES = frozenset({"phong", "quadratic"})
+"""Rates that evaluate the model at every sample."""
 
 
 class Points(Record):
@@ -46,22 +48,36 @@ def points(
     centres: NDArray[np.float32] | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
 ) -> Points:
-    """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``."""
-    if len(set(rates)) == 1:
+    """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``.
+
+    Where every object is shaded at the samples, point i is sample i, whatever the mixture of rates.
+    """
+    if len(set(rates)) == 1 and rates[0] in _POINTS:
         return _POINTS[rates[0]](world, hits, facet, normals, centres, polygon_normals)
     rate = np.array([RATES.index(name) for name in rates], np.int8)
     of_sample = rate.take(world.objects.take(hits.triangle))
+    if AT_SAMPLES.issuperset(rates):
+        return _samples(hits, facet, _sample_normals(world, hits, facet, of_sample, normals))
+
+    # Split the samples: one group per rate with points of its own, and one for all that are shaded in place.
     groups, parts = [], []
-    for number, name in enumerate(RATES):
-        group = np.flatnonzero(of_sample == number)
-        if group.size:
-            groups.append(group)
-            some = Hits(*(values.take(group) for values in vars(hits).values()))
-            own = Facets(*(rows(values, group) for values in vars(facet).values()))
+    in_place = np.isin(of_sample, [RATES.index(name) for name in AT_SAMPLES])
+    for name in (*_POINTS, None):
+        group = np.flatnonzero(in_place if name is None else of_sample == RATES.index(name))
+        if not group.size:
+            continue
+        some = Hits(*(values.take(group) for values in vars(hits).values()))
+        own = Facets(*(rows(values, group) for values in vars(facet).values()))
+        groups.append(group)
+        if name is None:
+            n = _sample_normals(world, some, own, of_sample.take(group), normals)
+            parts.append(_samples(some, own, n))
+        else:
             parts.append(_POINTS[name](world, some, own, normals, centres, polygon_normals))
     if not parts:
         return _samples(hits, facet, facet.ng)
 
+    # Join the groups' points; a value returns to its samples through its own group.
     def spread(values: NDArray[Any]) -> NDArray[Any]:
         out = np.empty((len(hits.triangle), *values.shape[1:]), values.dtype, order="F")
         first = 0
@@ -86,17 +102,23 @@ def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def _phong(
-    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
-) -> Points:
-    n = facet.ng if normals is None else interpolated(world, normals, hits.triangle, hits.u, hits.v, facet)
-    return _samples(hits, facet, n)
-
-
-def _quadratic(
-    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
-) -> Points:
-    return _samples(hits, facet, quadratic(world, normals, hits.triangle, hits.u, hits.v, facet))
+def _sample_normals(
+    world: World, hits: Hits, facet: Facets, of_sample: NDArray[np.int8], normals: CornerVectors | None
+) -> Vectors:
+    """(M, 3) shading normal of every sample, by the rate of its object."""
+    if normals is None:
+        return facet.ng
+    kinds = [(RATES.index("phong"), interpolated), (RATES.index("quadratic"), quadratic)]
+    parts = [(np.flatnonzero(of_sample == number), normal) for number, normal in kinds]
+    out = np.empty_like(facet.ng)
+    for group, normal in parts:
+        if group.size == len(of_sample):
+            return normal(world, normals, hits.triangle, hits.u, hits.v, facet)
+        if group.size:
+            own = Facets(*(rows(values, group) for values in vars(facet).values()))
+            triangle, u, v = hits.triangle.take(group), hits.u.take(group), hits.v.take(group)
+            out[group] = normal(world, normals, triangle, u, v, own)
+    return out
 
 
 def _constant(
@@ -136,9 +158,4 @@ def _gouraud(
     )
 
 
-_POINTS: dict[str, Callable[..., Points]] = {
-    "constant": _constant,
-    "gouraud": _gouraud,
-    "phong": _phong,
-    "quadratic": _quadratic,
-}
+_POINTS: dict[str, Callable[..., Points]] = {"constant": _constant, "gouraud": _gouraud}

@@ -148,7 +148,13 @@ def without_polygons(mesh: Mesh) -> Mesh:
     """The mesh with all its names and nothing that can be seen."""
     per_corner: dict[str, Any] = {
         name: None if (rows := getattr(mesh, name)) is None else rows[:0]
-        for name in ("corner_normals", "corner_uvs", "polygon_materials", "polygon_groups")
+        for name in (
+            "corner_normals",
+            "corner_uvs",
+            "polygon_materials",
+            "polygon_groups",
+            "polygon_smoothing",
+        )
     }
     return replace(
         mesh,

@@ -30,6 +30,7 @@ class Mesh(Record):
     polygon_materials: NDArray[np.int32] | None = None  # (P,) index in `material_names`, -1 none
     group_names: tuple[str, ...] = ()
     polygon_groups: NDArray[np.int32] | None = None  # (P,) index in `group_names`, -1 none
+    polygon_smoothing: NDArray[np.int32] | None = None  # (P,) smoothing group, 0 off (facetted), -1 none said
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     """Per vertex, (V,) or (V, k), every property the file has; vertex colours are `color`, (V, 3) linear."""
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

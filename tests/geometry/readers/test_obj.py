@@ -119,6 +119,14 @@ def test_groups_and_materials_hold_until_the_next(tmp_path: Path) -> None:
     assert mesh.polygon_materials.tolist() == [-1, 0, 0, 1, 0]
 
 
+def test_smoothing_groups_hold_until_the_next(tmp_path: Path) -> None:
+    said = ["", "s 1\n", "s 7\n", "s off\n", "", "s 1\n", "s 0\n", "s 99999999999\n"]
+    mesh = mesh_of(tmp_path, SQUARE + "".join(f"{each}f 1 2 3\n" for each in said) + "f 1 2\n")
+    assert mesh.polygon_smoothing is not None
+    assert mesh.polygon_smoothing.tolist() == [-1, 1, 2, 0, 0, 1, 0, 5]
+    assert mesh_of(tmp_path, SQUARE + "f 1 2 3\n").polygon_smoothing is None
+
+
 def test_short_faces_are_dropped_and_counted_with_what_belongs_to_them(tmp_path: Path) -> None:
     text = SQUARE + "vt 0 0\nvt 1 1\nusemtl a\nf 1/1 2/1\nusemtl b\nf 1/2 2/2 3/2\nf\nf 1\n"
     mesh = mesh_of(tmp_path, text)

@@ -30,6 +30,7 @@ def polygons(
     corner_uvs: NDArray[Any] | None = None,
     polygon_materials: NDArray[Any] | None = None,
     polygon_groups: NDArray[Any] | None = None,
+    polygon_smoothing: NDArray[Any] | None = None,
     attributes: Mapping[str, NDArray[Any]] | None = None,
     repairs: Mapping[str, int] | None = None,
     **more: Any,
@@ -50,7 +51,7 @@ def polygons(
     normals, uvs : (K, 3), (U, 2) float64, or None
     corner_normals, corner_uvs : (C,) int, or None
         Row of each corner, -1 for none.
-    polygon_materials, polygon_groups : (P,) int, or None
+    polygon_materials, polygon_groups, polygon_smoothing : (P,) int, or None
     attributes : (V,) or (V, k) each
     **more
         Other fields of `Mesh`.
@@ -64,6 +65,7 @@ def polygons(
         corners, counts = corners[kept], counts[~few]
         corner_normals, corner_uvs = _pick(corner_normals, kept), _pick(corner_uvs, kept)
         polygon_materials, polygon_groups = _pick(polygon_materials, ~few), _pick(polygon_groups, ~few)
+        polygon_smoothing = _pick(polygon_smoothing, ~few)
     if not len(counts):
         raise InputError(f"{path}: has no faces; export the mesh with its faces")
     if len(corners) > MOST_CORNERS:
@@ -86,6 +88,7 @@ def polygons(
         corner_uvs=_ids(corner_uvs),
         polygon_materials=_ids(polygon_materials),
         polygon_groups=_ids(polygon_groups),
+        polygon_smoothing=_ids(polygon_smoothing),
         repairs=found,
         **more,
     )

@@ -36,7 +36,7 @@ from illumcli.records import Value
 
 # statements that hold no polygons and change none; free-form geometry is counted in `repairs`
 _STATE = (
-    "s mg lod bevel c_interp d_interp shadow_obj trace_obj ctech stech maplib usemap vp cstype deg step bmat "
+    "mg lod bevel c_interp d_interp shadow_obj trace_obj ctech stech maplib usemap vp cstype deg step bmat "
     "parm trim hole scrv sp end con call csh"
 )
 _OTHER_SHAPES = {"p": "points", "l": "lines", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
@@ -46,8 +46,8 @@ def read(path: Path) -> Mesh:
     """The polygons of an OBJ file, and the materials of its libraries.
 
     Vertex colours (three more numbers behind a position) are taken for sRGB, in 0..1 or 0..255. `o` and `g`
-    both begin a group. Smoothing groups and display attributes are left out, lines, points and free-form
-    geometry are counted in `repairs`.
+    both begin a group. Display attributes are left out; lines, points and free-form geometry are counted in
+    `repairs`.
     """
     text = Text.of(path, content(path), comments=True, continued=True)
     words = text.keywords(3)
@@ -83,6 +83,7 @@ def read(path: Path) -> Mesh:
         polygon_materials=polygon_materials,
         group_names=group_names,
         polygon_groups=polygon_groups,
+        polygon_smoothing=_smoothing(rest.smoothing, lines[b"f"]),
         attributes={} if color is None else {"color": color},
         materials=materials,
         repairs=repairs,
@@ -97,13 +98,20 @@ class _Statements(Value):
 
     materials: list[tuple[int, str]] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
+    smoothing: list[tuple[int, str]] = field(default_factory=list)
     libraries: list[tuple[int, str]] = field(default_factory=list)
     repairs: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, text: Text, lines: NDArray[np.intp]) -> _Statements:
         rest = cls()
-        names = {"usemtl": rest.materials, "o": rest.groups, "g": rest.groups, "mtllib": rest.libraries}
+        names = {
+            "usemtl": rest.materials,
+            "o": rest.groups,
+            "g": rest.groups,
+            "s": rest.smoothing,
+            "mtllib": rest.libraries,
+        }
         for line in lines.tolist():
             word, _, name = text.line(line).replace("\t", " ").partition(" ")
             if word in names:
@@ -269,6 +277,19 @@ def _selected(
     lines = np.array([line for line, _ in statements])
     ids = np.array([-1, *(names[name] for _, name in statements)])
     return tuple(names), ids[np.searchsorted(lines, faces)]
+
+
+def _smoothing(statements: list[tuple[int, str]], faces: NDArray[np.intp]) -> NDArray[np.int64] | None:
+    """(P,) smoothing group of each face: 0 off, -1 where none is said, the others numbered from 1."""
+    names, chosen = _selected(statements, faces)
+    if chosen is None:
+        return None
+    groups = [0 if _is_off(name) else k for k, name in enumerate(names, start=1)]
+    return np.array([*groups, -1])[chosen]
+
+
+def _is_off(group: str) -> bool:
+    return group.lower() in ("off", "null") or group.strip("0") == ""
 
 
 def _materials(

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors
+from illumcli.arrays import Vectors, dot, unit
 from illumcli.description import written
 from illumcli.frame import Frame
 from illumcli.lights._attenuation import Law
@@ -37,17 +38,25 @@ class Spot(Light):
             raise ValueError("position and target must differ")
 
     def arriving(self, position: Vectors, frame: Frame) -> Arriving:
-        """Light at `position`; strength f(d) times the cone's smooth step."""
-        l, distance = towards(frame.inward(self.position), position)
-        axis = np.asarray(self.target) - self.position
-        axis = axis / np.abs(axis).max()
-        axis = (axis / np.linalg.norm(axis)).astype(position.dtype)
-        cosine = -(l[:, 0] * axis[0] + l[:, 1] * axis[1] + l[:, 2] * axis[2])
-        rim, full = np.cos(np.radians([self.angle, self.angle * (1 - self.softness)]))
-        if full > rim:
-            x = np.clip((cosine - rim) / (full - rim), 0, 1)
+        """Light at `position`; strength f(d) times the cone's smooth step in the cosine to the axis."""
+        light = frame.inward(self.position)
+        l, distance = towards(light, position)
+        # the cone in double precision and by 1 - cos: a narrow one has no digits in a rounded cosine
+        gap = gap_to_axis(position - light, np.subtract(self.target, self.position))
+        rim, full = np.radians([self.angle, self.angle * (1 - self.softness)]) / 2
+        rim_gap, width = 2 * np.sin(rim) ** 2, 2 * np.sin(rim + full) * np.sin(rim - full)
+        if width > 0:
+            x = np.clip((rim_gap - gap) / width, 0, 1)
             cone = x * x * (3 - 2 * x)
         else:
-            cone = cosine >= rim
+            cone = gap <= rim_gap
         strength = self.attenuation.factor(distance.astype(np.float64) * frame.radius) * cone
         return Arriving(l, distance, strength.astype(position.dtype))
+
+
+def gap_to_axis(way: NDArray[np.float64], axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) 1 - cos of the angle between (N, 3) vectors and an axis, within 0..2: half the squared distance of
+    the unit vectors, which keeps its digits where the cosine is near 1."""
+    axis = axis / np.abs(axis).max()
+    apart = unit(way) - axis / np.linalg.norm(axis)
+    return np.minimum(dot(apart, apart) / 2, 2)

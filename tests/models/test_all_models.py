@@ -18,7 +18,7 @@ from illumcli.description import Description
 from illumcli.jobs.schema import schema_of
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
-from illumcli.variants import members, tags
+from illumcli.variants import member, members, tags
 
 MODELS = members("illumcli.models")
 CLAIMS = ("reciprocal", "conserving", "isotropic", "physical")
@@ -167,6 +167,34 @@ def test_lobes_are_finite_not_negative_and_keep_their_precision(Model, dtype, da
         assert values.dtype == dtype, name
         assert np.all(np.isfinite(values)), name
         assert values.min() >= 0, name
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"model": "phong"}, lambda n_l: np.ones_like(n_l)),
+        ({"model": "phong", "normalised": True}, lambda n_l: n_l / np.pi),
+        ({"model": "blinn_phong"}, lambda n_l: np.ones_like(n_l)),
+        ({"model": "blinn_phong", "normalised": True}, lambda n_l: n_l / np.pi),
+        ({"model": "kajiya_kay"}, lambda n_l: np.ones_like(n_l)),
+        ({"model": "lafortune"}, lambda n_l: n_l),
+    ],
+    ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
+)
+def test_an_exponent_of_zero_gives_one_at_any_angle(keys, expected, dtype):
+    """0^0 = 1: max(0, cos)^0 is 1 behind the horizon of the lobe too, for all lanes or for single ones."""
+    given = directions(5, 600, dtype)
+    flat = member("illumcli.models", keys["model"]).validated(
+        {"specular": [1.0, 1.0, 1.0], **keys, "exponent": 0.0}
+    )
+    want = expected(dot(given["n"], given["l"]))[:, None]
+    lanes = np.where(np.arange(len(want)) % 2, 0.0, 50.0).astype(dtype)
+    some = flat.at({"exponent": lanes})
+    at_all = evaluate({"specular": flat.specular_lobe}, given)["specular"]
+    at_some = evaluate({"specular": some.specular_lobe}, given)["specular"]
+    np.testing.assert_allclose(at_all, np.broadcast_to(want, at_all.shape), rtol=1e-5)
+    np.testing.assert_array_equal(at_some[lanes == 0], at_all[lanes == 0])
 
 
 @every_model

@@ -13,13 +13,13 @@ from illumcli.description import Description
 
 
 def lobe(gap: Lanes, exponent: Any) -> Lanes:
-    """(N,) cos(angle)^exponent from gap = 1 - cos(angle); 0 at and beyond a right angle.
+    """(N,) max(0, cos(angle))^exponent from gap = 1 - cos(angle); an exponent of 0 gives 1 at any angle.
 
     A power of a rounded cosine loses exponent * 2^-53 of its value; with the gap formed as half the squared
     distance of two unit vectors, exp(e log1p(-gap)) keeps its digits for exponents of 10^6 and more.
     """
     below_one = 1 - float(np.finfo(gap.dtype).epsneg)
-    return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * (gap < 1)
+    return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * ((gap < 1) | (exponent == 0))
 
 
 def log_cos(cosine: Lanes, sin2: Lanes) -> Lanes:

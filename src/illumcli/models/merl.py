@@ -70,8 +70,9 @@ class Merl(IlluminationModel):
     model: Literal["merl"] = "merl"
     file: str
     """Path of the measurement, from the scene's folder."""
-    lookup: Literal["nearest", "linear"] = "nearest"
-    """The cell itself, or the eight around weighed by distance, without those that hold no measurement."""
+    lookup: Literal["linear", "nearest"] = "linear"
+    """`linear`: the eight cells around, weighed by distance, without those that hold no measurement.
+    `nearest`: the cell itself, with a step at every border between cells."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {}
     reciprocal: ClassVar[bool] = True

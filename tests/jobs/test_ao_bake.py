@@ -132,6 +132,51 @@ def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
     assert (new["vertex"]["red"] == 255).all()
 
 
+NAMED = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+property float normal
+property float uv
+property float color
+property float heat
+property float Heat
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0 255 0 0 0.1 1 4 7 10
+1 0 0 255 0 0 0.2 2 5 8 11
+0 1 0 255 0 0 0.3 3 6 9 12
+3 0 1 2
+"""
+
+
+def test_properties_with_the_names_of_others_keep_their_values(text_mesh, tmp_path):
+    """A file may call a scalar of its own `normal`, `uv` or `color`."""
+    path = text_mesh(NAMED, "named.ply")
+    outs = [tmp_path / "out.ply", tmp_path / "out.glb"]
+    bake(path, *outs, samples=4)
+    table = PlyData.read(outs[0])["vertex"]
+    assert [table[name][2] for name in ("red", "color", "heat", "Heat")] == [255, 6, 9, 12]
+    assert table["normal"].tolist() == pytest.approx([0.1, 0.2, 0.3])
+    found = read_mesh(outs[1]).attributes
+    np.testing.assert_allclose(found["color"], [[1, 0, 0]] * 3, atol=1e-6)
+    scalars = {name: found[name].tolist() for name in ("_NORMAL_", "_UV_", "_COLOR_", "_HEAT", "_HEAT_")}
+    assert scalars.pop("_NORMAL_") == pytest.approx([0.1, 0.2, 0.3])
+    assert scalars == {"_UV_": [1, 2, 3], "_COLOR_": [4, 5, 6], "_HEAT": [7, 8, 9], "_HEAT_": [10, 11, 12]}
+
+
+def test_an_object_called_own_is_no_occluder_by_that_name(text_mesh, tmp_path):
+    path = text_mesh("version: 1\nobjects: [{name: own, mesh: {shape: sphere}}]\n", "own.yaml")
+    with pytest.raises(InputError, match="--occluders own: an object has that name too; give the object"):
+        bake(path, tmp_path / "a.npz", occluders=("own",))
+
+
 def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
     path = text_mesh(CUBE.replace("v 1 1 1\n", "v 1 1 1 \n") + "v 0 3 0\nf 4 3 9\nf 8 9 7\n")
     outs = [tmp_path / f"out.{kind}" for kind in ("npz", "ply", "glb")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ from illumcli.files.atomic import Part
 from illumcli.records import Record
 
 SUFFIXES = (".npz", ".ply", ".glb")
+STANDARD = ("normal", "uv", "color")
+"""Attributes of a shape that every format has a form of its own for; all others are the file's own."""
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
 
 _FLOAT, _UBYTE, _UINT = 5126, 5121, 5125  # glTF component types
@@ -216,7 +218,7 @@ def _joined(shapes: Sequence[Shape]) -> dict[str, NDArray[Any]]:
     kind = np.float32 if fits_single(vertices) else np.float64
     columns: dict[str, NDArray[Any]] = {name: vertices[:, k].astype(kind) for k, name in enumerate("xyz")}
     common = set.intersection(*(set(shape.attributes) for shape in shapes))
-    for name in sorted(common):
+    for name in sorted(common, key=lambda name: (name not in STANDARD, name)):
         parts = [np.asarray(shape.attributes[name]) for shape in shapes]
         if len({part.shape[1:] for part in parts}) > 1:
             continue
@@ -225,8 +227,16 @@ def _joined(shapes: Sequence[Shape]) -> dict[str, NDArray[Any]]:
             values = srgb_bytes(values)
         if values.dtype.kind == "f":
             values = values.astype(np.float32)
-        columns |= dict(zip(_labels(name, values), _flat(values), strict=True))
+        for label, column in zip(_labels(name, values), _flat(values), strict=True):
+            columns[free_name(label, columns)] = column
     return columns
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """`name`, with underscores behind it until it is not taken."""
+    while name in taken:
+        name += "_"
+    return name
 
 
 def _flat(values: NDArray[Any]) -> list[NDArray[Any]]:
@@ -337,7 +347,7 @@ def write_glb(path: Path, shapes: Sequence[Shape], baked: Baked, channel: str | 
             node["translation"] = centre.tolist()
             vertices = vertices - centre
         attributes = {"POSITION": buffer.add(vertices.astype("<f4"), _VERTICES, bounds=True)}
-        for name, values in shape.attributes.items():
+        for name, values in sorted(shape.attributes.items(), key=lambda each: each[0] not in STANDARD):
             label = {"normal": "NORMAL", "uv": "TEXCOORD_0"}.get(name)
             values = np.asarray(values)
             if name == "color" and channel is None:
@@ -348,7 +358,7 @@ def write_glb(path: Path, shapes: Sequence[Shape], baked: Baked, channel: str | 
                 values = unit_rows(values) if name == "normal" else values
                 if name == "uv":
                     values = values * [1, -1] + [0, 1]  # glTF counts v downwards
-                attributes[label] = buffer.add(values.astype("<f4"), _VERTICES)
+                attributes[free_name(label, attributes)] = buffer.add(values.astype("<f4"), _VERTICES)
         own = {f"_{name.upper()}": column[part] for name, column in baked.columns().items()}
         for name, column in own.items():
             attributes[name] = buffer.add(column.astype("<f4"), _VERTICES)

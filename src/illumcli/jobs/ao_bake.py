@@ -19,10 +19,12 @@ from illumcli.arrays import F, columns, cross, rows, unit
 from illumcli.demand import order
 from illumcli.errors import InputError, OutputError
 from illumcli.files.vertex_data import (
+    STANDARD,
     SUFFIXES,
     Baked,
     Shape,
     add_to_glb,
+    free_name,
     mesh_hash,
     read_content,
     write_glb,
@@ -311,6 +313,8 @@ def spread(
 def occluders_of(scene: Scene, world: World, settings: Settings) -> list[Occluders]:
     """What hides the vertices of each object: the scene, the object itself, or it and objects by name."""
     names = scene.object_names()
+    if "own" in settings.occluders and "own" in names:
+        raise InputError("--occluders own: an object has that name too; give the object another name")
     unknown = [name for name in settings.occluders if name not in (*names, "scene", "own")]
     if unknown:
         raise InputError(
@@ -391,7 +395,11 @@ def shape_of(scene: Scene, world: World, number: int, report: Report) -> Shape:
     placed = world.placed[number]
     mesh, linear = placed.mesh, placed.matrix[:3, :3]
     name = scene.object_names()[number]
-    attributes: dict[str, NDArray[Any]] = dict(mesh.attributes)
+    attributes: dict[str, NDArray[Any]] = {}
+    for own_name, values in mesh.attributes.items():
+        is_color = own_name == "color" and values.ndim == 2
+        taken = () if is_color else (*STANDARD, *attributes)
+        attributes[free_name(own_name, taken)] = values
     for kind, table, index in (
         ("normal", mesh.normals, mesh.corner_normals),
         ("uv", mesh.uvs, mesh.corner_uvs),

@@ -412,7 +412,8 @@ def _attributes(path: Path, vertex: dict[str, Column]) -> dict[str, NDArray[Any]
     for name in vertex:
         if name not in taken:
             values = _single(path, vertex, name)
-            attributes[name] = values.astype(values.dtype.newbyteorder("="))
+            label = f"{name}_" if name in attributes else name  # a scalar `color` beside red, green, blue
+            attributes[label] = values.astype(values.dtype.newbyteorder("="))
     return attributes
 
 

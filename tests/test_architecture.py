@@ -22,6 +22,7 @@ LEAVES = {
     "records",
     "memory",
     "frame",
+    "layers",
     "pixels",
     "docstrings",
     "__init__",

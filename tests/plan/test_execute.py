@@ -166,6 +166,42 @@ def test_rates_that_evaluate_at_samples_mix_without_permuting_them(picture):
         np.testing.assert_allclose(mixed[name], values, atol=1e-6, err_msg=name)
 
 
+def test_names_of_users_are_names_alone(tmp_path):
+    """Objects, materials, meshes and cameras may be called what buffers, layers and keys are called."""
+    text = """version: 1
+film: {width: 12, height: 12, samples: 2}
+cameras: {CAMERA: {position: [0, 1, 4], target: [0, 0, 0]}}
+meshes: {MESH: {shape: sphere}, OTHER: {shape: box}}
+materials: {MATERIAL: {model: phong, exponent: 5}}
+objects: [{name: OBJECT, mesh: MESH, material: MATERIAL}, {mesh: OTHER, transform: {translate: [1, 0, 0]}}]
+lights: [{light: point, name: LIGHT, position: [2, 3, 4], intensity: 20}]
+outputs: {layers: [beauty, lights, object_id, material_id, depth]}
+"""
+    words = ("CAMERA", "MESH", "OTHER", "MATERIAL", "OBJECT", "LIGHT")
+    made = []
+    for names in (words, ("view", "lights", "x_textures", "alpha", "beauty", "hits")):
+        own = text
+        for word, name in zip(words, names, strict=True):
+            own = own.replace(word, name)
+        (tmp_path / "s.yaml").write_text(own)
+        loaded = load(tmp_path / "s.yaml")
+        steps = plan(loaded.scene, loaded)
+        (band,) = bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally())
+        made.append([band.layers[layer.name] for layer in steps.layers])
+    for a, b in zip(*made, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_file_without_suffix_is_not_taken_for_a_mesh_of_that_name(tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "version: 1\nmeshes: {ball: {shape: sphere}}\nobjects: [{mesh: {file: ball}}, {mesh: ball}]\n"
+    )
+    (tmp_path / "ball").write_text("")
+    loaded = load(tmp_path / "s.yaml")
+    with pytest.raises(InputError, match="ball"):
+        run_once(plan(loaded.scene, loaded), Tally())
+
+
 def test_layers_add_up_to_the_beauty(whole):
     lights = whole["key"] + whole["rim"] + whole["sun"]
     np.testing.assert_allclose(whole["diffuse"] + whole["specular"], lights, atol=2e-6)

@@ -565,6 +565,28 @@ def test_a_pattern_of_a_plug_in_is_said_as_it_stands():
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "layer"),
+    [("beauty", "beauty"), ("alpha", "alpha"), ("lights", "lights"), ("Depth", "depth"), ("P", "position")],
+)
+def test_a_light_with_the_name_of_a_layer_is_refused_at_its_place(problems, name, layer):
+    text = f"version: 1\nlights:\n  - light: point\n    name: {name}\n    position: [1, 2, 3]\n"
+    assert problems(text) == [
+        f"s.yaml:4:5: lights.0.name: the layer {layer} has the name '{name}'; give the light another"
+    ]
+
+
+def test_parts_named_as_keys_are_merged_like_others(write):
+    """A material may be called `model`, a mesh `shape` or `file`."""
+    base = "version: 1\nmaterials: {model: {model: phong}, texture: {model: lambert}}\n"
+    base += "meshes: {shape: {shape: box}, file: {file: a.obj}}\n"
+    write(base, "scenes/base.yaml")
+    more = "materials: {vertex: {model: ward}}\nmeshes: {law: {shape: disc}}\n"
+    made = load(write(f"extends: base.yaml\n{more}")).scene
+    assert sorted(made.materials) == ["model", "texture", "vertex"]
+    assert sorted(made.meshes) == ["file", "law", "shape"]
+
+
 @pytest.mark.parametrize("group", ["lights", "objects"])
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_name_that_another_has_by_default_is_taken(problems, group, order):

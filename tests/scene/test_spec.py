@@ -14,6 +14,7 @@ from pydantic_core import ValidationError
 
 from illumcli.docstrings import field_docs
 from illumcli.jobs.schema import schema
+from illumcli.layers import FIXED, PER_LIGHT
 from illumcli.scene.load import PATHS
 from illumcli.scene.references import reference_faults
 from illumcli.scene.spec import LAYERS, Scene
@@ -83,7 +84,9 @@ def test_references_pass_over_what_they_do_not_understand(tree):
 
 
 def test_layers_of_the_schema_are_the_layers():
-    assert tuple(SCHEMA["$defs"]["Outputs"]["properties"]["layers"]["items"]["enum"]) == LAYERS
+    said = SCHEMA["$defs"]["Outputs"]["properties"]["layers"]["items"]["enum"]
+    assert tuple(said) == LAYERS
+    assert sorted(said) == sorted([*FIXED, *PER_LIGHT])
 
 
 def test_every_path_of_the_schema_is_known_as_one():

@@ -6,17 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
-from illumcli.records import Value
-
-
-class Layer(Value):
-    """A layer of the picture."""
-
-    name: str
-    buffer: str  # what fills it
-    channels: tuple[str, ...]  # full channel names, in order
-    data: bool = False  # never filtered: the sample nearest to the pixel's centre, in 32 bits
-    per_pixel: bool = False  # made pixel by pixel from whole blocks of pixels
 
 
 def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: int) -> NDArray[np.float32]:

@@ -21,14 +21,14 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture
-from illumcli.film.film import Layer
 from illumcli.film.preview import viewable
 from illumcli.jobs.limits import refuse_disk, refuse_memory
+from illumcli.layers import Layer
 from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Planes, Tally, bands, run_once
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
-from illumcli.plan.recipes import View
+from illumcli.plan.recipes import PURPOSES, View
 from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
@@ -278,7 +278,7 @@ def repairs(shared: Mapping[str, Any]) -> dict[str, int]:
     return {
         what: count
         for name, made in shared.items()
-        if name in ("repairs", "baked") or name.endswith("_textures")
+        if name in ("repairs", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
         for what, count in made.repairs.items()
     }
 

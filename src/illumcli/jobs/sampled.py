@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
-from illumcli.film.film import Layer
+from illumcli.layers import Layer
 from illumcli.plan.execute import Tally, at_pixels, bands
 from illumcli.plan.plan import Plan, plan
 from illumcli.plan.recipes import View

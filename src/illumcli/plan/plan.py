@@ -12,7 +12,7 @@ import numpy as np
 from illumcli import __version__
 from illumcli.demand import Recipe, order
 from illumcli.errors import InputError, LimitError
-from illumcli.film.film import Layer
+from illumcli.layers import Layer
 from illumcli.plan.artifacts import Artifacts, Book, Picture, kind_of
 from illumcli.plan.doubled import AGAIN, BLOCK, doubled_count
 from illumcli.plan.keys import Keys, code, digest

@@ -10,8 +10,8 @@ from typing import Any
 from illumcli.demand import Recipe
 from illumcli.errors import InputError
 from illumcli.files.content import Content
-from illumcli.film.film import Layer
 from illumcli.geometry.readers import companions
+from illumcli.layers import FIXED, Layer, of_light, shadow_of
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
@@ -28,6 +28,8 @@ from illumcli.variants import suggestion
 
 GIVEN = ("view", "tile")
 """Buffers that need no recipe."""
+PURPOSES = ("lobes", "ambient", "emission")
+"""What parameters that vary over a surface may serve."""
 SMOOTH = ("gouraud", "phong", "quadratic")
 
 
@@ -82,43 +84,14 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
     InputError
         A name that is no layer of this scene.
     """
-    lights = [Layer(name, f"light:{name}", _rgb(name)) for name in scene.named_lights()]
-    shadows = [
-        Layer(f"shadow.{name}", f"shadow:{name}", (f"shadow.{name}.Y",)) for name in scene.named_lights()
-    ]
-    known = {layer.name: [layer] for layer in [*lights, *shadows, *_LAYERS.values()]}
+    lights = [of_light(name) for name in scene.named_lights()]
+    shadows = [shadow_of(name) for name in scene.named_lights()]
+    known = {layer.name: [layer] for layer in [*lights, *shadows, *FIXED.values()]}
     known |= {"lights": lights, "shadows": shadows}
     problems = [f"no layer '{name}'; {suggestion(name, tuple(known))}" for name in names if name not in known]
     if problems:
         raise InputError(problems)
     return list({layer.name: layer for name in names for layer in known[name]}.values())
-
-
-def _rgb(name: str) -> tuple[str, ...]:
-    return tuple(f"{name}.{c}" for c in "RGB")
-
-
-_LAYERS = {
-    layer.name: layer
-    for layer in (
-        Layer("beauty", "beauty", ("R", "G", "B")),
-        Layer("ambient", "ambient", _rgb("ambient")),
-        Layer("diffuse", "diffuse", _rgb("diffuse")),
-        Layer("specular", "specular", _rgb("specular")),
-        Layer("emission", "emission", _rgb("emission")),
-        Layer("obscurance", "obscurance", ("obscurance.Y",)),
-        Layer("alpha", "alpha", ("A",)),
-        Layer("depth", "depth", ("Z",), data=True),
-        Layer("position", "world_position", ("P.X", "P.Y", "P.Z"), data=True),
-        Layer("normal", "normal", ("N.X", "N.Y", "N.Z"), data=True),
-        Layer("geometric_normal", "geometric_normal", ("Ng.X", "Ng.Y", "Ng.Z"), data=True),
-        Layer("uv", "uv", ("uv.U", "uv.V"), data=True),
-        Layer("object_id", "object_id", ("objectId.Y",), data=True),
-        Layer("material_id", "material_id", ("materialId.Y",), data=True),
-        Layer("triangle_id", "triangle_id", ("triangleId.Y",), data=True),
-        Layer("error", "error", ("error.Y",), data=True, per_pixel=True),
-    )
-}
 
 
 def candidates(scene: Scene) -> list[IlluminationModel] | None:
@@ -331,7 +304,7 @@ def mesh_name(scene: Scene, mesh: Any) -> str:
     """What an object's mesh is called: by its file, else by its name, else by its description."""
     source = _source(scene, mesh)
     if isinstance(source, MeshFile):
-        return source.file
+        return source.file if "." in source.file else f"./{source.file}"  # apart from names
     return mesh if isinstance(mesh, str) else repr(source)
 
 
@@ -369,7 +342,7 @@ def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
     ]
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
     images = stages.Images({path: Content(partial(resolve, loaded, path)) for path in named}, loaded)
-    for purpose in ("lobes", "ambient", "emission"):
+    for purpose in PURPOSES:
         if may_vary(scene, purpose):
             read, made = f"{purpose}_textures", f"{purpose}_parameters"
             book += [

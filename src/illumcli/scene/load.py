@@ -191,8 +191,11 @@ def merged(base: Node, over: Node) -> Node:
 
 
 def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
-    said = {key: entries[key].value for key in CHOICES if key in entries}
-    return said | {key: True for key in ("file", "texture", "vertex") if key in entries}
+    """What a mapping says that it is. A mesh or material may have such a key for its name: not text then."""
+    said = {key: node.value for key, node in entries.items() if isinstance(node.value, str)}
+    return {key: value for key, value in said.items() if key in CHOICES} | {
+        key: True for key in ("file", "texture", "vertex") if key in said
+    }
 
 
 def _validated(tree: Node, problems: list[Problem]) -> Scene | None:

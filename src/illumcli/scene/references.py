@@ -8,6 +8,7 @@ from typing import Any
 from pydantic_core import ValidationError
 
 from illumcli.description import Description
+from illumcli.layers import owner_of
 from illumcli.scene.faults import Fault, faults
 from illumcli.variants import member, suggestion
 
@@ -41,7 +42,10 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
         }
         for i, thing in enumerate(things):
             name = _get(thing, "name")
-            if isinstance(name, str) and name in taken:
+            layer = owner_of(name) if kind == "lights" and isinstance(name, str) else None
+            if layer is not None:
+                yield (kind, i, "name"), f"the layer {layer} has the name '{name}'; give the light another"
+            elif isinstance(name, str) and name in taken:
                 yield (kind, i, "name"), f"the name '{name}' is taken"
             elif isinstance(name, str):
                 taken.add(name)

@@ -5,7 +5,7 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
@@ -283,31 +283,12 @@ class Obscurance(Description):
     (`one_sided`)."""
 
 
-LAYERS = (
-    "beauty",
-    "ambient",
-    "diffuse",
-    "specular",
-    "emission",
-    "lights",
-    "shadows",
-    "obscurance",
-    "alpha",
-    "depth",
-    "position",
-    "normal",
-    "geometric_normal",
-    "uv",
-    "object_id",
-    "material_id",
-    "triangle_id",
-    "error",
-)
 Layer: TypeAlias = Literal[
     "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha",
     "depth", "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
     "error",
 ]  # fmt: skip
+LAYERS: tuple[str, ...] = get_args(Layer)
 
 
 class Outputs(Description):

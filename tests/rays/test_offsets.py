@@ -7,7 +7,7 @@ import pytest
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.jobs.stress.rays import grazing, icosphere, surface_points, world_of
-from illumcli.rays.offsets import lifted, tangent_lift
+from illumcli.rays.offsets import lifted, terminator_offset
 from illumcli.rays.tracer import Tracer
 
 F = np.float32
@@ -80,15 +80,15 @@ def test_a_plate_a_millionth_above_the_floor_still_shades_it(height):
     assert Tracer(vertices, faces).occluded(origins, d.astype(F)).all()
 
 
-def test_tangent_lift_reaches_the_sphere_and_leaves_hollows_alone(ball):
+def test_terminator_offset_reaches_the_sphere_and_leaves_hollows_alone(ball):
     vertices, faces = ball
     corners = tuple(np.asfortranarray(vertices[faces[:, k]]) for k in range(3))
     third = np.full(len(faces), 1 / 3)
     centre = np.mean(corners, axis=0)
-    lift = tangent_lift(centre, corners, corners, (third, third, third))
+    lift = terminator_offset(centre, corners, corners, (third, third, third))
     assert (np.linalg.norm(centre + lift, axis=1) >= 1).all()
     hollow = tuple(-corner for corner in corners)
-    assert not tangent_lift(centre, corners, hollow, (third, third, third)).any()
+    assert not terminator_offset(centre, corners, hollow, (third, third, third)).any()
 
 
 def test_a_needle_turned_out_of_its_axes_does_not_hit_itself():

@@ -135,8 +135,15 @@ def render(setup):
         normal = setup.normals[corner[:, k]] * np.where(behind, -1, 1)[:, None]
         below = np.minimum(((position - setup.vertices[corner[:, k]]) * normal).sum(1), 0)
         lifted -= (weight[:, k] * below)[:, None] * normal
-    blocked, *_ = intersect(setup, lifted + SELF * radius * ng, l, SELF * radius, distance - SELF * radius)
-    delta = (lit & (blocked < 0)).astype(float)
+    # lit is what the polygon's own ray says, or the ray from that point where nothing lies on the way to it
+    # (every mesh here is one smooth part, so nothing else can stand nearby)
+    tiny = SELF * radius
+    start, height = position + tiny * ng, np.linalg.norm(lifted - position, axis=1)
+    own, *_ = intersect(setup, start, l, tiny, distance - tiny)
+    implied, *_ = intersect(setup, lifted + tiny * ng, l, tiny, distance - tiny)
+    up = (lifted - position) / np.maximum(height, 1e-300)[:, None]
+    way, *_ = intersect(setup, start, up, tiny, height - tiny)
+    delta = (lit & ((own < 0) | ((height > 0) & (implied < 0) & (way < 0)))).astype(float)
 
     model = Scene.validated({"version": 1, "materials": {"m": setup.material}}).materials["m"]
     given = {name: np.asfortranarray(value[lit]) for name, value in (("n", n), ("l", l), ("v", -d))}

@@ -36,7 +36,7 @@ about half as fast as measured."""
 MEMORY = 1 << 30
 """Bytes that the variants of a sweep keep in memory for each other."""
 
-ONCE = ("mesh", "standing", "lifts", "world", "repairs", "corner_normals", "numbering")
+ONCE = ("mesh", "standing", "implied_widths", "world", "repairs", "corner_normals", "numbering")
 """Buffers of the whole scene that are kept, by name or by its part before the colon.
 
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.

@@ -195,7 +195,7 @@ def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
         asked = {layer.buffer for layer in following.layers} | {"hits", "samples", "alpha"}
         read = {need for step in following.tile if step.makes not in common for need in step.needs.values()}
         wanted |= {other(name) for name in common & (asked | read)}
-        wanted |= {other(name) for name in ("lifts", *(step.makes for step in following.once))}
+        wanted |= {other(name) for name in ("implied_widths", *(step.makes for step in following.once))}
     return frozenset(wanted)
 
 
@@ -235,7 +235,7 @@ def _rays_of(scene: Any, samples: int, made: set[str]) -> dict[str, int]:
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in made and light.shadows and any(light.color()):
             rays[f"shadow:{name}"] = samples
-    if {"obscurance", "obscurance_origins"} <= made and scene.obscurance:
+    if {"obscurance", "obscurance_draws"} <= made and scene.obscurance:
         rays["obscurance"] = samples * scene.obscurance.samples
     return rays
 
@@ -266,13 +266,11 @@ def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[s
             reasons[name] = "the light's intensity is 0"
         elif kind in ("shadow", "reach") and light and not active[light].shadows:
             reasons[name] = "the light casts no shadows"
-        elif name == "obscurance_origins" and any(is_baked(scene)):
+        elif name == "obscurance_draws" and any(is_baked(scene)):
             reasons[name] = "the obscurance is baked"
-        elif kind in ("obscurance", "obscurance_origins") and scene.obscurance is None:
+        elif kind in ("obscurance", "obscurance_draws") and scene.obscurance is None:
             reasons[name] = "the scene has no obscurance: w = 1"
-        elif kind in ("ambient", "ambient_color", "obscurance", "obscurance_origins") and not is_ambient(
-            scene
-        ):
+        elif kind in ("ambient", "ambient_color", "obscurance", "obscurance_draws") and not is_ambient(scene):
             reasons[name] = "no ambient light leaves any surface"
         elif kind == "emission" and not is_emissive(scene):
             reasons[name] = "no material emits"

@@ -190,8 +190,8 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.view_vectors, "v"),
         Recipe.of(stages.uv_tangents),
         Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
-        Recipe.of(stages.shadow_origins, **smooth),
-        Recipe.of(stages.obscurance_origins),
+        Recipe.of(stages.ray_origins),
+        *_terminator(smooth),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         *_obscurance(scene, loaded, unseen),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
@@ -208,8 +208,9 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     ]
     book += _materials(scene, loaded)
     eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
+    implied = {"smooth": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
     for name, light in scene.named_lights().items():
-        book += _light(name, light, eye, at_samples)
+        book += _light(name, light, eye, at_samples, implied)
     made = {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
     counts = [view.samples for view in views(scene)]
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
@@ -271,7 +272,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
     how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
     methods = tuple("newell" if said is None else said.polygon for said in normals)
     parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
-    flat = tuple(own == "constant" for own in rate)
+    flat = tuple(own == "constant" or scene.terminator == "none" for own in rate)
     every = "every_mesh" if unseen else "meshes"
     left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
@@ -283,7 +284,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
             "standing",
             meshes=every,
         ),
-        Recipe.of(partial(stages.lifts, flat), "lifts", meshes=every),
+        Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
         Recipe.of(stages.world),
         Recipe.of(stages.frame),
         Recipe.of(stages.repairs),
@@ -362,8 +363,20 @@ def _varying(scene: Scene, purpose: str) -> dict[str, str]:
     return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
 
 
-def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) -> list[Recipe]:
-    """What one light takes: where it arrives, its shadow, the response to it."""
+def _terminator(smooth: Mapping[str, str]) -> list[Recipe]:
+    """The surface that normals imply, from which shadow rays start; none where every object is flat."""
+    if not smooth:
+        return []
+    return [Recipe.of(stages.smooth_parts, **smooth), Recipe.of(stages.smooth_surface, **smooth)]
+
+
+def _light(
+    name: str, light: Light, eye: Mapping[str, str], at_samples: bool, implied: Mapping[str, str]
+) -> list[Recipe]:
+    """What one light takes: where it arrives, its shadow, the response to it.
+
+    `implied` names the smooth surface that shadow rays may start from, if there is one.
+    """
     lit, reach, shadow = f"lit:{name}", f"reach:{name}", f"shadow:{name}"
     if not sends(light):
         dark = partial(stages.black)
@@ -383,7 +396,7 @@ def _light(name: str, light: Light, eye: Mapping[str, str], at_samples: bool) ->
         Recipe.of(partial(stages.reach, place), reach)
         if not at_samples
         else Recipe.of(stages.same, reach, lit=lit),
-        Recipe.of(stages.shadow, shadow, reach=reach)
+        Recipe.of(stages.shadow, shadow, reach=reach, **implied)
         if light.shadows
         else Recipe.of(stages.no_shadow, shadow),
         Recipe.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),

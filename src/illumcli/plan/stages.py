@@ -17,11 +17,11 @@ from illumcli.frame import Frame
 from illumcli.geometry import assemble
 from illumcli.geometry.assemble import CornerVectors, Standing, World
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
 from illumcli.rays.camera import axes as camera_axes
 from illumcli.rays.camera import camera_rays, film_points
-from illumcli.rays.offsets import lifted
 from illumcli.rays.surface import Facets, Hits
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
@@ -81,9 +81,10 @@ def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> Standing:
     return assemble.stand(meshes, matrices)
 
 
-def lifts(flat: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing) -> NDArray[np.float64]:
-    """(O,) how far off each object's surface its shadow rays start at most [scene units]: the curved surface
-    that normals pretend lies no farther from a polygon than this is wide."""
+def implied_widths(
+    flat: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing
+) -> NDArray[np.float64]:
+    """(O,) the widest polygon of each object whose normals imply another surface [scene units], else 0."""
     sizes = [
         0.0 if own else assemble.widest_polygon(mesh, matrix)
         for own, mesh, matrix in zip(flat, meshes, standing.matrices, strict=True)
@@ -473,14 +474,28 @@ def free(light: Light, frame: Frame, points: Points, shadow: Lanes) -> Lit:
     return reaching(light, frame, points.position, np.flatnonzero(shadow != 0))
 
 
-def shadow_origins(world: World, hits: Hits, facets: Facets, normals: CornerVectors | None = None) -> Vectors:
-    """(M, 3) where shadow rays start."""
-    return shadows.shadow_origins(world, hits, facets, normals)
+def ray_origins(facets: Facets) -> Vectors:
+    """(M, 3) where shadow and obscurance rays start."""
+    return shadows.ray_origins(facets)
 
 
-def shadow(tracer: Tracer, shadow_origins: Vectors, reach: Lit) -> Lanes:
+def smooth_parts(world: World, normals: CornerVectors) -> SmoothParts:
+    """Which triangles form one smooth surface."""
+    return SmoothParts(world, normals)
+
+
+def smooth_surface(
+    world: World, hits: Hits, facets: Facets, smooth_parts: SmoothParts, normals: CornerVectors
+) -> shadows.SmoothSurface:
+    """The samples on the surface that their normals imply."""
+    return shadows.SmoothSurface(world, normals, smooth_parts, hits, facets)
+
+
+def shadow(
+    tracer: Tracer, ray_origins: Vectors, reach: Lit, smooth: shadows.SmoothSurface | None = None
+) -> Lanes:
     """(M,) delta of one light."""
-    return shadows.shadow(tracer, shadow_origins, reach)
+    return shadows.shadow(tracer, ray_origins, reach, smooth)
 
 
 def no_shadow(hits: Hits) -> Lanes:
@@ -553,11 +568,6 @@ def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: V
     return (1 - fade) * uncued + fade * np.asarray(cue.color, F)
 
 
-def obscurance_origins(facets: Facets) -> Vectors:
-    """(M, 3) where obscurance rays start."""
-    return lifted(facets.position, facets.ng, facets.edge)
-
-
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
     """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
     key = sampling.stream(seed, "obscurance")
@@ -572,7 +582,7 @@ def obscurance(
     world: World,
     hits: Hits,
     facets: Facets,
-    obscurance_origins: Vectors,
+    ray_origins: Vectors,
     obscurance_draws: NDArray[np.float64],
     open_facets: OpenFacets | None = None,
     baked: BakedValues | None = None,
@@ -591,12 +601,10 @@ def obscurance(
     if open_facets is not None:
         known = open_facets.open(hits.triangle, facets.behind, WORTH_RAYS // settings.samples)
     if baked is None:
-        return estimates(
-            tracer, obscurance_origins, facets.ng, obscurance_draws, method, known, errors=False
-        ).w
+        return estimates(tracer, ray_origins, facets.ng, obscurance_draws, method, known, errors=False).w
     w = baked_obscurance(world, baked, hits)
     left = np.flatnonzero(np.isnan(w))
-    origins, ng = rows(obscurance_origins, left), rows(facets.ng, left)
+    origins, ng = rows(ray_origins, left), rows(facets.ng, left)
     known = None if known is None else known.take(left)
     w[left] = estimates(tracer, origins, ng, obscurance_draws[:, left], method, known, errors=False).w
     return w

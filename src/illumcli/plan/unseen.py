@@ -37,7 +37,7 @@ def why_all(made: Plan) -> str | None:
 def _reach(made: Plan, radius: float) -> float:
     """How far obscurance rays of the plan tell anything [scene units]; 0 where it casts none."""
     steps = {step.makes for step in made.tile}
-    if made.scene is None or not {"obscurance", "obscurance_origins"} <= steps:
+    if made.scene is None or not {"obscurance", "obscurance_draws"} <= steps:
         return 0.0
     return (made.scene.obscurance or Obscurance()).falloff.reach(radius)
 
@@ -68,11 +68,11 @@ def unseen_objects(
     ]
     reach = _reach(made, frame.radius) / frame.radius
     found = unseen(low, high, np.zeros(len(low)), views, lights, reach, frame)
-    if found.any() and lights and set(rates(scene)) & set(SMOOTH):
-        lifts = _asked(made, "lifts", artifacts, tally, threads, at_hand)
-        if lifts is None:
+    if found.any() and lights and scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH):
+        widths = _asked(made, "implied_widths", artifacts, tally, threads, at_hand)
+        if widths is None:
             return ()
-        found = unseen(low, high, lifts / frame.radius, views, lights, reach, frame)
+        found = unseen(low, high, widths / frame.radius, views, lights, reach, frame)
     if found.any():
         tally.add({}, {}, {"polygons": int(standing.polygons[found].sum())})
     return tuple(int(number) for number in np.flatnonzero(found))
@@ -84,7 +84,7 @@ def without(made: Plan, loaded: Any, numbers: tuple[int, ...]) -> Plan:
         return made
     fewer = plan(made.scene, loaded, [layer.name for layer in made.layers], numbers)
     names = made.scene.object_names()
-    skipped = {name: why for name, why in fewer.skipped.items() if name != "lifts"}
+    skipped = {name: why for name, why in fewer.skipped.items() if name != "implied_widths"}
     skipped |= {f"object:{names[number]}": WHY for number in numbers}
     return replace(fewer, views=made.views, skipped=skipped)
 

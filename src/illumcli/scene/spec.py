@@ -314,6 +314,9 @@ class Scene(Description):
     film: Film = NOTHING
     shading: Rate = "phong"
     """How often the model is evaluated."""
+    terminator: Literal["smooth", "none"] = "smooth"
+    """Where shadows of smooth shading begin: `smooth`, on the surface that the normals imply, so that coarse
+    polygons cast no shadow on its lit side; `none`, on the polygons themselves."""
     ambient: Annotated[Ambient, Before(_ambient, written=AmbientText)] = NOTHING
     """Colour, form or both of the light from everywhere."""
     obscurance: Obscurance | None = None

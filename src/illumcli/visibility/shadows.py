@@ -1,34 +1,97 @@
-"""Is the way to a light free: delta(p, j), rays for lit lanes only."""
+"""Occlusion of lights: delta(p, j), asked by shadow rays for the samples that a light may reach.
+
+A shadow ray starts on the polygon. Where polygons stand for a smooth surface that is a false terminator: on
+the lit side of the surface, polygons that face away from the light, or hide behind their neighbours, would be
+in shadow. So a sample whose own ray is blocked asks again from the surface that its normals imply. That ray
+must not jump over anything: the way to its start must be free, and nothing but the surface itself may stand
+nearby in the light's direction.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, columns, rows
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World
-from illumcli.rays.offsets import lifted, tangent_lift
+from illumcli.geometry.smooth_parts import SmoothParts
+from illumcli.rays.offsets import diameter, lifted, terminator_offset
 from illumcli.rays.surface import Facets, Hits, corner_rows, facing
 from illumcli.rays.tracer import Tracer
+from illumcli.records import Record
 from illumcli.visibility.arriving import Lit
 
-
-def shadow_origins(world: World, hits: Hits, facet: Facets, normals: CornerVectors | None = None) -> Vectors:
-    """(M, 3) float32 where shadow rays start: off the facet, and off the curved surface that interpolated
-    `normals` pretend, so that a coarse smooth mesh casts no shadow on its own lit side."""
-    position = facet.position
-    if normals is not None:
-        at = corner_rows(world, hits.triangle, normals)
-        corners = [rows(world.vertices, world.triangles[:, k].take(hits.triangle)) for k in range(3)]
-        ends = [facing(rows(normals.values, index), facet.behind) for index in at]
-        weights = (1 - hits.u - hits.v, hits.u, hits.v)
-        position = position + tangent_lift(columns(position, F), corners, ends, weights)
-    return lifted(position, facet.ng, facet.edge)
+NEARBY = 2.0
+"""Polygon diameters within which whatever is not part of the same smooth surface shadows a sample."""
 
 
-def shadow(tracer: Tracer, origins: Vectors, lit: Lit) -> NDArray[np.float32]:
-    """(M,) delta: 1 where the light's way is free, 0 in shadow; 0 on lanes the light does not reach."""
+class SmoothSurface(Record):
+    """The samples of a tile on the smooth surfaces that their normals imply."""
+
+    world: World
+    normals: CornerVectors
+    parts: SmoothParts
+    hits: Hits
+    facets: Facets
+
+
+def ray_origins(facets: Facets) -> Vectors:
+    """(M, 3) float32 where shadow and obscurance rays start: on the facet, off it by rounding alone."""
+    return lifted(facets.position, facets.ng, facets.edge)
+
+
+def shadow(
+    tracer: Tracer, origins: Vectors, lit: Lit, smooth: SmoothSurface | None = None
+) -> NDArray[np.float32]:
+    """(M,) delta: 1 where the light arrives, 0 in shadow and on samples that the light does not reach.
+
+    With `smooth` a false terminator is taken away; the samples are then those of its tile.
+    """
     delta = np.zeros(lit.count, F)
     hidden = tracer.occluded(columns(rows(origins, lit.lane)), lit.l, lit.distance)
+    if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
+        sample = lit.lane.take(blocked)
+        l, distance = columns(rows(lit.l, blocked)), lit.distance.take(blocked)
+        hidden[blocked] = ~_implied_reached(tracer, smooth, origins, sample, l, distance)
     delta[lit.lane] = ~hidden
     return delta
+
+
+def _implied_reached(
+    tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Lanes
+) -> NDArray[np.bool_]:
+    """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
+    # Where the implied surface lies above each sample.
+    triangle = smooth.hits.triangle.take(sample)
+    u, v = smooth.hits.u.take(sample), smooth.hits.v.take(sample)
+    facets = Facets(*(rows(values, sample) for values in vars(smooth.facets).values()))
+    world = smooth.world
+    corners = [rows(world.vertices, world.triangles[:, k].take(triangle)) for k in range(3)]
+    at = corner_rows(world, triangle, smooth.normals)
+    ends = [facing(rows(smooth.normals.values, index), facets.behind) for index in at]
+    offset = terminator_offset(columns(facets.position, F), corners, ends, (1 - u - v, u, v))
+    height = length(offset)
+    starts = lifted(facets.position + offset, facets.ng, facets.edge)
+
+    # Rule out, one question after the other, samples that stay in shadow: the light does not reach the
+    # implied surface; something stands between the polygon and it; something else stands nearby.
+    open_ = np.flatnonzero(height > 0)
+    open_ = open_[
+        ~tracer.occluded(columns(rows(starts, open_)), columns(rows(l, open_)), distance.take(open_))
+    ]
+    own = columns(rows(origins, sample.take(open_)))
+    way = ~tracer.occluded(own, columns(unit(rows(offset, open_))), height.take(open_))
+    open_, own = open_[way], columns(rows(own, np.flatnonzero(way)))
+    near = np.minimum(NEARBY * diameter([rows(corner, open_) for corner in corners]), distance.take(open_))
+    hit = tracer.closest(own, _above(rows(l, open_), rows(facets.ng, open_)))
+    other = (hit.distance < near) & ~smooth.parts.joined(triangle.take(open_), np.maximum(hit.triangle, 0))
+
+    reached = np.zeros(len(sample), np.bool_)
+    reached[open_[~other]] = True
+    return reached
+
+
+def _above(l: Vectors, ng: Vectors) -> Vectors:
+    """(N, 3) float32 `l`, taken along the polygon's plane where it points below it."""
+    below = np.minimum(dot(l, ng), 0)
+    return columns(unit(l - below[:, None] * ng), F)

@@ -25,6 +25,8 @@ from illumcli.frame import Frame
 from illumcli.geometry.order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
+from illumcli.rays.offsets import TERMINATOR_SHARE
+from illumcli.visibility.shadows import NEARBY
 
 ROOM = 1e-4
 """Radii by which everything is taken to be larger: rays in single precision, the second shot of rays that
@@ -144,7 +146,7 @@ def fewer(low: Points, high: Points) -> tuple[Points, Points]:
 def unseen(
     low: Points,
     high: Points,
-    lifts: NDArray[np.float64],
+    widths: NDArray[np.float64],
     views: Sequence[Planes],
     lights: Iterable[Light],
     reach: float,
@@ -156,8 +158,9 @@ def unseen(
     ----------
     low, high : (O, 3)
         Corners of the objects' boxes, in radii; inf and -inf for one without polygons, which is never told.
-    lifts : (O,)
-        How far off each object's surface its shadow rays may start, in radii.
+    widths : (O,)
+        The widest polygon of each object whose shadow rays may start on the surface that its normals imply,
+        in radii: they start within a share of it and look for other things nearby (`shadows`).
     views : sequence of (n, d)
         What bounds each, at least one, as `frustum` gives it.
     lights : iterable of Light
@@ -170,7 +173,7 @@ def unseen(
     found = np.asarray(beyond.all(axis=0))
     if not found.any():
         return found
-    more = (ROOM + lifts)[:, None]
+    more = (ROOM + TERMINATOR_SHARE * widths)[:, None]
     seen = np.concatenate(
         [
             within(planes, *fewer((low - more)[mine], (high + more)[mine]))
@@ -179,7 +182,11 @@ def unseen(
     )
     if not len(seen):
         return found
-    for points, gap in [(seen, ROOM + reach), *((ways(seen, light, frame), ROOM) for light in lights)]:
+    near = NEARBY * widths[real & ~beyond.all(axis=0)].max(initial=0)
+    for points, gap in [
+        (seen, ROOM + max(reach, near)),
+        *((ways(seen, light, frame), ROOM) for light in lights),
+    ]:
         which = np.flatnonzero(found)
         found[which] = apart(points, low[which], high[which], gap)
     return found

@@ -30,7 +30,7 @@ from illumcli.jobs.verify.vectors import PACKAGED, read_cases
 from illumcli.rays.offsets import lifted
 from illumcli.rays.tracer import Tracer
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
+from illumcli.visibility.obscurance import Errors, Estimates, Hemispheres, Method, estimates
 
 SCRAMBLES = 400
 PAIRS, OWN = 16, 256
@@ -113,9 +113,8 @@ def estimated(case: Any, samples: int) -> Found:
         ng = columns(np.tile([0.0, 0.0, 1.0], (count, 1)), F)
         here = np.tile(world.frame.inward(np.zeros(3)), (count, 1))
         origins = lifted(here, ng, np.full(count, edge))
-        return estimates(
-            tracer, origins, ng, rng.random((2, count)), Method(samples, falloff, world.frame.radius)
-        )
+        method = Method(samples, falloff, world.frame.radius)
+        return estimates(tracer, Hemispheres(ng, origins), rng.random((2, count)), method)
 
     return Found(case.expected[0], cast(SCRAMBLES), cast(OWN), cast(OWN))
 

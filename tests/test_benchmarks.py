@@ -7,7 +7,10 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from illumcli.geometry.shapes.torus import Torus
 
 SCRIPTS = {
     "startup": "ratio tiny render / six libraries",
@@ -52,3 +55,14 @@ def test_mitsuba_draws_the_same_picture(root, tmp_path):
         pytest.skip("needs PEERS, the python of an environment with mitsuba")
     text = printed(root, tmp_path, "peers", "mitsuba")
     assert float(text.partition("difference of the references: RMSE ")[2].split()[0]) < 0.06
+
+
+def test_w_jumps_less_about_interpolated_normals(root, tmp_path):
+    shape = Torus(segments=24, sides=12).mesh()
+    lines = [f"v {x} {y} {z}" for x, y, z in shape.vertices]
+    polygons = np.split(shape.corners + 1, shape.starts[1:-1])
+    (tmp_path / "torus.obj").write_text("\n".join(lines + [f"f {' '.join(map(str, p))}" for p in polygons]))
+    row = printed(root, tmp_path, "ao_facets", str(tmp_path / "torus.obj")).splitlines()[-1].split()
+    edges, geometric, shading = int(row[1]), float(row[2]), float(row[3])
+    assert edges == 20
+    assert shading < geometric / 2

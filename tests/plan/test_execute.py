@@ -296,3 +296,25 @@ lights: [{light: directional, direction: [0, -1, 0], irradiance: 2}]
     tally = Tally()
     (band,) = bands(steps, run_once(steps, tally), steps.views[0], 1, tally)
     np.testing.assert_allclose(band.layers["beauty"], 0.3 * 0.5 + 0.4 * 2 + 2, rtol=1e-6)
+
+
+def test_w_is_taken_about_the_normal_that_each_rate_interpolates(picture):
+    def w(*overrides):
+        return picture("obscurance", overrides=("film.samples=1", "objects.1.shading=phong", *overrides))[
+            "obscurance"
+        ]
+
+    geometric = w("obscurance.about=geometric")
+    flat = [f"objects.{k}.shading=constant" for k in range(5)]
+    assert np.array_equal(w(*flat), geometric)
+    gouraud, phong = (w(*(f"objects.{k}.shading={rate}" for k in range(5))) for rate in ("gouraud", "phong"))
+    assert np.array_equal(gouraud, phong)
+    assert not np.array_equal(phong, geometric)
+
+
+def test_a_coarse_smooth_ball_alone_is_open_exactly(picture):
+    away = [f"objects.{k}.transform.translate=[{20 * k}, 0.5, 0]" for k in (2, 3, 4)]
+    overrides = ("objects.0.mesh.size=[1e-3, 1e-3]", "camera.target=[0, 0.5, 0]", "camera.fov=15", *away)
+    layers = picture("obscurance", "alpha", overrides=("obscurance.falloff.max_distance=0.4", *overrides))
+    assert (layers["alpha"] > 0).mean() > 0.5
+    assert np.array_equal(layers["obscurance"], layers["alpha"])

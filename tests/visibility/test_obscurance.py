@@ -10,7 +10,8 @@ from illumcli.rays.tracer import Tracer
 from illumcli.variants import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import obscurance, turned_frame
+from illumcli.visibility.obscurance import Hemispheres, Method, obscurance, turned_frame
+from illumcli.visibility.obscurance import estimates as estimated
 
 F = np.float32
 FLOOR = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -125,3 +126,53 @@ def test_every_falloff_rises_from_0_at_contact_to_1_out_of_reach(Falloff):
         assert (np.diff(mu) >= 0).all()
         assert mu[0] == 0
         assert (mu[x >= 2] == 1).all()
+
+
+def tilted(tracer, tilts, sampler="spiral", samples=64, scrambles=400, bent=False):
+    """Estimates at the origin of a floor about normals that lean by `tilts` [degrees] towards -x."""
+    rng = np.random.default_rng(12)
+    t = np.radians(np.broadcast_to(tilts, scrambles))
+    n = np.asfortranarray(np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1).astype(F))
+    ng = np.asfortranarray(np.tile(UP.astype(F), (scrambles, 1)))
+    over = Hemispheres(n, lifted(np.zeros((scrambles, 3)), ng, np.full(scrambles, F(3))), ng)
+    return estimated(
+        tracer, over, rng.random((2, scrambles)), Method(samples, Step(), 1.0, sampler), bent=bent
+    )
+
+
+@pytest.mark.parametrize("tilt", [-60, -20, -1, 3, 35, 80])
+@pytest.mark.parametrize("sampler", ["spiral", "owen", "random"])
+def test_tilted_hemisphere_at_the_foot_of_an_endless_wall(tilt, sampler):
+    """Of the angles in the plane across the edge, seen from n, the wall covers those from t to 90 degrees,
+    (1 - sin t) / 2 of the cosine; what points below the floor is mirrored on its own side of the normal."""
+    wall = np.array([[1e-3, -500, 0], [1e-3, 500, 0], [1e-3, 500, 500], [1e-3, -500, 500]])
+    w = tilted(scene(FLOOR * 500, wall), tilt, sampler).w.astype(float)
+    agrees(w, (1 + np.sin(np.radians(tilt))) / 2)
+
+
+@pytest.mark.parametrize("samples", [1, 7, 64, 1024])
+@pytest.mark.parametrize("sampler", ["spiral", "owen", "random"])
+def test_a_lone_plane_is_open_exactly_about_any_normal(samples, sampler):
+    tilts = np.concatenate([np.linspace(0, 180, 100), np.geomspace(1e-6, 1, 100)])
+    assert (tilted(scene(FLOOR), tilts, sampler, samples, 200).w == 1).all()
+
+
+def test_only_rays_below_the_triangle_are_mirrored():
+    found = tilted(scene(FLOOR), 40, samples=4096, scrambles=50, bent=True)
+    mean = found.bent.astype(float)
+    assert (mean[:, 2] > np.cos(np.radians(40))).all()  # what was below has come above
+    straight = tilted(scene(FLOOR), 0, samples=4096, scrambles=50, bent=True).bent.astype(float)
+    assert np.abs(straight - UP).max() < 0.01
+
+
+def test_tilted_points_do_not_depend_on_their_company():
+    tracer = scene(FLOOR, FLOOR * 0.3 + [0, 0, 0.1])
+    tilts = np.linspace(0, 70, 400)
+    whole, draws = tilted(tracer, tilts).w, np.random.default_rng(12).random((2, 400))
+    t = np.radians(tilts)
+    n = np.asfortranarray(np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1).astype(F))
+    ng = np.asfortranarray(np.tile(UP.astype(F), (400, 1)))
+    over = Hemispheres(n, lifted(np.zeros((400, 3)), ng, np.full(400, F(3))), ng).take(slice(120, 133))
+    assert np.array_equal(
+        whole[120:133], estimated(tracer, over, draws[:, 120:133], Method(64, Step(), 1.0)).w
+    )

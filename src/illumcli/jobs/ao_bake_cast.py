@@ -23,7 +23,7 @@ from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
 from illumcli.visibility.horizon import Horizon
-from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
+from illumcli.visibility.obscurance import Errors, Estimates, Hemispheres, Method, estimates
 
 RAYS = 1 << 18
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
@@ -121,7 +121,8 @@ class Caster:
             around = self.occluders[piece.thing]
             tracer = around.tracer.counting(stop)
             method = replace(self.method, samples=piece.samples, facets=around.facets)
-            return estimates(tracer, part.origins, part.n, draws, method, bent=bent), tracer.rays
+            over = Hemispheres(part.n, part.origins)
+            return estimates(tracer, over, draws, method, bent=bent), tracer.rays
 
         done = kept.read(pieces, out) if kept is not None else set()
         waiting = [piece for number, piece in enumerate(pieces) if number not in done]

@@ -193,6 +193,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.ray_origins),
         *_terminator(smooth),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
+        Recipe.of(partial(stages.obscurance_normals, rate), "obscurance_normals", normals="corner_normals"),
         *_obscurance(scene, loaded, unseen),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
         Recipe.of(stages.emission, **_varying(scene, "emission")),
@@ -228,6 +229,8 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Reci
         more["baked"] = "baked"
     if settings.faces != "count":
         more["facet_normals"] = "facet_normals"
+    if settings.about == "shading" and set(rates(scene)) & set(SMOOTH):
+        more["obscurance_normals"] = "obscurance_normals"
     if all_baked(scene) or (scene.obscurance is None and "baked" in more):
         w = Recipe.of(stages.baked_or_open, "obscurance")
     else:

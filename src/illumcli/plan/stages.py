@@ -39,7 +39,7 @@ from illumcli.visibility import shadows
 from illumcli.visibility.arriving import Lit, reaching
 from illumcli.visibility.arriving import lit as lit_lanes
 from illumcli.visibility.horizon import OpenFacets
-from illumcli.visibility.obscurance import Method, estimates
+from illumcli.visibility.obscurance import Hemispheres, Method, estimates
 
 LARGEST_HORIZON = 1 << 17
 """Vertices up to which it is worth to look for facets with nothing above them."""
@@ -568,6 +568,13 @@ def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: V
     return (1 - fade) * uncued + fade * np.asarray(cue.color, F)
 
 
+def obscurance_normals(
+    rate: list[str], world: World, hits: Hits, facets: Facets, normals: CornerVectors
+) -> Vectors:
+    """(M, 3) what the hemisphere of obscurance stands about: the interpolated shading normal."""
+    return shading_rates.sample_normals(world, hits, facets, rate, normals)
+
+
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
     """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
     key = sampling.stream(seed, "obscurance")
@@ -584,11 +591,15 @@ def obscurance(
     facets: Facets,
     ray_origins: Vectors,
     obscurance_draws: NDArray[np.float64],
+    obscurance_normals: Vectors | None = None,
     open_facets: OpenFacets | None = None,
     baked: BakedValues | None = None,
     facet_normals: Vectors | None = None,
 ) -> Lanes:
-    """(M,) w of every sample seen; on meshes with baked values these, and rays for the others."""
+    """(M,) w of every sample seen; on meshes with baked values these, and rays for the others.
+
+    About the geometric normals where no others are given.
+    """
     method = Method(
         settings.samples,
         settings.falloff,
@@ -600,13 +611,16 @@ def obscurance(
     known = None
     if open_facets is not None:
         known = open_facets.open(hits.triangle, facets.behind, WORTH_RAYS // settings.samples)
+    if obscurance_normals is None:
+        over = Hemispheres(facets.ng, ray_origins)
+    else:
+        over = Hemispheres(obscurance_normals, ray_origins, facets.ng)
     if baked is None:
-        return estimates(tracer, ray_origins, facets.ng, obscurance_draws, method, known, errors=False).w
+        return estimates(tracer, over, obscurance_draws, method, known, errors=False).w
     w = baked_obscurance(world, baked, hits)
     left = np.flatnonzero(np.isnan(w))
-    origins, ng = rows(ray_origins, left), rows(facets.ng, left)
     known = None if known is None else known.take(left)
-    w[left] = estimates(tracer, origins, ng, obscurance_draws[:, left], method, known, errors=False).w
+    w[left] = estimates(tracer, over.take(left), obscurance_draws[:, left], method, known, errors=False).w
     return w
 
 

@@ -281,6 +281,9 @@ class Obscurance(Description):
     faces: Literal["count", "ignore", "one_sided"] = "count"
     """Faces met from behind `count` like others, are passed through (`ignore`), or let the ray go
     (`one_sided`)."""
+    about: Literal["shading", "geometric"] = "shading"
+    """What the hemisphere stands about: the interpolated normal that direct light is shaded with, or the
+    polygon's own. Directions that point below the polygon are mirrored at its plane."""
 
 
 Layer: TypeAlias = Literal[

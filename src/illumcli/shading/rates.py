@@ -39,6 +39,15 @@ class Points(Record):
         return len(self.triangle)
 
 
+def sample_normals(
+    world: World, hits: Hits, facet: Facets, rates: Sequence[str], normals: CornerVectors
+) -> Vectors:
+    """(M, 3) the interpolated shading normal of every sample, where object i is shaded at ``rates[i]``: of
+    `gouraud` the linear one, of `constant` the facet's own."""
+    rate = np.array([RATES.index(name) for name in rates], np.int8)
+    return _sample_normals(world, hits, facet, rate.take(world.objects.take(hits.triangle)), normals)
+
+
 def points(
     world: World,
     hits: Hits,
@@ -105,12 +114,13 @@ def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
 def _sample_normals(
     world: World, hits: Hits, facet: Facets, of_sample: NDArray[np.int8], normals: CornerVectors | None
 ) -> Vectors:
-    """(M, 3) shading normal of every sample, by the rate of its object."""
+    """(M, 3) shading normal of every sample, by the rate of its object; see `sample_normals`."""
     if normals is None:
         return facet.ng
-    kinds = [(RATES.index("phong"), interpolated), (RATES.index("quadratic"), quadratic)]
-    parts = [(np.flatnonzero(of_sample == number), normal) for number, normal in kinds]
-    out = np.empty_like(facet.ng)
+    bent = of_sample == RATES.index("quadratic")
+    flat = of_sample == RATES.index("constant")
+    parts = [(np.flatnonzero(bent), quadratic), (np.flatnonzero(~bent & ~flat), interpolated)]
+    out = facet.ng.copy(order="F")
     for group, normal in parts:
         if group.size == len(of_sample):
             return normal(world, normals, hits.triangle, hits.u, hits.v, facet)

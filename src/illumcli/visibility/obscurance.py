@@ -27,6 +27,8 @@ RAYS_AT_ONCE = 1 << 17
 origins and answers would stay in it; with two threads a fifth."""
 MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
+GRAZING = 2.0**-20
+"""Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
 
 
 class Method(Record):
@@ -43,6 +45,23 @@ class Method(Record):
     def any_hit(self) -> bool:
         """Does it suffice to know that something is in the way?"""
         return self.falloff.step and self.faces == "count"
+
+
+class Hemispheres(Record):
+    """What the rays of M points leave, and about what."""
+
+    n: Vectors  # (M, 3) float32 unit shading normals, the axes
+    origins: Vectors  # (M, 3) float32 off the surface, in radii from the scene's centre
+    ng: Vectors | None = None
+    """(M, 3) float32 unit normals of the triangles that the rays leave; None where they are `n`."""
+
+    def take(self, lanes: slice | NDArray[np.int64]) -> Hemispheres:
+        """Some of them, in this order."""
+
+        def part(of: Vectors) -> Vectors:
+            return of[lanes] if isinstance(lanes, slice) else rows(of, lanes)
+
+        return Hemispheres(part(self.n), part(self.origins), None if self.ng is None else part(self.ng))
 
 
 class Estimates(Record):
@@ -64,20 +83,23 @@ def obscurance(
     radius: float,
 ) -> NDArray[np.float32]:
     """(M,) w alone, with the default sampler; see `estimates`."""
-    return estimates(tracer, origins, ng, draws, Method(samples, falloff, radius), errors=False).w
+    method = Method(samples, falloff, radius)
+    return estimates(tracer, Hemispheres(ng, origins), draws, method, errors=False).w
 
 
 def estimates(
     tracer: Tracer,
-    origins: Vectors,
-    n: Vectors,
+    over: Hemispheres,
     draws: NDArray[np.float64],
     method: Method,
     known_open: NDArray[np.bool_] | None = None,
     bent: bool = False,
     errors: bool = True,
 ) -> Estimates:
-    """w = 1/pi * integral of mu(d) cos(theta) over the hemisphere about `n`: 1 where open.
+    """w = 1/pi * integral of mu(d) cos(theta) over the hemisphere about the shading normal: 1 where open.
+
+    A direction that points below the triangle it leaves is mirrored at that triangle's plane, so that no
+    triangle shades itself.
 
     The default sampler is a golden-angle spiral on the disc, turned and phased per point: unbiased for any
     count, and within 6 to 16 % of the least error any point set can have on visibility. Every estimate is a
@@ -85,10 +107,6 @@ def estimates(
 
     Parameters
     ----------
-    origins : (M, 3) float32
-        Off the surface, in radii from the scene's centre.
-    n : (M, 3) float32
-        Unit normals.
     draws : (2, M) float64
         In [0, 1): turn and phase of each point's spiral, or what another sampler is scrambled by.
     known_open : (M,) bool, optional
@@ -98,18 +116,21 @@ def estimates(
     errors : bool
         Also the unevenness, which `Errors` asks for; 0 otherwise.
     """
-    count = len(origins)
+    count = len(over.n)
     w, uneven = np.ones(count, F), np.zeros(count, F)
-    mean = np.array(n, F, order="F") if bent else None
+    mean = np.array(over.n, F, order="F") if bent else None
     lane = np.flatnonzero(~known_open) if known_open is not None and known_open.any() else None
     casting = count if lane is None else len(lane)
-    frames = about(n, draws, method)
+    frames = about(over.n, draws, method)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, casting, at_once):
         some = slice(first, min(first + at_once, casting))
         part = some if lane is None else lane[some]
+        own = over.take(part)
         d = directions(frames[part], draws[:, part], method)
-        mu = seen(tracer, origins[part], d, method).reshape(-1, method.samples)
+        if own.ng is not None:
+            mirror_below(d, own.n, own.ng, method)
+        mu = seen(tracer, own.origins, d, method).reshape(-1, method.samples)
         w[part] = shares(mu)
         if errors:
             uneven[part] = unevenness(mu, method.sampler)
@@ -199,6 +220,52 @@ def directions(frames: NDArray[np.float32], draws: NDArray[np.float64], method: 
     # a long row per component: three times as fast as one of three numbers per ray
     np.matmul(frames.transpose(0, 2, 1), patterns(draws, method), out=out.transpose(1, 0, 2))
     return out.reshape(3, -1).T
+
+
+def mirror_below(d: Vectors, n: Vectors, ng: Vectors, method: Method) -> None:
+    """Mirror those of the rays `d` that point below the plane of the triangle they leave, in place.
+
+    Parameters
+    ----------
+    d : (M * samples, 3) float32
+        The rays of each point, one point after the other.
+    n : (M, 3) float32
+        Unit axes of the points' patterns.
+    ng : (M, 3) float32
+        Unit normals of the triangles.
+    """
+    # the candidates of each point: of a pattern in the order of growing angles only the last
+    number = below_at_most(dot(n, ng), method)
+    point = np.repeat(np.arange(len(n)), number)
+    ray = (point + 1) * method.samples - 1 - np.arange(len(point))
+    ray += np.repeat(np.cumsum(number) - number, number)
+
+    # those that are below go as far above
+    normal = rows(ng, point)
+    height = dot(rows(d, ray), normal)
+    below = np.flatnonzero(height < GRAZING)
+    height, ray = height[below], ray[below]
+    up = np.maximum(-height, F(GRAZING)) - height
+    for component, along in zip(d.T, rows(normal, below).T, strict=True):
+        component[ray] += up * along
+
+
+def below_at_most(cosine: Lanes, method: Method) -> NDArray[np.int64]:
+    """(M,) how many rays, the last of each pattern, may point below a plane.
+
+    Ray i of a spiral leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose
+    normal stands at t from the axis unless sin^2 > cos^2 t.
+
+    Parameters
+    ----------
+    cosine : (M,) float32
+        Of the angle between the pattern's axis and the plane's normal.
+    """
+    if method.sampler != "spiral":
+        return np.full(len(cosine), method.samples)
+    least = 1 / (4 * len(spiral_table(method.samples)))  # half of what the last phase leaves of the rim
+    sine2 = 1 - np.square(np.clip(cosine, 0, 1).astype(np.float64)) + GRAZING
+    return np.clip(np.ceil(sine2 * method.samples - least), 0, method.samples).astype(np.int64)
 
 
 def patterns(draws: NDArray[np.float64], method: Method) -> NDArray[np.float32]:

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
+
+from illumcli.geometry.repairs import HARMLESS
+from illumcli.jobs.render import run
+from illumcli.plan import artifacts
 
 BAD = """v 0 0 0
 v 1 0 0
@@ -20,9 +25,9 @@ f 2//1 2//1 3//2
 f 1//1 3//1 2//1
 """
 EXPECTED = {
-    "unused vertices": (2, "vertex 4 of object 1"),
-    "faces without area": (2, "face 2 of object 1"),
-    "normals not finite or of no length": (1, "normal 2 of object 1"),
+    "unused vertices": (2, "bad.obj:4"),
+    "faces without area": (2, "bad.obj:10"),
+    "normals not finite or of no length": (1, "bad.obj:8"),
 }
 
 
@@ -34,31 +39,68 @@ def scene(tmp_path):
     return tmp_path
 
 
-def test_repairs_are_counted_and_said_with_their_first_place(illum, scene):
-    done = illum("render", "s.yaml", "--report", "r.json")
+def test_repairs_are_counted_and_said_once_with_their_first_line(illum, scene):
+    done = illum("render", "s.yaml", "--report", "r.json", "-v")
     assert done.returncode == 0, done.stderr
     report = json.loads((scene / "r.json").read_text())
-    assert report["repairs"] == {what: 2 * count for what, (count, _) in EXPECTED.items()}
+    assert report["repairs"] == {what: count for what, (count, _) in EXPECTED.items()}
     assert report["repairs_first"] == {what: first for what, (_, first) in EXPECTED.items()}
     for what, (count, first) in EXPECTED.items():
-        assert f"s.yaml: {what}: {2 * count}, the first is {first}" in done.stderr
+        assert done.stderr.count(f"s.yaml: {what}: {count}, the first is {first}\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("render", "s.yaml"),
+        ("ao-bake", "s.yaml", "-o", "b.npz", "--samples", "4"),
+        ("sweep", "s.yaml", "-D", "camera.fov=30,40"),
+    ],
+)
+def test_harmless_counts_are_for_those_who_ask(illum, scene, words):
+    quiet, told = illum(*words), illum(*words, "--force", "-v")
+    for what in EXPECTED:
+        assert quiet.stderr.count(what) == (what not in HARMLESS)
+        assert told.stderr.count(what) == 1
+    assert not any(what in illum(*words, "--force", "-q").stderr for what in EXPECTED)
 
 
 def test_a_second_run_from_the_cache_says_the_same(illum, scene):
     first = illum("render", "s.yaml", "--force", ILLUM_CACHE=str(scene / "c"))
     again = illum("render", "s.yaml", "--force", ILLUM_CACHE=str(scene / "c"))
     assert first.stderr == again.stderr
-    assert "unused vertices" in again.stderr
+    assert "faces without area" in again.stderr
+
+
+def test_a_mesh_that_was_renamed_is_called_by_its_new_name(tmp_path, monkeypatch):
+    """What is kept of a mesh is named by its content alone."""
+    monkeypatch.setattr(artifacts, "worth", lambda seconds, size: True)
+    monkeypatch.chdir(tmp_path)
+    Path("bad.obj").write_text(BAD)
+    Path("s.yaml").write_text(
+        "version: 1\nfilm: {width: 8, height: 8, samples: 1}\nobjects: [{mesh: bad.obj}]\n"
+    )
+    run(Path("s.yaml"))
+    Path("deep").mkdir()
+    Path("bad.obj").rename("deep/new.obj")
+    _, report = run(Path("s.yaml"), ["objects.0.mesh=deep/new.obj"], force=True)
+    assert any("store" in reused.values() for reused in report.reused.values())
+    assert {each.first for each in report.repairs.values()} == {f"deep/new.obj:{n}" for n in (4, 8, 10)}
 
 
 @pytest.mark.parametrize(
-    "words", [("render", "s.yaml"), ("ao-bake", "bad.obj", "-o", "b.npz", "--samples", "4")]
+    "words",
+    [
+        ("render", "s.yaml"),
+        ("ao-bake", "bad.obj", "-o", "b.npz", "--samples", "4"),
+        ("sweep", "s.yaml", "-D", "camera.fov=30"),
+    ],
 )
 def test_strict_refuses_every_class_and_writes_nothing(illum, scene, words):
     before = sorted(path.name for path in scene.iterdir())
     done = illum(*words, "--strict")
     assert done.returncode == 2, done.stderr
-    assert len(done.stderr.strip().splitlines()) == len(EXPECTED)
+    assert sum("leave --strict out" in line for line in done.stderr.splitlines()) == len(EXPECTED)
     for what in EXPECTED:
         assert what in done.stderr
     assert sorted(path.name for path in scene.iterdir() if path.name != "cache") == before

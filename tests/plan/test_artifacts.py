@@ -302,7 +302,6 @@ def test_buffers_come_back_as_they_were(scene):
     ) + sum(a.nbytes for placed in world.placed for a in policy.arrays_in(placed))
     again = decode(said, tuple(arrays))
     assert again.frame == world.frame
-    assert again.repairs == world.repairs
     assert again.placed[1].mesh.corners is again.placed[2].mesh.corners
     for name in ("vertices", "triangles", "corners", "polygons", "objects"):
         a, b = getattr(world, name), getattr(again, name)

@@ -106,7 +106,7 @@ class _Distance(click.ParamType):
 @click.option("--force", is_flag=True, help="Replace files that differ.")
 @strict_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@click.option("-v", "--verbose", is_flag=True, help="Say what was skipped and where time went.")
+@click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too, and where time went.")
 def ao_bake(
     source: Path,
     outputs: tuple[Path, ...],
@@ -134,7 +134,7 @@ def ao_bake(
     """
     from illumcli.cli._progress import reporter
     from illumcli.jobs.ao_bake import Settings, run, write_report
-    from illumcli.jobs.render import told_repairs
+    from illumcli.jobs.repairs import told
 
     if samples is not None and target_error is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")
@@ -161,7 +161,7 @@ def ao_bake(
     if not quiet:
         for kept in done.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in told_repairs(done.repairs, done.repairs_first):
+        for line in told(done.repairs, verbose):
             click.echo(f"{source}: {line}", err=True)
         for text in dict.fromkeys(done.left_out):
             click.echo(f"left out: {text}", err=True)

@@ -62,7 +62,8 @@ def render(
       illum render bunny.obj
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs.render import run, told_repairs, write_report
+    from illumcli.jobs.render import run, write_report
+    from illumcli.jobs.repairs import told
 
     reports = []
     for scene in scenes:
@@ -85,7 +86,7 @@ def render(
             click.echo(path)
         for kept in [] if quiet else done.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in [] if quiet else told_repairs(done.repairs, done.repairs_first):
+        for line in [] if quiet else told(done.repairs, verbose):
             click.echo(f"{scene}: {line}", err=True)
         for warning in done.warnings:
             click.echo(warning, err=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import allow_option, no_cache_option, scene_argument
+from illumcli.cli._options import allow_option, no_cache_option, scene_argument, strict_option
 
 if TYPE_CHECKING:
     from illumcli.jobs.sweep import Outcome
@@ -44,9 +44,11 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="By default the scene's.")
 @click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
 @click.option("--force", is_flag=True, help="Replace files that differ, render those that do not.")
+@strict_option
 @no_cache_option
 @allow_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
+@click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too.")
 def sweep(
     scene: Path,
     axes: tuple[str, ...],
@@ -62,8 +64,10 @@ def sweep(
     seed: int | None,
     threads: int | None,
     force: bool,
+    strict: bool,
     cache: bool,
     quiet: bool,
+    verbose: bool,
 ) -> None:
     """Render the variants of SCENE in one process; print the path of every image.
 
@@ -78,17 +82,25 @@ def sweep(
     """
     from illumcli.cli._progress import reporter
     from illumcli.jobs import sweep as job
+    from illumcli.jobs.repairs import told
+
+    said: set[str] = set()
 
     def written(outcome: Outcome) -> None:
         for path in outcome.paths if outcome.report else []:
             click.echo(path)
         for kept in outcome.report.kept if outcome.report and not quiet else []:
             click.echo(f"{kept}: kept, its content is the same", err=True)
+        for line in told(outcome.report.repairs, verbose) if outcome.report and not quiet else []:
+            if line not in said:
+                click.echo(f"{scene}: {line}", err=True)
+            said.add(line)
 
     if reference is not None and table is None:
         raise click.UsageError("--reference is what the errors of --table are against; give --table")
     variants = job.variants_of(axes, together, rows, frames)
-    done = job.run(scene, variants, pattern, only, seed, threads, force, cache, reporter(quiet), written)
+    progress = reporter(quiet)
+    done = job.run(scene, variants, pattern, only, seed, threads, force, cache, progress, written, strict)
     for warning in done.warnings:
         click.echo(warning, err=True)
     if table is not None:

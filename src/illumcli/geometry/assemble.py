@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, columns
 from illumcli.frame import Frame
-from illumcli.geometry.faults import Fault, faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.triangulate import triangulate
 from illumcli.records import Record
@@ -49,10 +48,6 @@ class World(Record):
     corners: NDArray[np.int32]  # (T, 3) corner numbers, for normals and uv
     polygons: NDArray[np.int32]  # (T,) polygon numbers
     objects: NDArray[np.int32]  # (T,) object numbers
-    repairs: Mapping[str, int]
-    """What was wrong with the meshes: class -> count."""
-    first: Mapping[str, str]
-    """Where each class occurs first, as `face 3 of object 1`."""
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.triangles, self.corners, self.polygons, self.objects):
@@ -176,9 +171,6 @@ def place(
     """
     frame = frame or stand(meshes, matrices).frame
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
-    repairs: dict[str, int] = {}
-    places: dict[str, str] = {}
-    known: dict[int, list[Fault]] = {}
     first = {"vertex": 0, "corner": 0, "polygon": 0, "triangle": 0}
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
         cut = triangulate(mesh)
@@ -198,12 +190,6 @@ def place(
         first["corner"] += len(mesh.corners)
         first["polygon"] += mesh.polygon_count
         first["triangle"] += len(own)
-        if id(mesh) not in known:
-            known[id(mesh)] = faults(mesh)
-        for fault in known[id(mesh)]:
-            repairs[fault.what] = repairs.get(fault.what, 0) + fault.count
-            if fault.first:
-                places.setdefault(fault.what, f"{fault.first} of object {number + 1}")
     return World(
         frame=frame,
         placed=tuple(placed),
@@ -212,8 +198,6 @@ def place(
         corners=columns(_joined(corners, np.zeros((0, 3), np.int32))),
         polygons=_joined(polygons, np.zeros(0, np.int32)),
         objects=_joined(objects, np.zeros(0, np.int32)),
-        repairs=repairs,
-        first=places,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.geometry.repairs import Repairs
 from illumcli.records import Record
 
 
@@ -35,8 +36,8 @@ class Mesh(Record):
     """Per vertex, (V,) or (V, k), every property the file has; vertex colours are `color`, (V, 3) linear."""
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """Material name -> keys of a scene's material, as the file's own library describes them."""
-    repairs: Mapping[str, int] = field(default_factory=dict)
-    """What was wrong and put right while reading: class -> count."""
+    repairs: Repairs = field(default_factory=dict)
+    """What was wrong and put right or left out while reading; places are relative to the mesh's file."""
 
     def __post_init__(self) -> None:
         for array in [*vars(self).values(), *self.attributes.values()]:

@@ -33,9 +33,11 @@ from illumcli.files.vertex_data import (
 )
 from illumcli.geometry.assemble import World, cofactors
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import Repairs
 from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders, PartFile
 from illumcli.jobs.ao_bake_points import Vertices, vertex_points
-from illumcli.jobs.render import peak_memory, refuse_repairs
+from illumcli.jobs.render import peak_memory
+from illumcli.jobs.repairs import refuse_repairs, repairs_data
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Value
@@ -97,8 +99,7 @@ class Report:
     target_error: float | None = None
     rays: dict[str, int] = field(default_factory=dict)
     samples: dict[int, int] = field(default_factory=dict)  # rays a point -> points
-    repairs: dict[str, int] = field(default_factory=dict)
-    repairs_first: dict[str, str] = field(default_factory=dict)
+    repairs: Repairs = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -107,7 +108,7 @@ class Report:
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it."""
-        data = {name: getattr(self, name) for name in self.__slots__}
+        data = {name: getattr(self, name) for name in self.__slots__} | repairs_data(self.repairs)
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory()}
 
     def summary(self) -> str:
@@ -140,16 +141,16 @@ def run(
     clock = _Clock()
     loaded = bare(path, overrides) if path.suffix.lower() in MESH_SUFFIXES else load(path, overrides)
     scene = loaded.scene
-    world = world_of(scene, loaded)
+    world, repairs = world_of(scene, loaded)
     meshes = [placed.mesh for placed in world.placed]
     hashes = [mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes]
     content = content_hash(scene, hashes, settings)
     threads = threads or len(os.sched_getaffinity(0))
     report = Report(str(path), content, settings.seed, threads, target_error=settings.target_error)
     report.vertices, report.triangles = len(world.vertices), len(world.triangles)
-    report.repairs, report.repairs_first = dict(world.repairs), dict(world.first)
+    report.repairs = repairs
     if strict:
-        refuse_repairs(str(path), report.repairs, report.repairs_first)
+        refuse_repairs(str(path), repairs)
     due = [each for each in outputs if not is_kept(each, content, force)]
     report.kept = [str(each) for each in outputs if each not in due]
     clock.lap(report, "read")
@@ -177,12 +178,12 @@ def run(
     return list(outputs), report
 
 
-def world_of(scene: Scene, loaded: Loaded) -> World:
-    """The scene's meshes in their places, made as a render makes them."""
+def world_of(scene: Scene, loaded: Loaded) -> tuple[World, Repairs]:
+    """The scene's meshes in their places, made as a render makes them, and what was put right in them."""
     buffers: dict[str, Any] = {}
-    for step in order(recipes(scene, loaded), ["world"]):
+    for step in order(recipes(scene, loaded), ["world", "repairs"]):
         buffers[step.makes] = step.make(buffers)
-    return buffers["world"]
+    return buffers["world"], buffers["repairs"].repairs
 
 
 def check_outputs(outputs: Sequence[Path]) -> None:

@@ -22,13 +22,15 @@ from illumcli.files.names import check_unique, expand
 from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture
 from illumcli.film.preview import viewable
+from illumcli.geometry.repairs import Repairs
 from illumcli.jobs.limits import refuse_disk, refuse_memory
+from illumcli.jobs.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.layers import Layer
 from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Planes, Tally, bands, run_once
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
-from illumcli.plan.recipes import PURPOSES, View
+from illumcli.plan.recipes import View
 from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
@@ -63,8 +65,7 @@ class Report:
     written: list[str] = field(default_factory=list)
     kept: list[str] = field(default_factory=list)
     skipped: dict[str, str] = field(default_factory=dict)
-    repairs: dict[str, int] = field(default_factory=dict)
-    repairs_first: dict[str, str] = field(default_factory=dict)
+    repairs: Repairs = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
     spared: dict[str, int] = field(default_factory=dict)
@@ -84,7 +85,7 @@ class Report:
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it, with versions and the peak of memory."""
-        data = {name: getattr(self, name) for name in self.__slots__}
+        data = {name: getattr(self, name) for name in self.__slots__} | repairs_data(self.repairs)
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
 
 
@@ -219,10 +220,9 @@ def rendered(
             report.reused[view.name] = dict(narrowed.reused)
             report.skipped = dict(narrowed.skipped)
             shared = run_once(narrowed, tally, artifacts, threads)
-            report.repairs |= repairs(shared)
-            report.repairs_first |= shared["repairs"].first
+            report.repairs = {**report.repairs, **repairs(shared)}
             if strict:
-                refuse_repairs(report.scene, report.repairs, report.repairs_first)
+                refuse_repairs(report.scene, report.repairs)
             sums = ErrorSums()
             report.clamped += _render_view(
                 work.scene, narrowed, shared, view, mine, threads, tally, progress, artifacts, sums
@@ -256,31 +256,6 @@ def mesh_files(loaded: Loaded, scene: Scene) -> set[Path]:
         if name is not None:
             found.add(loaded.path.parent / name)
     return found
-
-
-def refuse_repairs(place: str, repairs: Mapping[str, int], first: Mapping[str, str]) -> None:
-    """Raise InputError where anything needs a repair: every class, its count and its first place."""
-    if repairs:
-        way = "mend it, or leave --strict out"
-        raise InputError([f"{place}: {line}; {way}" for line in told_repairs(repairs, first)])
-
-
-def told_repairs(repairs: Mapping[str, int], first: Mapping[str, str]) -> list[str]:
-    """A line per class of repairs."""
-    return [
-        f"{what}: {count}{f', the first is {first[what]}' if what in first else ''}"
-        for what, count in repairs.items()
-    ]
-
-
-def repairs(shared: Mapping[str, Any]) -> dict[str, int]:
-    """What was put right in meshes and textures: class -> count."""
-    return {
-        what: count
-        for name, made in shared.items()
-        if name in ("repairs", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
-        for what, count in made.repairs.items()
-    }
 
 
 def image_set(

@@ -87,8 +87,11 @@ def run(
     cache: bool = True,
     progress: Progress = lambda what, done, of: None,
     written: Any = lambda outcome: None,
+    strict: bool = False,
 ) -> Sweep:
     """Render every variant; `written` is called with the outcome of each as soon as it is known.
+
+    `strict` refuses variants whose meshes or textures need repairs.
 
     A variant that fails is noted and the others go on. Files that are there with the same content are kept,
     so that a sweep that was stopped goes on where it was.
@@ -109,7 +112,7 @@ def run(
         following = next((later for later in range(number + 1, len(works)) if due[later]), None)
         try:
             after = None if following is None else works[following]
-            outcome.report = rendered(work, store, memory, threads, force, progress, following=after)
+            outcome.report = rendered(work, store, memory, threads, force, progress, strict, after)
         except IllumError as error:
             outcome.error = error
         memory.retire()

@@ -22,8 +22,9 @@ from illumcli.files.store import Store
 from illumcli.frame import Frame
 from illumcli.geometry.assemble import CornerVectors, Placed, Standing, World
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import Repair
 from illumcli.plan.keys import Keys, code
-from illumcli.plan.stages import Repairs, Tile
+from illumcli.plan.stages import MeshRepairs, Tile
 from illumcli.rays.surface import Hits
 from illumcli.records import Record, Value
 from illumcli.shading.materials import Numbering
@@ -42,7 +43,8 @@ ONCE = ("mesh", "standing", "implied_widths", "world", "repairs", "corner_normal
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.
 """
 CLASSES = {
-    cls.__name__: cls for cls in (Mesh, Standing, World, Placed, Frame, CornerVectors, Repairs, Numbering)
+    cls.__name__: cls
+    for cls in (Mesh, Standing, World, Placed, Frame, CornerVectors, MeshRepairs, Repair, Numbering)
 }
 
 

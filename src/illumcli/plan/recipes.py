@@ -277,6 +277,10 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
     parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
     flat = tuple(own == "constant" or scene.terminator == "none" for own in rate)
     every = "every_mesh" if unseen else "meshes"
+    called = tuple(
+        source.file if isinstance(source, MeshFile) else f"object {name}"
+        for source, name in zip(sources, scene.object_names(), strict=True)
+    )
     left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
         *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
@@ -290,7 +294,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
         Recipe.of(stages.world),
         Recipe.of(stages.frame),
-        Recipe.of(stages.repairs),
+        Recipe.of(partial(stages.repairs, called), "repairs"),
         Recipe.of(stages.tracer_over, "tracer"),
         Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
         Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),

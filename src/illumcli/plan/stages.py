@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,9 @@ from illumcli.files.content import Content
 from illumcli.frame import Frame
 from illumcli.geometry import assemble
 from illumcli.geometry.assemble import CornerVectors, Standing, World
+from illumcli.geometry.faults import faults
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import Repair, Repairs, joined, located, note
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
@@ -58,7 +60,8 @@ def mesh(source: Any) -> Mesh:
         The file changed while it was read.
     """
     if not isinstance(source, Content):
-        return source.mesh()
+        shape: Mesh = source.mesh()
+        return replace(shape, repairs=faults(shape))
     from illumcli.geometry.readers import read_mesh
 
     made = read_mesh(source.path)
@@ -109,16 +112,22 @@ def frame(standing: Standing) -> Frame:
     return standing.frame
 
 
-class Repairs(Value):
-    """What was wrong with meshes and put right."""
+class MeshRepairs(Value):
+    """What was wrong with meshes and put right or left out."""
 
-    repairs: Mapping[str, int]
-    first: Mapping[str, str]
+    repairs: Repairs
 
 
-def repairs(world: World) -> Repairs:
-    """Class of fault -> count, all meshes together, and where it occurs first."""
-    return Repairs(world.repairs, world.first)
+def repairs(names: tuple[str, ...], meshes: tuple[Mesh, ...]) -> MeshRepairs:
+    """Of all meshes together, each counted once.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What each object's mesh is called: its file as the scene names it, or the object.
+    """
+    each = {id(mesh): located(mesh.repairs, name) for name, mesh in zip(names, meshes, strict=True)}
+    return MeshRepairs(joined(each.values()))
 
 
 def tracer_over(world: World) -> Tracer:
@@ -141,7 +150,7 @@ class BakedValues(Record):
     """Obscurance that was baked at the world's vertices."""
 
     values: NDArray[np.float32]  # (V,) NaN on meshes that have none
-    repairs: Mapping[str, int]
+    repairs: Repairs
 
 
 def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedValues:
@@ -155,7 +164,7 @@ def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedV
     from illumcli.files.vertex_data import mesh_hash, read_npz
 
     values = np.full(len(world.vertices), np.nan, F)
-    repairs: dict[str, int] = {}
+    repairs: dict[str, Repair] = {}
     for (name, file), placed in zip(files, world.placed, strict=True):
         if file is None:
             continue
@@ -167,8 +176,7 @@ def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedV
                 f"{len(mesh.vertices)} vertices; bake it again"
             )
         if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in found.hashes():
-            what = f"{file.path}: was baked for another mesh of as many vertices"
-            repairs[what] = repairs.get(what, 0) + 1
+            note(repairs, "values that were baked for another mesh of as many vertices", str(file.path))
         values[placed.first_vertex : placed.first_vertex + len(own)] = own
     return BakedValues(values, repairs)
 

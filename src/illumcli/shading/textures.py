@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, columns, rows
 from illumcli.errors import InputError
 from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import surface
@@ -125,7 +126,7 @@ class Varying(Record):
     """What the materials' parameters vary by."""
 
     of_material: tuple[Mapping[str, Map | Attribute], ...] = ()  # by material number, by path
-    repairs: Mapping[str, int] = field(default_factory=dict)
+    repairs: Repairs = field(default_factory=dict)
 
 
 def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexValues]:
@@ -160,7 +161,7 @@ def varying(
     """
     used_by = _objects_of(world, materials)
     problems: list[str] = []
-    repairs: dict[str, int] = {}
+    repairs: dict[str, Repair] = {}
 
     def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute | None:
         within = parameter_range(materials.models[number], path)
@@ -253,11 +254,11 @@ def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats
     return image[..., number : number + 1]
 
 
-def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, int]) -> Floats:
+def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, Repair]) -> Floats:
     """`values` within the range, contiguous; how many were not is noted in `repairs`."""
     beyond = int(np.count_nonzero((values < F(within.low)) | (values > F(within.high))))
     if beyond:
-        repairs[f"{what} clipped to {within.low:g}..{within.high:g}"] = beyond
+        note(repairs, f"{what} clipped to {within.low:g}..{within.high:g}", count=beyond)
         values = np.clip(values, F(within.low), F(within.high))
     return np.ascontiguousarray(values)
 

@@ -9,12 +9,18 @@ import pytest
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import read_mesh
+from illumcli.geometry.repairs import HARMLESS
 
 FORMATS = [(True, "="), (False, "<"), (False, ">")]
 XYZ = [("x", "f4"), ("y", "f4"), ("z", "f4")]
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 
 ROWS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+
+
+def counted(mesh: Mesh) -> dict[str, int]:
+    """What the mesh's repairs count, without what is harmless."""
+    return {what: each.count for what, each in mesh.repairs.items() if what not in HARMLESS}
 
 
 def written(
@@ -64,7 +70,7 @@ def test_strips_alternate_and_restart(tmp_path: Path, text: bool, order: str) ->
     path = written(tmp_path / "a.ply", vertices, {"tristrips": ("vertex_indices", strips, "i4")}, text, order)
     mesh = read_mesh(path)
     assert mesh.corners.reshape(-1, 3).tolist() == [[0, 1, 2], [2, 1, 3], [2, 3, 4], [2, 1, 5], [4, 3, 5]]
-    assert mesh.repairs == {"triangles that only join strips": 2}
+    assert mesh.repairs["triangles that only join strips"].count == 2
 
 
 @pytest.mark.parametrize(("text", "order"), FORMATS)
@@ -99,7 +105,7 @@ def test_every_vertex_property_is_kept(tmp_path: Path, text: bool, order: str) -
     assert mesh.attributes["label"].tolist() == [-5, 0, 30_000]
     assert mesh.attributes["label"].dtype.isnative
     assert mesh.attributes["quality"].tolist() == [0.1, 0, 1e-300]
-    assert mesh.repairs == {"values of 'quality' not finite, made 0": 1}
+    assert counted(mesh) == {"values of 'quality' not finite, made 0": 1, "faces without area": 1}
 
 
 def test_uv_per_corner_go_before_uv_per_vertex(tmp_path: Path) -> None:
@@ -113,7 +119,7 @@ def test_uv_per_corner_go_before_uv_per_vertex(tmp_path: Path) -> None:
     assert mesh.uvs is not None
     assert mesh.corner_uvs is not None
     assert mesh.uvs[mesh.corner_uvs].tolist() == [[0, 0], [0.5, 0], [0, 0.5]]
-    assert mesh.repairs == {"faces with fewer than three corners": 1}
+    assert counted(mesh) == {"faces with fewer than three corners": 1}
 
 
 def test_text_keeps_all_digits_of_a_position(tmp_path: Path) -> None:

@@ -15,13 +15,13 @@ Wavefront Technologies (1995). MTL material format, version 4.2. Ke is a later c
 from __future__ import annotations
 
 import math
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from illumcli.errors import InputError
 from illumcli.geometry.readers._files import beside, content
 from illumcli.geometry.readers._polygons import LARGEST
+from illumcli.geometry.repairs import Repair, note
 
 _COLORS = ("Ka", "Kd", "Ks", "Ke")
 _NUMBERS = ("Ns", "d", "Tr", "illum")
@@ -42,13 +42,14 @@ BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
 
 
-def read(path: Path) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
-    """Material name -> keys of a scene's material, and what was left out: class -> count.
+def read(path: Path) -> tuple[dict[str, dict[str, Any]], dict[str, Repair]]:
+    """Material name -> keys of a scene's material, and what was left out.
 
     The path of a texture begins as `path` does.
     """
-    left_out: Counter[str] = Counter()
+    left_out: dict[str, Repair] = {}
     values: dict[str, dict[str, Any]] = {}
+    lines: dict[str, str] = {}
     current: dict[str, Any] | None = None
     for number, line in enumerate(content(path).decode("utf-8", "replace").splitlines(), start=1):
         word, _, rest = line.strip().replace("\t", " ").partition(" ")
@@ -56,6 +57,7 @@ def read(path: Path) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
         place = f"{path}:{number}"
         if word == "newmtl":
             current = values.setdefault(rest, {})
+            lines.setdefault(rest, f"{path.name}:{number}")
         elif word not in (*_COLORS, *_NUMBERS, "map_Kd"):
             continue
         elif current is None:
@@ -66,20 +68,20 @@ def read(path: Path) -> tuple[dict[str, dict[str, Any]], dict[str, int]]:
             current[word] = _color(place, rest, left_out)
         else:
             current[word] = _numbers(place, rest.split()[-1:])[0]
-    return {name: _material(found, left_out) for name, found in values.items()}, dict(left_out)
+    return {name: _material(found, lines[name], left_out) for name, found in values.items()}, left_out
 
 
-def _material(found: dict[str, Any], left_out: Counter[str]) -> dict[str, Any]:
+def _material(found: dict[str, Any], line: str, left_out: dict[str, Repair]) -> dict[str, Any]:
     """The keys of a scene's material for the statements of one MTL material."""
     found = {word: value for word, value in found.items() if value is not None}
     diffuse = found.get("map_Kd", found.get("Kd"))
     if "map_Kd" in found and found.get("Kd", WHITE) != WHITE:
-        left_out["factors Kd of a texture left out"] += 1
+        note(left_out, "factors Kd of a texture left out", line)
     if found.get("d", 1.0) < 1 or found.get("Tr", 0.0) > 0:
-        left_out["transparent materials made opaque"] += 1
+        note(left_out, "transparent materials made opaque", line)
     illum = found.get("illum", 2.0)
     if illum > 2:
-        left_out["reflection of materials left out"] += 1
+        note(left_out, "reflection of materials left out", line)
     if illum == 0:
         light = WHITE if diffuse is None else diffuse
         return {
@@ -99,10 +101,10 @@ def _material(found: dict[str, Any], left_out: Counter[str]) -> dict[str, Any]:
     return {"model": "blinn_phong", **{key: value for key, value in keys.items() if value is not None}}
 
 
-def _color(place: str, text: str, left_out: Counter[str]) -> tuple[float, ...] | None:
+def _color(place: str, text: str, left_out: dict[str, Repair]) -> tuple[float, ...] | None:
     words = text.split()
     if words[:1] in (["spectral"], ["xyz"]):
-        left_out["spectral and XYZ colours left out"] += 1
+        note(left_out, "spectral and XYZ colours left out", Path(place).name)
         return None
     values = _numbers(place, words[:3])
     return values if len(values) == 3 else values[:1] * 3
@@ -120,7 +122,7 @@ def _numbers(place: str, words: list[str]) -> tuple[float, ...]:
     return values
 
 
-def _texture(path: Path, place: str, text: str, left_out: Counter[str]) -> dict[str, str] | None:
+def _texture(path: Path, place: str, text: str, left_out: dict[str, Repair]) -> dict[str, str] | None:
     """The texture a map statement names, without its options; None where it lies outside the folder."""
     texture: dict[str, str] = {}
     words = text.split()
@@ -134,13 +136,13 @@ def _texture(path: Path, place: str, text: str, left_out: Counter[str]) -> dict[
         if option == "-clamp" and given == ["on"]:
             texture["wrap"] = "clamp"
         else:
-            left_out["texture options left out"] += 1
+            note(left_out, "texture options left out", Path(place).name)
     if not words:
         raise InputError(f"{place}: names no image; write map_Kd FILE")
     try:
         texture["texture"] = str(beside(path, " ".join(words), place))
     except InputError:
-        left_out["textures outside the folder of the mesh left out"] += 1
+        note(left_out, "textures outside the folder of the mesh left out", Path(place).name)
         return None
     return texture
 

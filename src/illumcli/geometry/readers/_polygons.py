@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, LimitError
+from illumcli.geometry.faults import Place, faults, numbered
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import Repair, Repairs, note
 
 LARGEST = 1e18  # of a coordinate: products of two stay in the range of single precision
 MOST_CORNERS = 2**31 - 1  # corners are counted in int32
@@ -32,14 +35,15 @@ def polygons(
     polygon_groups: NDArray[Any] | None = None,
     polygon_smoothing: NDArray[Any] | None = None,
     attributes: Mapping[str, NDArray[Any]] | None = None,
-    repairs: Mapping[str, int] | None = None,
+    repairs: Repairs | None = None,
+    place: Place = numbered,
     **more: Any,
 ) -> Mesh:
     """The mesh of polygons with `counts` corners each, or `InputError` where it has none or is not finite.
 
     Polygons of fewer than three corners are dropped. Normals and uv that are not finite, and normals of
-    no length, are taken from the corners that use them. Attributes that are not finite become 0. All of it
-    is counted in the mesh's `repairs`.
+    no length, are taken from the corners that use them. Attributes that are not finite become 0, and so do
+    vertices that no polygon uses. All of it is counted in the mesh's `repairs`.
 
     Parameters
     ----------
@@ -53,14 +57,17 @@ def polygons(
         Row of each corner, -1 for none.
     polygon_materials, polygon_groups, polygon_smoothing : (P,) int, or None
     attributes : (V,) or (V, k) each
+    repairs
+        What the reader itself put right.
+    place
+        Where a part of the file stands.
     **more
         Other fields of `Mesh`.
     """
     found = dict(repairs or {})
-    check_finite(path, vertices)
     few = counts < 3
     if few.any():
-        found["faces with fewer than three corners"] = int(few.sum())
+        _count(found, "faces with fewer than three corners", "face", few, place)
         kept = np.repeat(~few, counts)
         corners, counts = corners[kept], counts[~few]
         corner_normals, corner_uvs = _pick(corner_normals, kept), _pick(corner_uvs, kept)
@@ -72,13 +79,17 @@ def polygons(
         raise LimitError(
             f"{path}: has {len(corners)} corners, the limit is {MOST_CORNERS}; use a smaller mesh"
         )
+    vertices = _finite_vertices(path, vertices, corners, found, place)
     if normals is not None and corner_normals is not None:
         usable = _within(normals) & normals.any(axis=1)
-        corner_normals = _unless(usable, corner_normals, found, "normals not finite or of no length")
+        corner_normals = _unless(usable, corner_normals)
+        _count(found, "normals not finite or of no length", "normal", ~usable, place)
     if uvs is not None and corner_uvs is not None:
-        corner_uvs = _unless(_within(uvs), corner_uvs, found, "uv not finite")
-    return Mesh(
-        attributes={name: _finite(name, values, found) for name, values in (attributes or {}).items()},
+        usable = _within(uvs)
+        corner_uvs = _unless(usable, corner_uvs)
+        _count(found, "uv not finite", "uv", ~usable, place)
+    mesh = Mesh(
+        attributes={name: _finite(name, values, found, place) for name, values in (attributes or {}).items()},
         vertices=vertices,
         corners=corners.astype(np.int32),
         starts=starts_of(counts).astype(np.int32),
@@ -91,6 +102,10 @@ def polygons(
         polygon_smoothing=_ids(polygon_smoothing),
         repairs=found,
         **more,
+    )
+    face = np.flatnonzero(~few)
+    return replace(
+        mesh, repairs=faults(mesh, lambda part, n: place(part, int(face[n]) if part == "face" else n))
     )
 
 
@@ -105,16 +120,22 @@ def runs(starts: NDArray[Any], counts: NDArray[Any], step: int = 1) -> Ints:
     return np.repeat(starts, counts) + step * within
 
 
-def check_finite(path: Path, vertices: NDArray[np.float64]) -> None:
-    """Refuse coordinates that are NaN, infinite or beyond `LARGEST`."""
+def _finite_vertices(
+    path: Path, vertices: NDArray[np.float64], corners: Ints, found: dict[str, Repair], place: Place
+) -> NDArray[np.float64]:
+    """`vertices`, 0 where one is NaN, infinite or beyond `LARGEST`; refused where a corner uses it."""
     usable = _within(vertices)
     if usable.all():
-        return
-    bad = np.flatnonzero(~usable)
-    raise InputError(
-        f"{path}: {len(bad)} of {len(vertices)} vertices are not finite or beyond {LARGEST:g}, the first is "
-        f"number {bad[0] + 1}; repair the mesh where it was made"
-    )
+        return vertices
+    used = np.zeros(len(vertices), np.bool_)
+    used[corners] = True
+    if (bad := np.flatnonzero(used & ~usable)).size:
+        raise InputError(
+            f"{path}: {len(bad)} of {len(vertices)} vertices are not finite or beyond {LARGEST:g}, the first "
+            f"is number {bad[0] + 1}; repair the mesh where it was made"
+        )
+    _count(found, "unused vertices that are not finite, made 0", "vertex", ~usable, place)
+    return np.where(usable[:, None], vertices, 0.0)
 
 
 def check_range(indices: Ints, size: int, refuse: Callable[[int], InputError]) -> None:
@@ -156,22 +177,27 @@ def _pick(values: NDArray[Any] | None, kept: NDArray[np.bool_]) -> NDArray[Any] 
     return None if values is None else values[kept]
 
 
-def _unless(
-    usable: NDArray[np.bool_], corner_rows: NDArray[Any], found: dict[str, int], what: str
-) -> NDArray[Any]:
-    """`corner_rows` with -1 where the row is not usable, counted in `found`."""
+def _unless(usable: NDArray[np.bool_], corner_rows: NDArray[Any]) -> NDArray[Any]:
+    """`corner_rows` with -1 where the row is not usable."""
     if usable.all():
         return corner_rows
-    found[what] = int(np.count_nonzero(~usable))
     return np.where(np.append(usable, True)[corner_rows], corner_rows, -1)
 
 
-def _finite(name: str, values: NDArray[Any], found: dict[str, int]) -> NDArray[Any]:
+def _finite(name: str, values: NDArray[Any], found: dict[str, Repair], place: Place) -> NDArray[Any]:
     if values.dtype.kind != "f" or np.isfinite(values).all():
         return values
     finite = np.isfinite(values)
-    found[f"values of '{name}' not finite, made 0"] = int(np.count_nonzero(~finite))
+    row = int(np.argwhere(~finite)[0, 0])
+    note(
+        found, f"values of '{name}' not finite, made 0", place("vertex", row), int(np.count_nonzero(~finite))
+    )
     return np.where(finite, values, values.dtype.type(0))
+
+
+def _count(found: dict[str, Repair], what: str, part: str, wrong: NDArray[np.bool_], place: Place) -> None:
+    if wrong.any():
+        note(found, what, place(part, int(np.argmax(wrong))), int(np.count_nonzero(wrong)))
 
 
 def _ids(values: NDArray[Any] | None) -> NDArray[np.int32] | None:

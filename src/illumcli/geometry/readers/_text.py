@@ -75,9 +75,13 @@ class Text(Value):
         start = self.starts[index]
         return self.data[start : self.data.index(b"\n", start)].decode("utf-8", "replace").strip()
 
+    def number(self, index: int) -> int:
+        """Number of a line in the file, from 1."""
+        return 1 + self.raw.count(NEWLINE, 0, self.starts[index])
+
     def place(self, index: int) -> str:
         """``path:line`` of a line."""
-        return f"{self.path}:{1 + self.raw.count(NEWLINE, 0, self.starts[index])}"
+        return f"{self.path}:{self.number(index)}"
 
     def block(self, lines: NDArray[np.intp], keyword: int = 0) -> Block:
         """The lines of these ascending indices, the `keyword` letters at the start of each blanked."""

@@ -25,6 +25,7 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers._files import beside, content
 from illumcli.geometry.readers._polygons import Ints, check_range, polygons, starts_of, strip
+from illumcli.geometry.repairs import Repair, note
 from illumcli.records import Value
 
 MOST_CORNERS = 1 << 28  # over all nodes: a mesh may be placed many times, and each is written out
@@ -133,10 +134,10 @@ class _Document:
     json: dict[str, Any]
     chunk: bytes | None
     buffers: dict[int, bytes] = field(default_factory=dict)
-    repairs: dict[str, int] = field(default_factory=dict)
+    repairs: dict[str, Repair] = field(default_factory=dict)
 
     def count(self, what: str) -> None:
-        self.repairs[what] = self.repairs.get(what, 0) + 1
+        note(self.repairs, what)
 
     def wrong(self, fact: str) -> InputError:
         return InputError(f"{self.path}: {fact}; export the mesh again")
@@ -452,8 +453,7 @@ def _triangles(document: _Document, primitive: dict[str, Any], mode: int, size: 
     if mode == _STRIP:
         triangles, joints = strip(indices)
         if joints:
-            name = "triangles that only join strips"
-            document.repairs[name] = document.repairs.get(name, 0) + joints
+            note(document.repairs, "triangles that only join strips", count=joints)
         return triangles
     spokes = (
         np.stack([indices[1:-1], indices[2:]], axis=1) if len(indices) > 2 else np.empty((0, 2), np.int64)

@@ -32,6 +32,7 @@ from illumcli.geometry.readers._color import linear
 from illumcli.geometry.readers._files import beside, content
 from illumcli.geometry.readers._polygons import Ints, polygons
 from illumcli.geometry.readers._text import Block, Text, keyword
+from illumcli.geometry.repairs import Repair, joined, note
 from illumcli.records import Value
 
 # statements that hold no polygons and change none; free-form geometry is counted in `repairs`
@@ -66,8 +67,7 @@ def read(path: Path) -> Mesh:
 
     corners = rows(0, b"v", len(vertices))
     materials, found = _materials(path, text, rest.libraries)
-    for what, count in found.items():
-        repairs[what] = repairs.get(what, 0) + count
+    repairs = dict(joined([repairs, found]))
     material_names, polygon_materials = _selected(rest.materials, lines[b"f"])
     group_names, polygon_groups = _selected(rest.groups, lines[b"f"])
     return polygons(
@@ -87,10 +87,14 @@ def read(path: Path) -> Mesh:
         attributes={} if color is None else {"color": color},
         materials=materials,
         repairs=repairs,
+        place=lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}",
     )
 
 
 _NAMES = {b"v": "vertices", b"vt": "texture coordinates", b"vn": "normals"}
+
+
+_PARTS = {"vertex": b"v", "uv": b"vt", "normal": b"vn", "face": b"f"}
 
 
 class _Statements(Value):
@@ -100,7 +104,7 @@ class _Statements(Value):
     groups: list[tuple[int, str]] = field(default_factory=list)
     smoothing: list[tuple[int, str]] = field(default_factory=list)
     libraries: list[tuple[int, str]] = field(default_factory=list)
-    repairs: dict[str, int] = field(default_factory=dict)
+    repairs: dict[str, Repair] = field(default_factory=dict)
 
     @classmethod
     def of(cls, text: Text, lines: NDArray[np.intp]) -> _Statements:
@@ -117,8 +121,7 @@ class _Statements(Value):
             if word in names:
                 names[word].append((line, name.strip()))
             elif word in _OTHER_SHAPES:
-                what = f"{_OTHER_SHAPES[word]} left out"
-                rest.repairs[what] = rest.repairs.get(what, 0) + 1
+                note(rest.repairs, f"{_OTHER_SHAPES[word]} left out", f":{text.number(line)}")
             elif word not in _STATE.split():
                 raise InputError(
                     f"{text.place(line)}: '{word:.40}' is no statement of an OBJ file; remove the line or "
@@ -127,7 +130,7 @@ class _Statements(Value):
         return rest
 
 
-def _vertices(block: Block, repairs: dict[str, int]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
+def _vertices(block: Block, repairs: dict[str, Repair]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
     """(V, 3) positions, and (V, 3) linear colours where any vertex has one; the others are white then."""
     values = _table(block, (3, 4, 6), 6, fill=np.nan, what="v x y z, or v x y z r g b")
     vertices = np.ascontiguousarray(values[:, :3])
@@ -143,7 +146,9 @@ def _vertices(block: Block, repairs: dict[str, int]) -> tuple[NDArray[Any], NDAr
     if code.max() > 1:
         code = code / 255
     if not colored.all():
-        repairs["vertices without a colour, made white"] = int(np.count_nonzero(~colored))
+        first = f":{block.text.number(int(block.lines[np.argmin(colored)]))}"
+        count = int(np.count_nonzero(~colored))
+        note(repairs, "vertices without a colour, made white", first, count)
     color = np.ones((len(vertices), 3), np.float32)
     color[colored] = linear(code)
     return vertices, color
@@ -294,20 +299,19 @@ def _is_off(group: str) -> bool:
 
 def _materials(
     path: Path, text: Text, libraries: list[tuple[int, str]]
-) -> tuple[dict[str, Mapping[str, Any]], dict[str, int]]:
+) -> tuple[dict[str, Mapping[str, Any]], dict[str, Repair]]:
     """Every material of the libraries, the first of a name, and what was left out of them."""
     materials: dict[str, Mapping[str, Any]] = {}
-    repairs: dict[str, int] = {}
+    repairs: dict[str, Repair] = {}
     for names, line in {names: line for line, names in reversed(libraries)}.items():
         place = text.place(line)
         whole = beside(path, names, place)
         files = [whole] if os.path.exists(whole) else [beside(path, name, place) for name in names.split()]
         for library in files:
             if not os.path.exists(library):
-                repairs["missing material library"] = repairs.get("missing material library", 0) + 1
+                note(repairs, "missing material library", f":{text.number(line)}")
                 continue
             found, left_out = _mtl.read(library)
             materials = {**found, **materials}
-            for what, count in left_out.items():
-                repairs[what] = repairs.get(what, 0) + count
+            repairs = dict(joined([repairs, left_out]))
     return materials, repairs

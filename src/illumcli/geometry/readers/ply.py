@@ -30,6 +30,7 @@ from illumcli.geometry.readers._color import linear
 from illumcli.geometry.readers._files import content
 from illumcli.geometry.readers._polygons import Ints, check_range, polygons, runs, starts_of, strip
 from illumcli.geometry.readers._text import Text
+from illumcli.geometry.repairs import Repair, note
 from illumcli.records import Value
 
 _TYPES = {
@@ -91,7 +92,7 @@ def read(path: Path) -> Mesh:
         raise InputError(f"{path}: has no vertices with x, y and z; export the mesh again")
     vertex = tables["vertex"]
     vertices = _stacked(path, vertex, ("x", "y", "z"))
-    repairs: dict[str, int] = {}
+    repairs: dict[str, Repair] = {}
     corners, counts, wedges = _polygons(path, tables, len(vertices), repairs)
     more: dict[str, Any] = {}
     if all(name in vertex for name in _NORMAL):
@@ -348,7 +349,7 @@ def _single(path: Path, table: dict[str, Column], name: str) -> NDArray[Any]:
 
 
 def _polygons(
-    path: Path, tables: dict[str, dict[str, Column]], size: int, repairs: dict[str, int]
+    path: Path, tables: dict[str, dict[str, Column]], size: int, repairs: dict[str, Repair]
 ) -> tuple[Ints, Ints, NDArray[np.float64] | None]:
     """Corners, corners per polygon, (C, 2) uv per corner if the faces hold them; strips follow faces."""
     corners, counts, wedges = np.empty(0, np.int64), np.empty(0, np.int64), None
@@ -364,7 +365,7 @@ def _polygons(
         ended = np.insert(indices, starts_of(strips.counts)[1:-1], -1)
         triangles, joints = strip(ended)
         if joints:
-            repairs["triangles that only join strips"] = joints
+            note(repairs, "triangles that only join strips", count=joints)
         corners = np.concatenate([corners, triangles.ravel()])
         counts = np.concatenate([counts, np.full(len(triangles), 3)])
         wedges = None if len(triangles) else wedges

@@ -1,0 +1,62 @@
+"""What is wrong with an input and can be lived with: counted per class, with the first place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, MutableMapping
+from pathlib import PurePath
+from typing import TypeAlias
+
+from illumcli.records import Value
+
+HARMLESS = frozenset(
+    {
+        "unused vertices",
+        "triangles that only join strips",
+    }
+)
+"""Classes that change nothing that is seen: in the report, told with -v alone, refused under --strict."""
+
+
+class Repair(Value):
+    """How often something of one class was mended or left out."""
+
+    count: int
+    first: str = ""
+    """Where it occurs first. While a mesh file is read this is what follows the file's name (``:12`` for a
+    line, ``: face 3``, nothing for the whole file), or a place in a file beside it (``a.mtl:3``)."""
+
+
+Repairs: TypeAlias = Mapping[str, Repair]
+"""Class -> how often and where."""
+
+
+def note(repairs: MutableMapping[str, Repair], what: str, first: str = "", count: int = 1) -> None:
+    """Count `count` more of the class `what`; `first` is kept where it is the first of its class."""
+    known = repairs.get(what)
+    repairs[what] = Repair(count, first) if known is None else Repair(known.count + count, known.first)
+
+
+def located(repairs: Repairs, file: str) -> Repairs:
+    """The repairs of a mesh file, each place with the path of its file.
+
+    Parameters
+    ----------
+    file : str
+        Path of the mesh, or the name of what is no file.
+    """
+    folder = PurePath(file).parent
+    return {
+        what: Repair(
+            each.count, file + each.first if each.first[:1] in ("", ":") else str(folder / each.first)
+        )
+        for what, each in repairs.items()
+    }
+
+
+def joined(parts: Iterable[Repairs]) -> Repairs:
+    """All of them together: counts added, the first place of each class."""
+    found: dict[str, Repair] = {}
+    for repairs in parts:
+        for what, each in repairs.items():
+            note(found, what, each.first, each.count)
+    return found

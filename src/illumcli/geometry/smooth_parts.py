@@ -7,12 +7,11 @@ another smooth part is another thing that can cast a shadow; what lies on the sa
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Ids
+from illumcli.arrays import F, Ids
 from illumcli.geometry.assemble import CornerVectors, World
 
 NORMAL_STEPS = 512
@@ -47,39 +46,44 @@ class SmoothParts:
         return out
 
     @cached_property
-    def _part(self) -> Ids:
-        """(T,) lowest triangle number of each triangle's part; threads that ask at once find the same."""
+    def _part(self) -> NDArray[np.int64]:
+        """(T,) a number for the part of each triangle; threads that ask at once find the same."""
+        point = self._corner_points()
+        first, second = point[:, :2].T.ravel(), point[:, 1:].T.ravel()
+        root = np.arange(point.max(initial=-1) + 1)
+        # Hook the larger of two roots that a triangle joins below the smaller, then flatten the trees.
+        while first.size:
+            low, high = np.sort([root.take(first), root.take(second)], axis=0)
+            apart = low != high
+            np.minimum.at(root, high[apart], low[apart])
+            first, second = first[apart], second[apart]
+            while not np.array_equal(flatter := root.take(root), root):
+                root = flatter
+        return root.take(point[:, 0])
+
+    def _corner_points(self) -> NDArray[np.int64]:
+        """(T, 3) a number for the object, place and normal of each corner; equal ones share it."""
         world = self._world
-        count = len(world.triangles)
-        # Number the distinct (object, place, normal) of all corners, triangle by triangle.
-        place = _number_rows(world.vertices)
-        direction = _number_rows(np.rint(self._normals.values * NORMAL_STEPS).astype(np.int32))
-        keys = (
-            np.repeat(world.objects, 3),
-            place.take(world.triangles.ravel()),
-            direction.take(self._normals.index.take(world.corners.ravel())),
+        of_vertex = np.zeros(len(world.vertices), np.int64)
+        of_vertex[world.triangles] = world.objects[:, None]
+        # + 0.0 makes zeros of both signs the same bits
+        x, y, z = ((column + F(0)).view(np.uint32).astype(np.int64) for column in world.vertices.T)
+        place = _number(x << 32 | y, of_vertex << 32 | z)
+        a, b, c = (np.rint(self._normals.values.T * NORMAL_STEPS) + NORMAL_STEPS).astype(np.int64)
+        direction = _number(a << 32 | b << 16 | c)
+        corner = direction.take(self._normals.index.take(world.corners))
+        return _number((place.take(world.triangles) * (corner.max(initial=0) + 1) + corner).ravel()).reshape(
+            -1, 3
         )
-        point = _number_rows(np.stack(keys, axis=1))
-        order = np.argsort(point, kind="stable")
-        owner, first = order // 3, np.flatnonzero(np.diff(point[order], prepend=-1))
-        # Spread the lowest number over shared corners until nothing changes; jumps shorten long chains.
-        part = np.arange(count, dtype=np.int32)
-        while True:
-            lowest = np.minimum.reduceat(part.take(owner), first)
-            new = lowest.take(point).reshape(-1, 3).min(axis=1)
-            new = new.take(new)
-            if np.array_equal(new, part):
-                return part
-            part = new
 
 
-def _number_rows(table: NDArray[Any]) -> NDArray[np.int64]:
-    """(N,) number of each row of an (N, k) table; equal rows share one. Zeros of either sign are equal."""
-    order = np.lexsort(table.T)
-    new = np.zeros(len(table), np.bool_)
-    for column in table.T:
-        ordered = column.take(order)
+def _number(*keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) a number for each distinct combination of keys, each (N,), from 0."""
+    order = np.lexsort(keys)
+    new = np.zeros(len(order), np.bool_)
+    for key in keys:
+        ordered = key.take(order)
         new[1:] |= ordered[1:] != ordered[:-1]
-    out = np.empty(len(table), np.int64)
+    out = np.empty(len(order), np.int64)
     out[order] = np.cumsum(new)
     return out

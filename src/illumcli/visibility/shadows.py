@@ -9,6 +9,8 @@ nearby in the light's direction.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,34 +63,37 @@ def _implied_reached(
     tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Lanes
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
-    # Where the implied surface lies above each sample.
+    # Where the implied surface lies above each sample; on flat polygons it is the polygon itself.
+    world, facets = smooth.world, smooth.facets
     triangle = smooth.hits.triangle.take(sample)
     u, v = smooth.hits.u.take(sample), smooth.hits.v.take(sample)
-    facets = Facets(*(rows(values, sample) for values in vars(smooth.facets).values()))
-    world = smooth.world
+    position = rows(facets.position, sample)
     corners = [rows(world.vertices, world.triangles[:, k].take(triangle)) for k in range(3)]
     at = corner_rows(world, triangle, smooth.normals)
-    ends = [facing(rows(smooth.normals.values, index), facets.behind) for index in at]
-    offset = terminator_offset(columns(facets.position, F), corners, ends, (1 - u - v, u, v))
-    height = length(offset)
-    starts = lifted(facets.position + offset, facets.ng, facets.edge)
+    ends = [facing(rows(smooth.normals.values, index), facets.behind.take(sample)) for index in at]
+    offset = terminator_offset(columns(position, F), corners, ends, (1 - u - v, u, v))
+    curved = np.flatnonzero(length(offset) > 0)
 
-    # Rule out, one question after the other, samples that stay in shadow: the light does not reach the
-    # implied surface; something stands between the polygon and it; something else stands nearby.
-    open_ = np.flatnonzero(height > 0)
-    open_ = open_[
-        ~tracer.occluded(columns(rows(starts, open_)), columns(rows(l, open_)), distance.take(open_))
-    ]
-    own = columns(rows(origins, sample.take(open_)))
-    way = ~tracer.occluded(own, columns(unit(rows(offset, open_))), height.take(open_))
-    open_, own = open_[way], columns(rows(own, np.flatnonzero(way)))
-    near = np.minimum(NEARBY * diameter([rows(corner, open_) for corner in corners]), distance.take(open_))
-    hit = tracer.closest(own, _above(rows(l, open_), rows(facets.ng, open_)))
-    other = (hit.distance < near) & ~smooth.parts.joined(triangle.take(open_), np.maximum(hit.triangle, 0))
+    # Ask the light from there, and of what it reaches, whether the way there is free.
+    ng, edge = rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))
+    starts = lifted(_at(position, curved) + _at(offset, curved), ng, edge)
+    curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
+    height = length(_at(offset, curved))
+    own = columns(rows(origins, sample.take(curved)))
+    curved = curved[~tracer.occluded(own, columns(_at(offset, curved) / height[:, None]), height)]
 
+    # What stands nearby in the light's direction shadows the sample, unless it is the surface itself.
+    own, ng = columns(rows(origins, sample.take(curved))), rows(facets.ng, sample.take(curved))
+    hit = tracer.closest(own, _above(_at(l, curved), ng))
+    near = np.minimum(NEARBY * diameter([_at(corner, curved) for corner in corners]), _at(distance, curved))
+    same = smooth.parts.joined(_at(triangle, curved), np.maximum(hit.triangle, 0))
     reached = np.zeros(len(sample), np.bool_)
-    reached[open_[~other]] = True
+    reached[curved[(hit.distance >= near) | same]] = True
     return reached
+
+
+def _at(values: NDArray[Any], index: NDArray[np.intp]) -> NDArray[Any]:
+    return columns(rows(values, index))
 
 
 def _above(l: Vectors, ng: Vectors) -> Vectors:

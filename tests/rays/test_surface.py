@@ -11,7 +11,8 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes.cylinder import Cylinder
 from illumcli.geometry.shapes.plane import Plane
 from illumcli.geometry.shapes.sphere import Sphere
-from illumcli.rays.surface import along_u, rings, tangent, uv_tangents
+from illumcli.rays.corner_weights import corner_weights
+from illumcli.rays.surface import rings, tangent, uv_tangents
 
 F = np.float32
 SKEWED = rotation(0, 30) @ np.diag([2.0, 0.5, 1.0, 1.0]) @ rotation(2, 50)
@@ -30,6 +31,11 @@ def position(world, triangle, u, v):
     return (1 - u - v)[:, None] * p0 + u[:, None] * p1 + v[:, None] * p2
 
 
+def along_u(world, triangle, u, v):
+    weights = corner_weights(world, None, triangle, u, v)
+    return weights.interpolate(world, uv_tangents(world, world_uvs(world)))
+
+
 def unit_rows(x):
     return x / np.linalg.norm(x, axis=1, keepdims=True)
 
@@ -38,7 +44,7 @@ def unit_rows(x):
 def test_u_grows_along_x_of_a_plane_under_any_transform(matrix):
     world = place([Plane(resolution=(3, 2)).mesh()], [matrix])
     at = anywhere(world)
-    found = along_u(uv_tangents(world, world_uvs(world)), *at)
+    found = along_u(world, *at)
     wanted = matrix[:3, 0] / np.linalg.norm(matrix[:3, 0])
     np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=1e-5)
 
@@ -50,7 +56,7 @@ def test_the_grain_of_a_coarse_round_body_is_smooth(shape):
     p = position(world, triangle, u, v)
     seam = (p[:, 0] > 0) & (np.abs(p[:, 2]) < np.tan(2 * np.pi / 16) * p[:, 0])
     keep = (np.hypot(p[:, 0], p[:, 2]) > 0.2) & ~seam
-    found = unit_rows(along_u(uv_tangents(world, world_uvs(world)), triangle, u, v))[keep]
+    found = unit_rows(along_u(world, triangle, u, v))[keep]
     wanted = unit_rows(np.cross([0, 1, 0], p))[keep]
     assert np.degrees(np.arccos(np.clip(dot(found, wanted), -1, 1))).max() < 2  # a facet spans 22.5
 
@@ -65,7 +71,7 @@ def test_uv_that_turn_over_at_a_seam_keep_their_sides_apart():
     )
     world = place([mesh], [np.eye(4)])
     third = np.full(2, 1 / 3, F)
-    found = along_u(uv_tangents(world, world_uvs(world)), np.array([0, 1], np.int32), third, third)
+    found = along_u(world, np.array([0, 1], np.int32), third, third)
     np.testing.assert_allclose(found, [[1, 0, 0], [-1, 0, 0]], atol=1e-6)
 
 

@@ -249,14 +249,29 @@ def world_uvs(world: World) -> CornerVectors:
     return CornerVectors(columns(_joined(values, np.zeros((0, 2))), F), _joined(index, np.zeros(0, np.int32)))
 
 
-def polygon_centres(world: World) -> NDArray[np.float32]:
-    """(P, 3) mean of each polygon's vertices, in radii from the scene's centre."""
-    centres = []
+class PolygonCentres(Record):
+    """The P polygons of a World as wholes. Arrays are read-only."""
+
+    position: NDArray[np.float32]  # (P, 3) mean of the corners, in radii
+    starts: NDArray[np.int32]  # (P + 1,) number of each polygon's first corner, and the end
+    vertex: NDArray[np.int32]  # (C,) vertex number of each corner
+
+    def __post_init__(self) -> None:
+        for array in (self.position, self.starts, self.vertex):
+            array.setflags(write=False)
+
+
+def polygon_centres(world: World) -> PolygonCentres:
+    """Centres and corners of all polygons."""
+    centres, vertices, starts = [], [np.zeros(0, np.int32)], [np.zeros(1, np.int32)]
     for placed in world.placed:
         mesh = placed.mesh
         if not mesh.polygon_count:
             continue
-        points = world.vertices[mesh.corners + placed.first_vertex].astype(np.float64)
+        vertices.append(mesh.corners + np.int32(placed.first_vertex))
+        starts.append(mesh.starts[1:] + np.int32(placed.first_corner))
+        points = world.vertices[vertices[-1]].astype(np.float64)
         sums = np.add.reduceat(points, mesh.starts[:-1], axis=0)
         centres.append(sums / np.diff(mesh.starts)[:, None])
-    return columns(_joined(centres, np.zeros((0, 3))), F)
+    position = columns(_joined(centres, np.zeros((0, 3))), F)
+    return PolygonCentres(position, np.concatenate(starts), np.concatenate(vertices))

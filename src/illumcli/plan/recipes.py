@@ -174,18 +174,22 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
+    whole = {"planar_polygons": "planar_polygons"} if smooth or any(is_baked(scene)) else {}
     at_samples = AT_SAMPLES.issuperset(rate)
     grains = tuple(thing.grain for thing in scene.objects)
-    by_uv = {"uv_tangents": "uv_tangents"} if None in grains else {}
+    by_uv = {name: name for name in ("uv_tangents", "point_weights")} if None in grains else {}
     book = [
         *_geometry(scene, loaded, rate, unseen),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
+        Recipe.of(stages.planar_polygons),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
         Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
         Recipe.of(stages.hits),
         Recipe.of(stages.facets),
+        Recipe.of(stages.corner_weights, **whole),
         Recipe.of(partial(stages.points, rate), "points", **smooth, **flat),
+        Recipe.of(stages.point_weights),
         Recipe.of(stages.material),
         Recipe.of(stages.view_vectors, "v"),
         Recipe.of(stages.uv_tangents),
@@ -226,7 +230,7 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Reci
     settings = scene.obscurance or Obscurance()
     more = {"open_facets": "open_facets"}
     if any(file for _, file in files):
-        more["baked"] = "baked"
+        more |= {"baked": "baked", "corner_weights": "corner_weights"}
     if settings.faces != "count":
         more["facet_normals"] = "facet_normals"
     if settings.about == "shading" and set(rates(scene)) & set(SMOOTH):

@@ -14,16 +14,19 @@ from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length,
 from illumcli.errors import InputError
 from illumcli.files.content import Content
 from illumcli.frame import Frame
-from illumcli.geometry import assemble
-from illumcli.geometry.assemble import CornerVectors, Standing, World
+from illumcli.geometry import assemble, planar
+from illumcli.geometry.assemble import CornerVectors, PolygonCentres, Standing, World
 from illumcli.geometry.faults import faults
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import Repair, Repairs, joined, located, note
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
 from illumcli.rays.camera import axes as camera_axes
 from illumcli.rays.camera import camera_rays, film_points
+from illumcli.rays.corner_weights import CornerWeights
+from illumcli.rays.corner_weights import corner_weights as corner_weights_at
 from illumcli.rays.surface import Facets, Hits
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
@@ -214,8 +217,13 @@ def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
     return surface.uv_tangents(world, uvs)
 
 
-def polygon_centres(world: World) -> NDArray[np.float32]:
-    """(P, 3) the centre of every polygon, in radii."""
+def planar_polygons(world: World) -> PlanarPolygons | None:
+    """The planar polygons of more than three corners; None where there are none."""
+    return planar.planar_polygons(world)
+
+
+def polygon_centres(world: World) -> PolygonCentres:
+    """The centre of every polygon."""
     return assemble.polygon_centres(world)
 
 
@@ -399,17 +407,27 @@ def facets(world: World, rays: Rays, hits: Hits) -> Facets:
     return surface.facets(world, hits.triangle, hits.u, hits.v, towards_eye)
 
 
+def corner_weights(world: World, hits: Hits, planar_polygons: PlanarPolygons | None = None) -> CornerWeights:
+    """What the corners around each sample weigh there."""
+    return corner_weights_at(world, planar_polygons, hits.triangle, hits.u, hits.v)
+
+
 def points(
     rate: list[str],
     world: World,
-    hits: Hits,
+    corner_weights: CornerWeights,
     facets: Facets,
     normals: CornerVectors | None = None,
-    centres: NDArray[np.float32] | None = None,
+    centres: PolygonCentres | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
 ) -> Points:
     """Where models are evaluated."""
-    return shading_rates.points(world, hits, facets, rate, normals, centres, polygon_normals)
+    return shading_rates.points(world, corner_weights, facets, rate, normals, centres, polygon_normals)
+
+
+def point_weights(points: Points, corner_weights: CornerWeights) -> CornerWeights:
+    """What the corners around each point weigh there."""
+    return corner_weights if points.weights is None else points.weights
 
 
 def material(world: World, numbering: Numbering, points: Points) -> Ids:
@@ -418,10 +436,10 @@ def material(world: World, numbering: Numbering, points: Points) -> Ids:
 
 
 def parameters(
-    world: World, textures: Varying, material: Ids, points: Points, uvs: CornerVectors
+    world: World, textures: Varying, material: Ids, point_weights: CornerWeights, uvs: CornerVectors
 ) -> Parameters:
     """The parameters that vary over the surface, at every point."""
-    return parameters_at(world, textures, material, points.triangle, points.u, points.v, uvs)
+    return parameters_at(world, textures, material, point_weights, uvs)
 
 
 def view_vectors(view: Any, frame: Frame, points: Points) -> Vectors:
@@ -435,13 +453,17 @@ def view_vectors(view: Any, frame: Frame, points: Points) -> Vectors:
 
 
 def tangents(
-    grains: tuple[Any, ...], world: World, points: Points, uv_tangents: CornerVectors | None = None
+    grains: tuple[Any, ...],
+    world: World,
+    points: Points,
+    point_weights: CornerWeights | None = None,
+    uv_tangents: CornerVectors | None = None,
 ) -> Vectors:
     """(E, 3) float32 unit tangents: the grain of each object, or the direction of growing u."""
-    if uv_tangents is None:
+    if uv_tangents is None or point_weights is None:
         grain = np.zeros_like(points.n)
     else:
-        grain = surface.along_u(uv_tangents, points.triangle, points.u, points.v)
+        grain = point_weights.interpolate(world, uv_tangents)
     number = world.objects.take(points.triangle)
     for i, (own, placed) in enumerate(zip(grains, world.placed, strict=True)):
         if own is None or not (lanes := np.flatnonzero(number == i)).size:
@@ -577,10 +599,10 @@ def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: V
 
 
 def obscurance_normals(
-    rate: list[str], world: World, hits: Hits, facets: Facets, normals: CornerVectors
+    rate: list[str], world: World, corner_weights: CornerWeights, facets: Facets, normals: CornerVectors
 ) -> Vectors:
     """(M, 3) what the hemisphere of obscurance stands about: the interpolated shading normal."""
-    return shading_rates.sample_normals(world, hits, facets, rate, normals)
+    return shading_rates.sample_normals(world, corner_weights, facets, rate, normals)
 
 
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
@@ -603,6 +625,7 @@ def obscurance(
     open_facets: OpenFacets | None = None,
     baked: BakedValues | None = None,
     facet_normals: Vectors | None = None,
+    corner_weights: CornerWeights | None = None,
 ) -> Lanes:
     """(M,) w of every sample seen; on meshes with baked values these, and rays for the others.
 
@@ -623,24 +646,24 @@ def obscurance(
         over = Hemispheres(facets.ng, ray_origins)
     else:
         over = Hemispheres(obscurance_normals, ray_origins, facets.ng)
-    if baked is None:
+    if baked is None or corner_weights is None:
         return estimates(tracer, over, obscurance_draws, method, known, errors=False).w
-    w = baked_obscurance(world, baked, hits)
+    w = baked_obscurance(world, baked, corner_weights)
     left = np.flatnonzero(np.isnan(w))
     known = None if known is None else known.take(left)
     w[left] = estimates(tracer, over.take(left), obscurance_draws[:, left], method, known, errors=False).w
     return w
 
 
-def baked_obscurance(world: World, baked: BakedValues, hits: Hits) -> Lanes:
-    """(M,) baked values interpolated over triangles; NaN on meshes that have none."""
-    a, b, c = (baked.values.take(world.triangles[:, k].take(hits.triangle)) for k in range(3))
-    return ((1 - hits.u - hits.v) * a + hits.u * b + hits.v * c).astype(F)
+def baked_obscurance(world: World, baked: BakedValues, corner_weights: CornerWeights) -> Lanes:
+    """(M,) baked values interpolated over polygons; NaN on meshes that have none."""
+    w: Lanes = corner_weights.interpolate_vertices(world, baked.values[:, None])[:, 0]
+    return w
 
 
-def baked_or_open(world: World, baked: BakedValues, hits: Hits) -> Lanes:
+def baked_or_open(world: World, baked: BakedValues, corner_weights: CornerWeights) -> Lanes:
     """(M,) the same; 1 on meshes that have none."""
-    w = baked_obscurance(world, baked, hits)
+    w = baked_obscurance(world, baked, corner_weights)
     return np.where(np.isnan(w), F(1), w)
 
 
@@ -714,7 +737,7 @@ def geometric_normal(facets: Facets) -> Vectors:
 
 def uv(world: World, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
     """(M, 2) texture coordinates."""
-    return surface.uv(world, uvs, hits.triangle, hits.u, hits.v)
+    return surface.uv(world, uvs, corner_weights_at(world, None, hits.triangle, hits.u, hits.v))
 
 
 def object_id(world: World, hits: Hits) -> Lanes:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
+from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners
 from illumcli.rays.offsets import effective_edge
 from illumcli.rays.tracer import Closest
 from illumcli.records import Record
@@ -72,20 +74,12 @@ def corner_rows(world: World, triangle: Ids, table: CornerVectors) -> tuple[Ids,
     return a, b, c
 
 
-def linear(table: CornerVectors, at: tuple[Ids, Ids, Ids], u: Lanes, v: Lanes) -> Vectors:
-    """(M, k) barycentric interpolation of three rows of `table`."""
-    a, b, c = (rows(table.values, index) for index in at)
-    return (1 - u - v)[:, None] * a + u[:, None] * b + v[:, None] * c
-
-
-def interpolated(
-    world: World, normals: CornerVectors, triangle: Ids, u: Lanes, v: Lanes, facet: Facets
-) -> Vectors:
+def interpolated(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
     """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
 
     The facet's own where the interpolated one vanishes. On the side the eye sees.
     """
-    n = unit(linear(normals, corner_rows(world, triangle, normals), u, v))
+    n = unit(weights.interpolate(world, normals))
     n = facing(n, facet.behind)
     return with_facet(n, facet.ng)
 
@@ -98,52 +92,77 @@ def with_facet(n: Vectors, ng: Vectors) -> Vectors:
     return n
 
 
-def quadratic(
-    world: World, normals: CornerVectors, triangle: Ids, u: Lanes, v: Lanes, facet: Facets
-) -> Vectors:
+def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
     """(M, 3) unit normal, quadratic along every edge.
 
     Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
     b = 3 ((n0 + n1).delta / delta.delta) delta, so that on average it stays at right angles to the edge: an
-    inflection between two equal normals shows, which linear interpolation loses. Over a triangle the
-    edge terms are weighed by products of barycentric weights, which reduces to the edge's own form there.
+    inflection between two equal normals shows, which linear interpolation loses. Over a polygon the edge
+    terms are weighed by products of the weights of their ends, which reduces to the edge's own form there.
 
     References
     ----------
     van Overveld, C. W. A. M. and Wyvill, B. (1997). Phong normal interpolation revisited. ACM TOG 16(4).
     """
-    corners = [rows(world.vertices, world.triangles[:, k].take(triangle)) for k in range(3)]
-    ends = [rows(normals.values, index) for index in corner_rows(world, triangle, normals)]
-    n = bent(corners, ends, (1 - u - v, u, v))
+    n = columns(weights.interpolate(world, normals))
+    for group in weights.groups:
+
+        def corner(k: int, group: Corners = group) -> Corner:
+            end = rows(normals.values, normals.index.take(group.corner(world, k)))
+            return rows(world.vertices, group.vertex(world, k)), end, group.weight(k)
+
+        if group.lane is None:
+            bend(n, group.count, corner)
+        else:
+            part = rows(n, group.lane)
+            bend(part, group.count, corner)
+            n[group.lane] = part
     return with_facet(facing(unit(n), facet.behind), facet.ng)
 
 
-def bent(corners: Sequence[Vectors], ends: Sequence[Vectors], weights: Sequence[Lanes]) -> Vectors:
-    """(M, 3) quadratic normal, not unit, of triangles with these corners and unit corner normals."""
-    n = weights[0][:, None] * ends[0] + weights[1][:, None] * ends[1] + weights[2][:, None] * ends[2]
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        delta = corners[j] - corners[i]
+Corner: TypeAlias = tuple[Vectors, Vectors, Lanes]
+"""(M, 3) place of a corner, its unit normal, (M,) its weight."""
+
+
+def bend(n: Vectors, count: int, corner: Callable[[int], Corner]) -> None:
+    """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit."""
+    first = last = corner(0)
+    for k in range(1, count + 1):
+        following = corner(k) if k < count else first
+        delta = following[0] - last[0]
         square = dot(delta, delta)
         slope = np.divide(
-            3 * dot(ends[i] + ends[j], delta), square, out=np.zeros_like(square), where=square > 0
+            3 * dot(last[1] + following[1], delta), square, out=np.zeros_like(square), where=square > 0
         )
-        n -= (weights[i] * weights[j] * slope)[:, None] * delta
-    return n
+        n -= (last[2] * following[2] * slope)[:, None] * delta
+        last = following
 
 
-def uv(world: World, uvs: CornerVectors, triangle: Ids, u: Lanes, v: Lanes) -> NDArray[np.float32]:
-    """(M, 2) texture coordinates; 0 where a mesh has none."""
-    at = corner_rows(world, triangle, uvs)
-    out = np.zeros((len(triangle), 2), F, order="F")
-    has = np.flatnonzero((at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0))
-    if has.size:
-        a, b, c = (index.take(has) for index in at)
-        out[has] = linear(uvs, (a, b, c), u.take(has), v.take(has))
+def uv(world: World, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
+    """(M, 2) texture coordinates; 0 where a mesh has none.
+
+    Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
+    """
+    out = _with_all(world, uvs, weights.hits)
+    for group in weights.groups:
+        if isinstance(group, MeanCorners):
+            lane = slice(None) if group.lane is None else group.lane
+            out[lane] = _with_all(world, uvs, group)
     return out
 
 
+def _with_all(world: World, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
+    """(m, 2) means by weight; 0 where a corner has none."""
+    index = [uvs.index.take(corners.corner(world, k)) for k in range(corners.count)]
+    has = np.minimum.reduce(index) >= 0
+    if not has.any():
+        return np.zeros((len(has), 2), F, order="F")
+    found = corners.mean(lambda k: rows(uvs.values, index[k]))
+    return np.asarray(np.where(has[:, None], found, F(0)))
+
+
 def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
-    """Where u grows, at every corner of every triangle, number 3 t + k for corner k of triangle t.
+    """Where u grows, at every corner.
 
     The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
     the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
@@ -161,7 +180,10 @@ def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
     sums: Vectors = np.stack(
         [np.bincount(index.ravel(), part) for part in weights.T], axis=1, dtype=np.float64
     )
-    return CornerVectors(columns(unit(sums), F), index.ravel().astype(np.int32))
+    none = np.zeros((1, 3))  # of corners that the cut skipped
+    corner = np.full(len(uvs.index), len(sums), np.int32)
+    corner[world.corners.ravel()] = index.ravel()
+    return CornerVectors(columns(np.concatenate([unit(sums), none]), F), corner)
 
 
 def _along_u(
@@ -177,12 +199,6 @@ def _along_u(
     e1, e2 = points[1] - points[0], points[2] - points[0]
     way: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
     return unit(way) * hand[:, None], hand.astype(np.int64) + 1
-
-
-def along_u(tangents: CornerVectors, triangle: Ids, u: Lanes, v: Lanes) -> Vectors:
-    """(M, 3) where u grows at points on triangles, not unit, from `uv_tangents`."""
-    a, b, c = (tangents.index.take(3 * triangle.astype(np.int64) + k) for k in range(3))
-    return linear(tangents, (a, b, c), u, v)
 
 
 def rings(

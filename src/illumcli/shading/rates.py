@@ -15,8 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, rows
-from illumcli.geometry.assemble import CornerVectors, World
-from illumcli.rays.surface import Facets, Hits, facing, interpolated, quadratic
+from illumcli.geometry.assemble import CornerVectors, PolygonCentres, World
+from illumcli.rays.corner_weights import (
+    Corners,
+    CornerWeights,
+    MeanCorners,
+    TriangleCorners,
+    concatenated,
+)
+from illumcli.rays.surface import Facets, facing, interpolated, quadratic
 from illumcli.records import Record
 
 RATES = ("constant", "gouraud", "phong", "quadratic")
@@ -34,27 +41,31 @@ class Points(Record):
     n: Vectors  # (E, 3) float32 unit shading normal on the side the eye sees
     spread: Callable[[NDArray[Any]], NDArray[Any]]
     """(E, k) values at the points to (M, k) values at the samples."""
+    weights: CornerWeights | None = None
+    """Of the corners around each point; None where the points are the samples."""
 
     def __len__(self) -> int:
         return len(self.triangle)
 
 
 def sample_normals(
-    world: World, hits: Hits, facet: Facets, rates: Sequence[str], normals: CornerVectors
+    world: World, weights: CornerWeights, facet: Facets, rates: Sequence[str], normals: CornerVectors
 ) -> Vectors:
     """(M, 3) the interpolated shading normal of every sample, where object i is shaded at ``rates[i]``: of
     `gouraud` the linear one, of `constant` the facet's own."""
     rate = np.array([RATES.index(name) for name in rates], np.int8)
-    return _sample_normals(world, hits, facet, rate.take(world.objects.take(hits.triangle)), normals)
+    return _sample_normals(
+        world, weights, facet, rate.take(world.objects.take(weights.hits.triangle)), normals
+    )
 
 
 def points(
     world: World,
-    hits: Hits,
+    weights: CornerWeights,
     facet: Facets,
     rates: Sequence[str],
     normals: CornerVectors | None = None,
-    centres: NDArray[np.float32] | None = None,
+    centres: PolygonCentres | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
 ) -> Points:
     """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``.
@@ -62,11 +73,11 @@ def points(
     Where every object is shaded at the samples, point i is sample i, whatever the mixture of rates.
     """
     if len(set(rates)) == 1 and rates[0] in _POINTS:
-        return _POINTS[rates[0]](world, hits, facet, normals, centres, polygon_normals)
+        return _POINTS[rates[0]](world, weights, facet, normals, centres, polygon_normals)
     rate = np.array([RATES.index(name) for name in rates], np.int8)
-    of_sample = rate.take(world.objects.take(hits.triangle))
+    of_sample = rate.take(world.objects.take(weights.hits.triangle))
     if AT_SAMPLES.issuperset(rates):
-        return _samples(hits, facet, _sample_normals(world, hits, facet, of_sample, normals))
+        return _samples(weights, facet, _sample_normals(world, weights, facet, of_sample, normals))
 
     # Split the samples: one group per rate with points of its own, and one for all that are shaded in place.
     groups, parts = [], []
@@ -75,7 +86,7 @@ def points(
         group = np.flatnonzero(in_place if name is None else of_sample == RATES.index(name))
         if not group.size:
             continue
-        some = Hits(*(values.take(group) for values in vars(hits).values()))
+        some = weights.take(group)
         own = Facets(*(rows(values, group) for values in vars(facet).values()))
         groups.append(group)
         if name is None:
@@ -84,11 +95,11 @@ def points(
         else:
             parts.append(_POINTS[name](world, some, own, normals, centres, polygon_normals))
     if not parts:
-        return _samples(hits, facet, facet.ng)
+        return _samples(weights, facet, facet.ng)
 
     # Join the groups' points; a value returns to its samples through its own group.
     def spread(values: NDArray[Any]) -> NDArray[Any]:
-        out = np.empty((len(hits.triangle), *values.shape[1:]), values.dtype, order="F")
+        out = np.empty((len(weights), *values.shape[1:]), values.dtype, order="F")
         first = 0
         for group, part in zip(groups, parts, strict=True):
             out[group] = part.spread(values[first : first + len(part)])
@@ -99,10 +110,15 @@ def points(
         name: columns(np.concatenate([getattr(part, name) for part in parts]))
         for name in ("triangle", "u", "v", "position", "n")
     }
-    return Points(**joined, spread=spread)
+    own_weights = [
+        weights.take(group) if part.weights is None else part.weights
+        for group, part in zip(groups, parts, strict=True)
+    ]
+    return Points(**joined, spread=spread, weights=concatenated(own_weights))
 
 
-def _samples(hits: Hits, facet: Facets, n: Vectors) -> Points:
+def _samples(weights: CornerWeights, facet: Facets, n: Vectors) -> Points:
+    hits = weights.hits
     return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, as_they_are)
 
 
@@ -112,7 +128,11 @@ def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sample_normals(
-    world: World, hits: Hits, facet: Facets, of_sample: NDArray[np.int8], normals: CornerVectors | None
+    world: World,
+    weights: CornerWeights,
+    facet: Facets,
+    of_sample: NDArray[np.int8],
+    normals: CornerVectors | None,
 ) -> Vectors:
     """(M, 3) shading normal of every sample, by the rate of its object; see `sample_normals`."""
     if normals is None:
@@ -123,49 +143,62 @@ def _sample_normals(
     out = facet.ng.copy(order="F")
     for group, normal in parts:
         if group.size == len(of_sample):
-            return normal(world, normals, hits.triangle, hits.u, hits.v, facet)
+            return normal(world, normals, weights, facet)
         if group.size:
             own = Facets(*(rows(values, group) for values in vars(facet).values()))
-            triangle, u, v = hits.triangle.take(group), hits.u.take(group), hits.v.take(group)
-            out[group] = normal(world, normals, triangle, u, v, own)
+            out[group] = normal(world, normals, weights.take(group), own)
     return out
 
 
 def _constant(
-    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+    world: World,
+    weights: CornerWeights,
+    facet: Facets,
+    normals: Any,
+    centres: PolygonCentres,
+    polygon_normals: Any,
 ) -> Points:
-    """One point per polygon and side seen: its centre, its normal; its uv are those of the middle of its
-    first triangle, whichever of its triangles the tile sees."""
-    polygon = world.polygons.take(hits.triangle)
+    """One point per polygon and side seen: its centre, its normal, and the mean of what its corners have."""
+    polygon = world.polygons.take(weights.hits.triangle)
     key, first, back = np.unique(polygon * 2 + facet.behind, return_index=True, return_inverse=True)
     own = key // 2
     third = np.full(len(key), 1 / 3, F)
     n = facing(rows(polygon_normals, own), facet.behind.take(first))
     triangle = np.searchsorted(world.polygons, own).astype(np.int32)
-    return Points(triangle, third, third, rows(centres, own), n, lambda values: rows(values, back))
+    first_triangle = TriangleCorners(None, triangle, third, third)
+    mean = CornerWeights(first_triangle, (MeanCorners(None, centres, own),))
+    return Points(
+        triangle, third, third, rows(centres.position, own), n, lambda values: rows(values, back), mean
+    )
 
 
 def _gouraud(
-    world: World, hits: Hits, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+    world: World, weights: CornerWeights, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
 ) -> Points:
-    """One point per vertex and side seen, where vertices with several normals count as several."""
-    corner = np.concatenate([world.corners[:, k].take(hits.triangle) for k in range(3)])
-    behind = np.tile(facet.behind, 3)
-    # corners that share vertex, normal and side share their value; uv may differ between them
-    _, first, back = np.unique(corner.astype(np.int64) * 2 + behind, return_index=True, return_inverse=True)
-    which, sample = np.divmod(first, len(hits.triangle))
-    triangle = hits.triangle.take(sample)
-    vertex = world.triangles[triangle, which]
-    n = facing(rows(normals.values, normals.index.take(corner.take(first))), behind.take(first))
-    a, b, c = back.reshape(3, -1)
-    w0, w1, w2 = 1 - hits.u - hits.v, hits.u, hits.v
+    """One point per polygon corner and side seen: corners of a vertex may differ in normal and uv."""
+    found: list[tuple[NDArray[Any], ...]] = []
+    numbers: dict[Corners, NDArray[np.int64]] = {}  # (m,) point of each hit's corner 0
+    steps: dict[Corners, int] = {}  # how far the next corner's point is away
+    count = 0
+    for group in weights.groups:
+        behind = facet.behind if group.lane is None else facet.behind.take(group.lane)
+        _, first, back = np.unique(group.shape * np.int64(2) + behind, return_index=True, return_inverse=True)
+        numbers[group], steps[group] = back.ravel() + count, len(first)
+        for k in range(group.count):
+            corner, vertex = (rows(number(world, k), first) for number in (group.corner, group.vertex))
+            n = facing(rows(normals.values, normals.index.take(corner)), rows(behind, first))
+            at = (rows(part, first) for part in group.place(k))
+            found.append((*at, rows(world.vertices, vertex), n))
+            count += len(first)
 
     def spread(values: NDArray[Any]) -> NDArray[Any]:
-        return w0[:, None] * rows(values, a) + w1[:, None] * rows(values, b) + w2[:, None] * rows(values, c)
+        return weights.joined(lambda group, k: rows(values, numbers[group] + k * steps[group]))
 
-    return Points(
-        triangle, (which == 1).astype(F), (which == 2).astype(F), rows(world.vertices, vertex), n, spread
+    triangle, u, v, position, n = (
+        columns(np.concatenate([each[part] for each in found])) for part in range(5)
     )
+    there = TriangleCorners(None, triangle, u, v)
+    return Points(triangle, u, v, position, n, spread, CornerWeights(there, (there,)))
 
 
 _POINTS: dict[str, Callable[..., Points]] = {"constant": _constant, "gouraud": _gouraud}

@@ -21,6 +21,7 @@ from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import surface
+from illumcli.rays.corner_weights import CornerWeights
 from illumcli.records import Record, Value
 from illumcli.shading.materials import Materials, colors_at
 from illumcli.values import LARGEST, Three, Within, marks
@@ -290,9 +291,7 @@ def parameters(
     world: World,
     varying: Varying,
     material: Ids,
-    triangle: Ids,
-    u: Floats,
-    v: Floats,
+    weights: CornerWeights,
     uvs: CornerVectors | None,
 ) -> Parameters:
     """Every varying parameter at points on triangles.
@@ -301,8 +300,8 @@ def parameters(
     ----------
     material : (E,) int32
         Material number of each point.
-    triangle, u, v : (E,)
-        Where the points lie: triangle, weights of its corners 1 and 2.
+    weights : CornerWeights
+        Of the corners around each of the E points.
     """
     names: list[tuple[tuple[str, int], ...]] = []
     values: dict[tuple[str, int], Floats] = {}
@@ -311,16 +310,14 @@ def parameters(
         lanes = np.flatnonzero(material == number).astype(np.int32) if mine else np.zeros(0, np.int32)
         if not lanes.size:
             continue
-        at = triangle.take(lanes), u.take(lanes), v.take(lanes)
+        at = weights.take(lanes)
         uv = None
         for path, each in mine.items():
             if isinstance(each, Attribute):
-                corners = tuple(world.triangles[:, k].take(at[0]) for k in range(3))
-                a, b, c = (each.values.take(index, axis=0) for index in corners)
-                found = (1 - at[1] - at[2])[:, None] * a + at[1][:, None] * b + at[2][:, None] * c
+                found = at.interpolate_vertices(world, each.values)
             else:
                 assert uvs is not None
-                uv = surface.uv(world, uvs, *at) if uv is None else uv
+                uv = surface.uv(world, uvs, at) if uv is None else uv
                 found = FILTERS[each.filter](each.image, uv, each.wrap)
             key = path, each.within.width
             whole = values.setdefault(key, np.zeros((len(material), each.within.width), F, order="F"))

@@ -18,7 +18,7 @@ from illumcli.jobs.verify.inputs import Inputs
 from illumcli.jobs.verify.lobes import response
 from illumcli.jobs.verify.phong import own_light, surface
 from illumcli.models.blinn_phong import BlinnPhong
-from illumcli.rays.surface import bent
+from illumcli.rays.surface import bend
 
 Point = NDArray[Any]  # (3,) or (2,)
 
@@ -94,8 +94,11 @@ def linear(n0: Vectors, n1: Vectors, delta: Vectors, s: Lanes) -> Vectors:
 
 def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Lanes) -> Vectors:
     """The same by van Overveld and Wyvill (1997): the renderer's triangle, of which one edge is looked at."""
-    origin = np.zeros_like(delta)
-    return bent((origin, delta, origin), (n0, n1, n0), (1 - s, s, np.zeros_like(s)))
+    origin, none = np.zeros_like(delta), np.zeros_like(s)
+    corners = ((origin, n0, 1 - s), (delta, n1, s), (origin, n0, none))
+    n = linear(n0, n1, delta, s)
+    bend(n, 3, corners.__getitem__)
+    return n
 
 
 def _along(y: Lanes, start: Point, end: Point) -> Lanes:

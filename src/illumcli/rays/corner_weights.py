@@ -1,0 +1,387 @@
+"""Weights of the corners of the polygon that a hit lies on: the one way values at corners reach hits.
+
+Triangles have barycentric weights. Planar polygons of more corners are interpolated over the whole polygon,
+so that nothing depends on how they were cut: clearly convex quads by inverse bilinear coordinates, all others
+by mean value coordinates. On an edge both are linear between its ends, as barycentric weights are: values
+are continuous from polygon to polygon.
+
+References
+----------
+Floater, M. S. (2003). Mean value coordinates. Computer Aided Geometric Design 20(1).
+Hormann, K., Floater, M. S. (2006). Mean value coordinates for arbitrary planar polygons. ACM TOG 25(4).
+Quilez, I. (2010). Inverse bilinear interpolation. The quadratic equation of a quad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Ids, Lanes, rows
+from illumcli.geometry.assemble import CornerVectors, PolygonCentres, World
+from illumcli.geometry.planar import PlanarPolygons
+from illumcli.records import Record
+
+BLOCK = 1 << 15
+"""Mean value coordinates are formed for about so many corners at once, which stay in a core's cache."""
+TINY = 1e-12
+"""In radii of a polygon: what lies nearer to an edge or a corner lies on it."""
+BELOW = -1e-6
+"""A weight below this lies outside: more than the rounding of a hit across an edge."""
+
+
+class Corners(Record):
+    """Hits on polygons of one class, and what each corner weighs there."""
+
+    lane: Ids | None  # (m,) which of the M hits, ascending; None where these are all
+
+    @property
+    def count(self) -> int:
+        """Corners per hit."""
+        raise NotImplementedError
+
+    def weight(self, k: int) -> Lanes:
+        """(m,) weight of corner k."""
+        raise NotImplementedError
+
+    def corner(self, world: World, k: int) -> Ids:
+        """(m,) number of corner k among the World's corners."""
+        raise NotImplementedError
+
+    def vertex(self, world: World, k: int) -> Ids:
+        """(m,) number of its vertex."""
+        raise NotImplementedError
+
+    @property
+    def shape(self) -> Ids:
+        """(m,) which triangle or polygon of the class each hit lies on."""
+        raise NotImplementedError
+
+    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+        """(m,) a triangle in which corner k lies, and its barycentric weights there."""
+        raise NotImplementedError
+
+    def of(self, hits: NDArray[Any], place: Ids) -> Corners:
+        """Those of some of the hits, at their new places."""
+        raise NotImplementedError
+
+    def mean(self, values: Callable[[int], NDArray[Any]]) -> NDArray[Any]:
+        """(m, j) means by weight of the values at the corners; `values` gives (m, j) those of corner k."""
+        total = self.weight(0)[:, None] * values(0)
+        for k in range(1, self.count):
+            total = total + self.weight(k)[:, None] * values(k)
+        return np.asarray(total)
+
+
+class TriangleCorners(Corners):
+    """Barycentric weights."""
+
+    triangle: Ids  # (m,)
+    u: Lanes  # (m,) float32 weight of corner 1
+    v: Lanes  # (m,) float32 weight of corner 2
+
+    @property
+    def count(self) -> int:
+        return 3
+
+    def weight(self, k: int) -> Lanes:
+        return (self.u, self.v)[k - 1] if k else 1 - self.u - self.v
+
+    def corner(self, world: World, k: int) -> Ids:
+        return world.corners[:, k].take(self.triangle)
+
+    def vertex(self, world: World, k: int) -> Ids:
+        return world.triangles[:, k].take(self.triangle)
+
+    @property
+    def shape(self) -> Ids:
+        return self.triangle
+
+    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+        return self.triangle, np.full_like(self.u, k == 1), np.full_like(self.v, k == 2)
+
+    def of(self, hits: NDArray[Any], place: Ids) -> TriangleCorners:
+        own = hits if self.lane is None else np.flatnonzero(place.take(self.lane) >= 0)
+        lane = None if self.lane is None else place.take(self.lane.take(own))
+        return TriangleCorners(lane, self.triangle.take(own), self.u.take(own), self.v.take(own))
+
+
+class PolygonCorners(Corners):
+    """Weights in planar polygons; the last corner stands for those that a polygon of the class lacks."""
+
+    planar: PlanarPolygons
+    polygon: Ids  # (m,) row of `planar`
+    last: Ids  # (m,) corners less 1
+    weights: NDArray[np.floating[Any]]  # (n, m) sum to 1; below 0 at places in concave polygons
+    outside: NDArray[np.bool_]  # (m,) some weight is below 0
+
+    @property
+    def count(self) -> int:
+        return len(self.weights)
+
+    def weight(self, k: int) -> Lanes:
+        weight: Lanes = self.weights[k]
+        return weight
+
+    def number(self, first: NDArray[np.int32], k: int) -> Ids:
+        """(m,) number of corner k, where those of polygon q have the numbers from ``first[q]`` on."""
+        return np.asarray(first.take(self.polygon) + np.minimum(self.last, np.int32(k)))
+
+    def corner(self, world: World, k: int) -> Ids:
+        return self.number(self.planar.first_corner, k)
+
+    def vertex(self, world: World, k: int) -> Ids:
+        return self.planar.vertex.take(self.number(self.planar.starts, k))
+
+    @property
+    def shape(self) -> Ids:
+        return self.polygon
+
+    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+        number = self.number(self.planar.starts, k)
+        return self.planar.triangle.take(number), self.planar.u.take(number), self.planar.v.take(number)
+
+    def of(self, hits: NDArray[Any], place: Ids) -> PolygonCorners:
+        assert self.lane is not None
+        own = np.flatnonzero(place.take(self.lane) >= 0)
+        return PolygonCorners(
+            place.take(self.lane.take(own)),
+            self.planar,
+            self.polygon.take(own),
+            self.last.take(own),
+            self.weights[:, own],
+            self.outside.take(own),
+        )
+
+    def mean(self, values: Callable[[int], NDArray[Any]]) -> NDArray[Any]:
+        """The same, clamped to the range of the corners where some weight is below 0."""
+        total = super().mean(values)
+        lanes = np.flatnonzero(self.outside)
+        if lanes.size:
+            low = high = rows(values(0), lanes)
+            for k in range(1, self.count):
+                own = rows(values(k), lanes)
+                low, high = np.minimum(low, own), np.maximum(high, own)
+            total[lanes] = np.clip(total[lanes], low, high)
+        return total
+
+
+class MeanCorners(Corners):
+    """Points that stand for whole polygons: the mean of their corners."""
+
+    centres: PolygonCentres
+    polygon: Ids  # (m,) polygon number
+
+    @property
+    def count(self) -> int:
+        return int(self._last().max(initial=0)) + 1
+
+    def _last(self) -> Ids:
+        return np.diff(self.centres.starts).take(self.polygon) - np.int32(1)
+
+    def weight(self, k: int) -> Lanes:
+        last = self._last()
+        return np.where(k <= last, 1 / (last + 1), 0).astype(F)
+
+    def corner(self, world: World, k: int) -> Ids:
+        return np.asarray(self.centres.starts.take(self.polygon) + np.minimum(self._last(), np.int32(k)))
+
+    def vertex(self, world: World, k: int) -> Ids:
+        return self.centres.vertex.take(self.corner(world, k))
+
+    def of(self, hits: NDArray[Any], place: Ids) -> MeanCorners:
+        own = hits if self.lane is None else np.flatnonzero(place.take(self.lane) >= 0)
+        lane = None if self.lane is None else place.take(self.lane.take(own))
+        return MeanCorners(lane, self.centres, self.polygon.take(own))
+
+
+class CornerWeights(Record):
+    """What the corners of the polygon that each of M hits lies on weigh there. Made by `corner_weights`.
+
+    Every interpolation goes through here: `interpolate` for vectors that corners have (normals),
+    `interpolate_vertices` for values at vertices (colours, baked obscurance). `joined` takes any function of
+    a group and the number k of a corner.
+    """
+
+    hits: TriangleCorners
+    """All M, by their triangles alone."""
+    groups: tuple[Corners, ...]
+    """The hits by class of polygon: each in one group."""
+
+    def __len__(self) -> int:
+        return len(self.hits.triangle)
+
+    def interpolate(self, world: World, table: CornerVectors) -> NDArray[Any]:
+        """(M, j) the vectors that `table` has at corners, interpolated; not made unit."""
+        return self.joined(lambda group, k: rows(table.values, table.index.take(group.corner(world, k))))
+
+    def interpolate_vertices(self, world: World, values: NDArray[Any]) -> NDArray[Any]:
+        """(M, j) of (V, j) values at the World's vertices."""
+        return self.joined(lambda group, k: rows(values, group.vertex(world, k)))
+
+    def joined(self, values: Callable[[Any, int], NDArray[Any]]) -> NDArray[Any]:
+        """(M, j) means by weight; `values` gives the (m, j) values at corner k of a group's hits."""
+        if len(self.groups) == 1 and self.groups[0].lane is None:
+            return self.groups[0].mean(partial(values, self.groups[0]))
+        means = [group.mean(partial(values, group)) for group in self.groups]
+        out = np.empty((len(self), means[0].shape[1]), F, order="F")
+        for group, mean in zip(self.groups, means, strict=True):
+            out[group.lane] = mean
+        return out
+
+    def take(self, hits: NDArray[Any]) -> CornerWeights:
+        """The weights at some of the hits, which ascend."""
+        if len(hits) == len(self):
+            return self
+        place = np.full(len(self), -1, np.int32)
+        place[hits] = np.arange(len(hits), dtype=np.int32)
+        groups = tuple(group.of(hits, place) for group in self.groups)
+        return CornerWeights(self.hits.of(hits, place), groups)
+
+
+def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
+    """The hits of all parts, one part after the other."""
+    groups: list[Corners] = []
+    count = 0
+    for part in parts:
+        for group in part.groups:
+            lane = np.arange(len(part), dtype=np.int32) if group.lane is None else group.lane
+            groups.append(replace(group, lane=lane + np.int32(count)))
+        count += len(part)
+    triangle = np.concatenate([part.hits.triangle for part in parts])
+    u, v = (np.concatenate([getattr(part.hits, name) for part in parts]) for name in ("u", "v"))
+    return CornerWeights(TriangleCorners(None, triangle, u, v), tuple(groups))
+
+
+def corner_weights(
+    world: World, planar: PlanarPolygons | None, triangle: Ids, u: Lanes, v: Lanes
+) -> CornerWeights:
+    """The weights at M hits.
+
+    Parameters
+    ----------
+    planar : PlanarPolygons, optional
+        None: interpolate by triangles.
+    triangle : (M,) int32
+    u, v : (M,) float32
+        Barycentric weights of the triangle's corners 1 and 2.
+    """
+    hits = TriangleCorners(None, triangle, u, v)
+    if planar is None:
+        return CornerWeights(hits, (hits,))
+    row = planar.row.take(triangle)
+    alone = np.flatnonzero(row < 0).astype(np.int32)
+    groups: list[Corners] = [TriangleCorners(alone, triangle.take(alone), u.take(alone), v.take(alone))]
+    padded = np.append(planar.padded, -1)[row]
+    for size in np.unique(planar.padded):
+        lane = np.flatnonzero(padded == size).astype(np.int32)
+        polygon = row.take(lane)
+        start = planar.starts.take(polygon)
+        last = planar.starts.take(polygon + 1) - start - 1
+        x, y = _in_plane(world, planar, triangle.take(lane), u.take(lane), v.take(lane))
+        if size:
+            weights: NDArray[Any] = _mean_value(planar.flat, start, last, int(size), x, y)
+        else:
+            weights = _bilinear([planar.flat.take(start + k, axis=0) for k in range(4)], x, y)
+        outside = np.any(weights < BELOW, axis=0)
+        groups.append(PolygonCorners(lane, planar, polygon, last, weights, outside))
+    some = tuple(group for group in groups if group.lane is not None and group.lane.size)
+    return CornerWeights(hits, some or tuple(groups[:1]))
+
+
+def _in_plane(
+    world: World, planar: PlanarPolygons, triangle: Ids, u: Lanes, v: Lanes
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m,) coordinates of hits in the planes of their polygons, in double precision."""
+    polygon = planar.row.take(triangle)
+    shift = planar.starts.take(polygon) - planar.first_corner.take(polygon)
+    x, y = planar.flat.T
+    at = [world.corners[:, k].take(triangle) + shift for k in range(3)]
+    second, third = u.astype(np.float64), v.astype(np.float64)
+    weights = (1 - second - third, second, third)
+    return (
+        sum(weight * x.take(index) for weight, index in zip(weights, at, strict=True)),
+        sum(weight * y.take(index) for weight, index in zip(weights, at, strict=True)),
+    )
+
+
+def _bilinear(
+    corners: list[NDArray[np.float64]], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """(4, m) weights (1 - s)(1 - t), s (1 - t), s t, (1 - s) t of convex quads, counter-clockwise.
+
+    t solves k2 t^2 + k1 t + k0 = 0. Where the map from (s, t) keeps its orientation its Jacobian,
+    2 k2 t + k1, is the positive root of the discriminant, which says which t; either sign of k1 has a form
+    without cancellation, also for parallelograms (k2 = 0). s is then how far the hit lies along the line
+    between two opposite edges, at t on both.
+    """
+    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = (corner.T for corner in corners)
+    ex, ey, fx, fy = x1 - x0, y1 - y0, x3 - x0, y3 - y0
+    gx, gy, hx, hy = x2 - x3 - ex, y2 - y3 - ey, x - x0, y - y0
+    k2 = gx * fy - gy * fx
+    k1 = ex * fy - ey * fx + hx * gy - hy * gx
+    k0 = hx * ey - hy * ex
+    root = np.sqrt(np.maximum(k1 * k1 - 4 * k2 * k0, 0))
+    is_rising = k1 >= 0
+    over = np.where(is_rising, -2 * k0, root - k1)
+    under = np.where(is_rising, k1 + root, 2 * k2)
+    t = np.clip(_ratio(over, under), 0, 1)
+    ax, ay = ex + gx * t, ey + gy * t
+    s = np.clip(_ratio((hx - fx * t) * ax + (hy - fy * t) * ay, ax * ax + ay * ay), 0, 1)
+    weights = np.empty((4, len(x)), F)
+    for k, weight in enumerate(((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t)):
+        weights[k] = weight
+    return weights
+
+
+def _mean_value(
+    flat: NDArray[np.float64],
+    start: Ids,
+    last: Ids,
+    count: int,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(count, m) mean value coordinates in polygons whose last corner fills them up to `count`."""
+    weights = np.empty((count, len(x)))
+    number = np.arange(count, dtype=np.int32)[:, None]
+    width = max(BLOCK // count, 1)
+    for begin in range(0, len(x), width):
+        part = slice(begin, begin + width)
+        at = start[part] + np.minimum(number, last[part])
+        weights[:, part] = _mean_value_of(flat[:, 0].take(at) - x[part], flat[:, 1].take(at) - y[part])
+    return weights
+
+
+def _mean_value_of(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, m) coordinates, by the vectors from each hit to its corners, in radii of the polygon.
+
+    w_i = (tan(a_{i-1} / 2) + tan(a_i / 2)) / r_i, where a_i is the angle that edge i is seen under. Tangents
+    are formed without cancellation; on an edge they are the inverse of `TINY` in place of infinite. Corners
+    that stand at one place, as those that fill up, share what one of them would weigh.
+    """
+    following_x, following_y = np.roll(x, -1, axis=0), np.roll(y, -1, axis=0)
+    r = np.sqrt(x * x + y * y)
+    both = r * np.roll(r, -1, axis=0)
+    inner = x * following_x + y * following_y
+    outer = x * following_y - y * following_x
+    is_wide = inner < 0
+    least = TINY * (both - inner)
+    outer = np.where(is_wide & (np.abs(outer) < least), least, outer)
+    tangent = _ratio(np.where(is_wide, both - inner, outer), np.where(is_wide, outer, both + inner))
+    weights = (np.roll(tangent, 1, axis=0) + tangent) / np.maximum(r, TINY)
+    weights[r <= TINY] = TINY**-3  # on a corner: above all that edges give
+    total = weights[0].copy()
+    for row in weights[1:]:  # in their order, whatever numpy makes of the shape
+        total += row
+    return weights / total
+
+
+def _ratio(over: NDArray[np.float64], under: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`over` / `under`, 0 where `under` is 0."""
+    return np.divide(over, under, out=np.zeros_like(over), where=under != 0)

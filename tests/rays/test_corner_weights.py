@@ -1,0 +1,298 @@
+"""Weights of polygon corners: what generalised barycentric coordinates promise, whatever the cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from illumcli.arrays import columns
+from illumcli.geometry import planar
+from illumcli.geometry.assemble import CornerVectors, place, polygon_centres, rotation
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.planar import planar_polygons
+from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
+from illumcli.rays.surface import bend
+
+F = np.float32
+TURNED = rotation(0, 33) @ rotation(1, 12) @ rotation(2, 71)
+MIRRORED = TURNED @ np.diag([-1.0, 1.0, 1.0, 1.0])
+L_SHAPE = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]]
+ARROW = [[0, 0], [1, 0.4], [2, 0], [1, 1]]  # a concave quad
+KEYHOLE = [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0], [1, 1], [1, 3], [3, 3], [3, 1], [1, 1]]
+STAR = [
+    [r * np.cos(a), r * np.sin(a)]
+    for r, a in zip([1, 0.4] * 5, np.arange(10) * np.pi / 5, strict=True)
+]  # fmt: skip
+POLE = [[0, 0], [1, 0], [0.5, 1], [0.5, 1]]
+STRAIGHT = [[0, 0], [1, 0], [2, 0], [1, 1]]
+NAMED = {
+    "L": L_SHAPE,
+    "arrow": ARROW,
+    "keyhole": KEYHOLE,
+    "star": STAR,
+    "pole": POLE,
+    "straight": STRAIGHT,
+}
+
+
+def ring(radii, squeeze=1.0):
+    angles = np.arange(len(radii)) * 2 * np.pi / len(radii)
+    return np.stack([radii * np.cos(angles), squeeze * radii * np.sin(angles)], axis=1)
+
+
+def polygon(points):
+    """A mesh of one polygon in the plane z = 0."""
+    points = np.asarray(points, float)
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    return Mesh(points, np.arange(len(points), dtype=np.int32), np.array([0, len(points)], np.int32))
+
+
+def anywhere(world, count=400, seed=3):
+    random = np.random.default_rng(seed)
+    triangle = random.integers(0, len(world.triangles), count).astype(np.int32)
+    a, b = np.sort(random.random((2, count)), axis=0)
+    return triangle, a.astype(F), (b - a).astype(F)
+
+
+def positions(world, triangle, u, v):
+    a, b, c = (world.vertices[world.triangles[triangle, k]].astype(float) for k in range(3))
+    u, v = u.astype(float)[:, None], v.astype(float)[:, None]
+    return (1 - u - v) * a + u * b + v * c
+
+
+def dense(weights, world):
+    """(M, C) weights of all the World's corners."""
+    corners = CornerVectors(np.eye(world.corners.max() + 1, dtype=F), np.arange(world.corners.max() + 1))
+    return weights.interpolate(world, corners)
+
+
+def at(points, seed=3, matrix=TURNED):
+    world = place([polygon(points)], [matrix])
+    found = planar_polygons(world)
+    assert found is not None
+    hits = anywhere(world, seed=seed)
+    return world, hits, corner_weights(world, found, *hits)
+
+
+convex = st.builds(
+    lambda count, seed, squeeze: (
+        ring(np.ones(count), squeeze)
+        if seed is None
+        else np.stack([np.cos(a := spread(count, seed)), squeeze * np.sin(a)], axis=1)
+    ),
+    st.integers(4, 20),
+    st.none() | st.integers(0, 10_000),
+    st.floats(0.05, 1),
+)
+
+
+def spread(count, seed):
+    """Angles round a circle, none of the gaps more than half a turn."""
+    return np.sort((np.arange(count) + np.random.default_rng(seed).random(count) * 0.9) * 2 * np.pi / count)
+
+
+stars = st.builds(
+    lambda count, seed: ring(np.random.default_rng(seed).uniform(0.2, 1, count)),
+    st.integers(4, 20),
+    st.integers(0, 10_000),
+)
+
+
+@given(points=convex | stars, mirrored=st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_weights_sum_to_one_and_linear_functions_come_back(points, mirrored):
+    world, hits, weights = at(points, matrix=MIRRORED if mirrored else TURNED)
+    own = weights.groups[0]
+    np.testing.assert_allclose(sum(own.weight(k) for k in range(own.count)), 1, atol=3e-7)
+    np.testing.assert_allclose(
+        weights.interpolate_vertices(world, world.vertices), positions(world, *hits), atol=4e-7
+    )
+
+
+@given(points=convex)
+@settings(max_examples=60, deadline=None)
+def test_no_weight_is_negative_in_a_convex_polygon(points):
+    world, _, weights = at(points)
+    assert dense(weights, world).min() >= -1e-6  # a hit lies across an edge by the rounding of u, v
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_the_named_polygons_are_interpolated_with_linear_precision(name):
+    world, hits, weights = at(NAMED[name])
+    np.testing.assert_allclose(
+        weights.interpolate_vertices(world, world.vertices), positions(world, *hits), atol=4e-7
+    )
+
+
+@given(points=convex | stars | st.sampled_from(list(NAMED.values())), seed=st.integers(0, 99))
+@settings(max_examples=60, deadline=None)
+def test_values_stay_within_the_range_of_the_corners(points, seed):
+    world, _, weights = at(points)
+    values = np.random.default_rng(seed).uniform(-1, 1, (len(world.vertices), 2)).astype(F)
+    found = weights.interpolate_vertices(world, values)
+    assert (found >= values.min(axis=0) - 1e-6).all()
+    assert (found <= values.max(axis=0) + 1e-6).all()
+
+
+@given(points=convex | stars | st.sampled_from([L_SHAPE, ARROW, STAR, STRAIGHT]), seed=st.integers(0, 99))
+@settings(max_examples=60, deadline=None)
+def test_values_are_linear_along_edges(points, seed):
+    world = place([polygon(points)], [TURNED])
+    found = planar_polygons(world)
+    count = len(world.vertices)
+    values = np.random.default_rng(seed).uniform(-1, 1, (count, 1)).astype(F)
+    share = np.linspace(0, 1, 17).astype(F)
+    for triangle in range(len(world.triangles)):
+        for k in range(3):
+            a, b = (int(world.corners[triangle, (k + step) % 3]) for step in (0, 1))
+            if (b - a) % count not in (1, count - 1):
+                continue  # a diagonal
+            w = np.zeros((3, len(share)), F)
+            w[k], w[(k + 1) % 3] = 1 - share, share
+            which = np.full(len(share), triangle, np.int32)
+            along = corner_weights(world, found, which, w[1], w[2]).interpolate_vertices(world, values)
+            wanted = (1 - share) * values[a] + share * values[b]
+            np.testing.assert_allclose(along[:, 0], wanted, atol=2e-6)
+
+
+@given(points=convex | stars | st.sampled_from([L_SHAPE, ARROW, STAR]), turn=st.integers(1, 19))
+@settings(max_examples=60, deadline=None)
+def test_another_cut_gives_the_same_values(points, turn):
+    """The polygon begins at another corner: fans and ears differ, values at a point do not."""
+    points = np.asarray(points, float)
+    values = np.random.default_rng(turn).uniform(-1, 1, (len(points), 1)).astype(F)
+    worlds = [place([polygon(np.roll(points, shift, axis=0))], [TURNED]) for shift in (0, turn)]
+    triangle, u, v = anywhere(worlds[0])
+    where = positions(worlds[0], triangle, u, v)
+    other = np.full(len(where), -1, np.int32)
+    u2, v2 = np.zeros_like(u), np.zeros_like(v)
+    for number, vertices in enumerate(worlds[1].triangles):
+        a, b, c = worlds[1].vertices[vertices].astype(float)
+        if np.linalg.norm(np.cross(b - a, c - a)) < 1e-12:
+            continue
+        own = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), (where - a).T, rcond=None)[0]
+        inside = (own >= -1e-6).all(axis=0) & (own.sum(axis=0) <= 1 + 1e-6) & (other < 0)
+        other[inside], u2[inside], v2[inside] = number, own[0, inside], own[1, inside]
+    kept = other >= 0
+    assert kept.mean() > 0.9
+    one = corner_weights(worlds[0], planar_polygons(worlds[0]), triangle, u, v)
+    two = corner_weights(worlds[1], planar_polygons(worlds[1]), other[kept], u2[kept], v2[kept])
+    found = two.interpolate_vertices(worlds[1], np.roll(values, turn, axis=0))
+    np.testing.assert_allclose(found, one.interpolate_vertices(worlds[0], values)[kept], atol=3e-5)
+
+
+@pytest.mark.parametrize("skew", [0.0, 1e-14, 1e-9, 1e-3, 0.3, -0.3])
+def test_parallelograms_and_trapezoids_have_exact_bilinear_coordinates(skew):
+    corners = np.array([[0, 0], [1, 0], [1.2 + skew, 1], [0.2 - skew, 1 + skew / 2]])
+    world = place([polygon(corners)], [np.eye(4)])
+    triangle, u, v = anywhere(world)
+    found = dense(corner_weights(world, planar_polygons(world), triangle, u, v), world).astype(float)
+    s, t = found[:, 1] + found[:, 2], found[:, 2] + found[:, 3]
+    wanted = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
+    np.testing.assert_allclose(found, wanted, atol=3e-7)
+    np.testing.assert_allclose(found @ world.vertices, positions(world, triangle, u, v), atol=3e-7)
+
+
+def two_quads():
+    """A flat quad and a folded one that share an edge."""
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0.3], [2, 1, -0.3]]
+    return Mesh(
+        np.array(vertices, float),
+        np.array([0, 1, 2, 3, 1, 4, 5, 2], np.int32),
+        np.array([0, 4, 8], np.int32),
+    )
+
+
+def test_a_folded_quad_is_interpolated_by_triangles_and_agrees_at_its_edge():
+    world = place([two_quads()], [np.eye(4)])
+    found = planar_polygons(world)
+    assert (found.row >= 0).tolist() == [True, True, False, False]
+    values = np.random.default_rng(5).random((6, 1)).astype(F)
+    share = np.linspace(0, 1, 9).astype(F)
+    seen = {0: 0, 1: 0}
+    for triangle, vertices in enumerate(world.triangles):
+        where = [list(vertices).index(v) for v in (1, 2) if v in vertices]
+        if len(where) < 2:
+            continue
+        w = np.zeros((3, len(share)), F)
+        w[where[0]], w[where[1]] = 1 - share, share
+        which = np.full(len(share), triangle, np.int32)
+        along = corner_weights(world, found, which, w[1], w[2]).interpolate_vertices(world, values)
+        np.testing.assert_allclose(along[:, 0], (1 - share) * values[1] + share * values[2], atol=1e-6)
+        seen[int(world.polygons[triangle])] += 1
+    assert all(seen.values())
+
+
+@pytest.mark.parametrize(("fold", "is_flat"), [(2.0**-8 * 0.99, True), (2.0**-8 * 1.01, False)])
+def test_a_square_counts_as_flat_up_to_a_fold_of_2_to_the_minus_8(fold, is_flat):
+    rise = np.tan(fold / 2) / np.sqrt(2)
+    square = polygon([[0, 0, rise], [1, 0, 0], [1, 1, rise], [0, 1, 0]])
+    assert (planar_polygons(place([square], [np.eye(4)])) is not None) == is_flat
+
+
+def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangles():
+    bow = polygon([[0, 0], [1, 1], [1, 0], [0, 1]])
+    large = polygon(ring(np.ones(planar.MOST_CORNERS + 1)))
+    three = polygon([[0, 0], [1, 0], [0, 1]])
+    for mesh in (bow, large, three):
+        assert planar_polygons(place([mesh], [np.eye(4)])) is None
+
+
+def test_triangles_keep_their_bits_beside_polygons():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1]], float)
+    mesh = Mesh(vertices, np.array([0, 1, 2, 3, 1, 4, 2], np.int32), np.array([0, 4, 7], np.int32))
+    world = place([mesh], [TURNED])
+    hits = anywhere(world)
+    whole = corner_weights(world, planar_polygons(world), *hits).interpolate_vertices(world, world.vertices)
+    by_triangles = corner_weights(world, None, *hits).interpolate_vertices(world, world.vertices)
+    alone = world.polygons[hits[0]] == 1
+    assert alone.any()
+    np.testing.assert_array_equal(whole[alone], by_triangles[alone])
+
+
+def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
+    meshes = [polygon(L_SHAPE), two_quads(), polygon(ARROW), polygon(ring(np.ones(9)))]
+    world = place(meshes, [np.eye(4)] * 4)
+    hits = anywhere(world, 1000)
+    whole = corner_weights(world, planar_polygons(world), *hits)
+    values = np.random.default_rng(1).random((len(world.vertices), 3)).astype(F)
+    all_of_them = whole.interpolate_vertices(world, values)
+    half = [np.flatnonzero(hits[0] % 2 == rest) for rest in (0, 1)]
+    parts = [whole.take(lanes) for lanes in half]
+    for lanes, part in zip(half, parts, strict=True):
+        np.testing.assert_array_equal(part.interpolate_vertices(world, values), all_of_them[lanes])
+    joined = concatenated(parts).interpolate_vertices(world, values)
+    np.testing.assert_array_equal(joined, all_of_them[np.concatenate(half)])
+    nothing = whole.take(half[0][:0])
+    assert nothing.interpolate_vertices(world, values).shape == (0, 3)
+
+
+def test_the_mean_of_polygons_of_any_size():
+    world = place([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
+    centres = polygon_centres(world)
+    group = MeanCorners(None, centres, np.array([0, 2, 1, 0], np.int32))
+    weights = CornerWeights(corner_weights(world, None, *anywhere(world, 4)).hits, (group,))
+    found = weights.interpolate_vertices(world, world.vertices)
+    np.testing.assert_allclose(found, centres.position[[0, 2, 1, 0]], atol=1e-6)
+
+
+def test_quadratic_normals_of_a_quad_have_its_edges_terms_and_none_of_a_diagonal():
+    """Between two equal edges of a rectangle the normal is that of the edge, for every t."""
+    width = np.linspace(0, 1, 21).astype(F)
+    up, way = np.array([0.6, 0, 0.8], F), np.array([1, 0, 0], F)
+    for t in (0.0, 0.3, 1.0):
+        w = [(1 - width) * (1 - F(t)), width * (1 - F(t)), width * F(t), (1 - width) * F(t)]
+        x = [0, 1, 1, 0], [0, 0, 1, 1]
+        n = columns(np.tile(up, (len(width), 1)))
+
+        def corner(k, w=w, x=x):
+            place = columns(np.tile(np.array([x[0][k], x[1][k], 0], F), (len(width), 1)))
+            return place, columns(np.tile(up, (len(width), 1))), w[k]
+
+        bend(n, 4, corner)
+        share = (1 - t) ** 2 + t**2
+        wanted = up - (width * (1 - width) * 3 * 1.2 * share)[:, None] * way
+        np.testing.assert_allclose(n, wanted, atol=1e-6)

@@ -156,6 +156,12 @@ def test_ten_mistakes_are_ten_lines_in_the_order_of_the_text(problems):
             "objects: [{mesh: {shape: sphere}, transform: {scale: [1, 2]}}]",
             "objects.0.transform.scale: must be a list of",
         ),
+        (
+            "objects: [{mesh: a.obj, transform: {matrix: "
+            "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0.5, 0, 0, 1]]}}]",
+            "objects.0.transform.matrix: the last of its four rows must be 0, 0, 0, 1, is 0.5, 0, 0, 1; "
+            "where its numbers stand column by column, write it transposed",
+        ),
         ("objects: [{mesh: {shape: spere}}]", "no shape 'spere'; did you mean 'sphere'?"),
         ("objects: [{mesh: {}}]", "objects.0.mesh: missing key 'file'"),
         (

@@ -5,11 +5,12 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from illumcli.description import Description, written
+from illumcli.description import Description, checks, written
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
@@ -93,7 +94,16 @@ class Transform(Description):
     translate: Vector = (0.0, 0.0, 0.0)
     """[scene units]"""
     matrix: tuple[Row, Row, Row, Row] | None = None
-    """Four rows, applied last to column vectors."""
+    """Four rows, applied last to column vectors; the last one is 0 0 0 1."""
+
+    @checks("matrix")
+    def _affine(matrix: tuple[Row, ...] | None, before: Mapping[str, Any]) -> None:
+        if matrix is not None and matrix[3] != (0, 0, 0, 1):
+            last = ", ".join(f"{value:g}" for value in matrix[3])
+            raise ValueError(
+                f"the last of its four rows must be 0, 0, 0, 1, is {last}; where its numbers stand column by "
+                "column, write it transposed"
+            )
 
 
 class Grain(Description):

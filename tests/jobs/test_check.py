@@ -28,7 +28,7 @@ def scenes(tmp_path):
 
 
 def test_every_problem_of_every_file(scenes):
-    valid, problems = run(list(scenes.values()))
+    valid, _, problems = run(list(scenes.values()))
     assert valid == [scenes["good"]]
     assert [line.replace(f"{scenes['bad'].parent}/", "") for line in problems] == [
         "bad.yaml:4:1: seed: must be at least 0, is -1",
@@ -40,7 +40,7 @@ def test_every_problem_of_every_file(scenes):
 
 
 def test_a_fault_of_an_override_is_said_once(scenes):
-    valid, problems = run([scenes["good"], scenes["good"]], ["film.width=0"])
+    valid, _, problems = run([scenes["good"], scenes["good"]], ["film.width=0"])
     assert (valid, problems) == ([], ["-D film.width=0: must be at least 1, is 0"])
 
 
@@ -65,6 +65,13 @@ def test_allowed_folders_by_option(scenes, tmp_path):
     assert subprocess.run(command, capture_output=True, check=False).returncode == 2
     allowed = [*command, "--allow", tmp_path / "far"]
     assert subprocess.run(allowed, capture_output=True, check=False).returncode == 0
+
+
+def test_what_has_no_effect_is_said_and_no_fault(scenes):
+    valid, unused, problems = run([scenes["good"]], ["film.samples=1", "film.filter={filter: tent}"])
+    assert (valid, problems) == ([scenes["good"]], [])
+    assert len(unused) == 1
+    assert "a single sample looks through the pixel's centre" in unused[0]
 
 
 def test_the_schema_file_is_the_schema(root):

@@ -9,7 +9,7 @@ import pytest
 
 from illumcli.errors import InputError
 from illumcli.files.images import read_image
-from illumcli.jobs.sweep import at_frame, axis_of, split, variants_of
+from illumcli.jobs.sweep import at_frame, axis_of, run, split, variants_of
 
 SCENE = """
 version: 1
@@ -150,6 +150,16 @@ def test_a_moving_light_casts_its_own_rays_alone(illum, scene, tmp_path):
     rays = [each["rays"] for each in json.loads((tmp_path / "r.json").read_text())]
     assert set(rays[0]) == {"hits", "obscurance", "shadow:key"}
     assert all(set(each) == {"shadow:key"} for each in rays[1:])
+
+
+def test_what_has_an_effect_in_some_variant_is_not_told(scene, tmp_path):
+    """Without ambient light the obscurance weighs nothing; the same key with the film's filter never does."""
+    variants = variants_of(
+        ["ambient=0,0.2", "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"]
+    )
+    done = run(scene, variants, str(tmp_path / "{ambient}.png"), cache=False)
+    assert len(done.warnings) == 1
+    assert "a single sample looks" in done.warnings[0]
 
 
 def test_all_problems_are_said_before_anything_is_rendered(illum, scene, tmp_path):

@@ -17,7 +17,9 @@ def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
     from illumcli.errors import InputError
     from illumcli.jobs.check import run
 
-    valid, problems = run(scenes, overrides)
+    valid, unused, problems = run(scenes, overrides)
+    for line in unused:
+        click.echo(line, err=True)
     for path in valid:
         click.echo(f"{path}: ok")
     if problems:

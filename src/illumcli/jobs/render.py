@@ -34,7 +34,7 @@ from illumcli.plan.recipes import View
 from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
-from illumcli.scene.load import Loaded, load
+from illumcli.scene.load import Loaded, load, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)
@@ -144,6 +144,7 @@ def run(
     work = prepared(load(path, overrides), pattern, only, seed)
     store = opened_store() if cache else None
     report = rendered(work, store, Memory(), threads, force, progress, strict)
+    report.warnings += unused_keys(work, pattern)
     if store is not None:
         store.finish()
         report.warnings += [store.warning] if store.warning else []
@@ -177,6 +178,12 @@ def prepared(
     steps = plan(scene, loaded, only)
     patterns = (pattern,) if pattern else scene.outputs.files
     return Work(loaded, scene, steps, tuple(image_set(loaded, scene, steps, patterns, values or {})))
+
+
+def unused_keys(work: Work, pattern: str | None = None) -> list[str]:
+    """What the scene says and what changes nothing, a line each."""
+    files = () if pattern else work.scene.outputs.files
+    return unused_lines(work.loaded, work.scene, [layer.name for layer in work.plan.layers], files)
 
 
 def rendered(

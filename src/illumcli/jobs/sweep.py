@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 from illumcli.errors import IllumError, InputError
 from illumcli.files.names import check_unique
 from illumcli.geometry.formula import parse as formula
-from illumcli.jobs.render import Progress, Report, Work, is_kept, opened_store, prepared, rendered
+from illumcli.jobs.render import (
+    Progress,
+    Report,
+    Work,
+    is_kept,
+    opened_store,
+    prepared,
+    rendered,
+    unused_keys,
+)
 from illumcli.plan.artifacts import Memory
 from illumcli.records import Value
 from illumcli.scene.load import load
@@ -118,6 +127,7 @@ def run(
         memory.retire()
         sweep.outcomes.append(outcome)
         written(outcome)
+    sweep.warnings += _in_all([unused_keys(work, pattern) for work in works])
     if store is not None:
         store.finish()
         sweep.warnings += [store.warning] if store.warning else []
@@ -142,6 +152,12 @@ def _prepared(
         raise InputError(problems)
     check_unique([str(target.path) for work in works for target in work.targets])
     return works
+
+
+def _in_all(groups: Sequence[Sequence[str]]) -> list[str]:
+    """The lines of the first group that stand in every other too."""
+    common = set(groups[0]).intersection(*groups) if groups else set()
+    return [line for line in groups[0] if line in common] if groups else []
 
 
 def failed(sweep: Sweep) -> IllumError | None:

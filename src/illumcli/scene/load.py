@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
 from illumcli.scene.spec import Scene
+from illumcli.scene.unused import unused
 from illumcli.variants import suggestion
 
 MAX_EXTENDS = 8  # files, one extending the next
@@ -104,6 +105,12 @@ def file_problems(loaded: Loaded) -> list[str]:
         (at, node, _inside(str(node.value), loaded.folder, loaded.roots)) for at, node in _paths(loaded.tree)
     ]
     return _lines([_problem(node.at, at, fact) for at, node, fact in found if isinstance(fact, str)])
+
+
+def unused_lines(loaded: Loaded, scene: Scene, layers: Collection[str], files: Collection[str]) -> list[str]:
+    """What the scene as written says and what has no effect, a line each; arguments as those of `unused`."""
+    found = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
+    return _lines([_problem(node.at, path, fact) for path, fact, node in found if node is not None])
 
 
 @dataclass

@@ -1,0 +1,135 @@
+"""What a scene says and what changes nothing beside the rest of it: told once, with the way out.
+
+Arithmetic is none of it (a light of intensity 0), nor what no layer asked for shows, nor a material, mesh or
+camera that nothing names: scenes share them by `extends`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+from illumcli.description import Description
+from illumcli.models._parameters import Texture
+from illumcli.scene.faults import Fault
+from illumcli.scene.source import Path
+from illumcli.scene.spec import MeshFile, Object, Scene
+from illumcli.values import Three, marks
+
+
+def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:
+    """The part and the fact of whatever has no effect where it is said; what is not said is among them.
+
+    Parameters
+    ----------
+    layers : collection of str
+        Layers that are made.
+    files : collection of str
+        Name patterns of the files that are written; none where the scene's own are not.
+    """
+    yield from _views(scene)
+    yield from _ambient(scene, layers)
+    yield from _meshes(scene)
+    for i, thing in enumerate(scene.objects):
+        yield from _object(scene, i, thing)
+    if scene.objects and all(thing.shading for thing in scene.objects):
+        yield ("shading",), "is not used, every object has a rate of its own; change theirs"
+    if files and all(name.lower().endswith(".png") for name in files):
+        yield ("outputs", "colour"), "is not used, it is the precision of .exr; write one, or leave it out"
+
+
+def _views(scene: Scene) -> Iterator[Fault]:
+    """Keys of cameras and of the film."""
+    film, cameras = scene.film, scene.named_cameras()
+    for name, camera in cameras.items():
+        path: Path = ("cameras", name) if scene.cameras else ("camera",)
+        if _parallel(camera.up, [b - a for a, b in zip(camera.position, camera.target, strict=True)]):
+            yield (*path, "up"), "is not used, it lies along the line of sight; give another direction"
+    for key in ("width", "height", "samples"):
+        if all(getattr(camera, key) for camera in cameras.values()):
+            yield ("film", key), f"is not used, every camera has its own {key}; change theirs"
+    samples = [camera.samples or film.samples for camera in cameras.values()]
+    if film.adaptive is not None and max(samples) <= film.adaptive.first:
+        fact = f"is not used, no pixel has more than the {film.adaptive.first} samples that come first"
+        yield ("film", "adaptive"), f"{fact}; raise film.samples"
+    if max(samples) == 1:
+        yield ("film", "filter"), "is not used, a single sample looks through the pixel's centre; take more"
+
+
+def _parallel(a: Any, b: Any) -> bool:
+    """Have two vectors the same direction, or the opposite one, as far as a camera can tell?"""
+    a, b = ([x / max(map(abs, vector)) for x in vector] for vector in (a, b))
+    cross = [a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    size = sum(x * x for x in a) * sum(x * x for x in b)
+    return sum(x * x for x in cross) < 1e-18 * size
+
+
+def _ambient(scene: Scene, layers: Collection[str]) -> Iterator[Fault]:
+    """Obscurance that weighs no light, or is there already."""
+    sources = [source for _, source in _sources(scene)]
+    baked = [isinstance(source, MeshFile) and source.obscurance is not None for source in sources]
+    if baked and all(baked):
+        yield ("obscurance",), "is not used, every mesh has baked values; leave it or theirs out"
+    if scene.ambient.form == "separate" and not any(scene.ambient.color) and "obscurance" not in layers:
+        fact = "is not used, there is no ambient light for it to weigh; give ambient a colour"
+        yield ("obscurance",), fact
+        for path, _ in _sources(scene):
+            yield (*path, "obscurance"), fact
+
+
+def _sources(scene: Scene) -> list[tuple[Path, Any]]:
+    """Where each object's mesh is described, and its description."""
+    return [
+        (("meshes", thing.mesh), scene.meshes.get(thing.mesh))
+        if isinstance(thing.mesh, str)
+        else (("objects", i, "mesh"), thing.mesh)
+        for i, thing in enumerate(scene.objects)
+    ]
+
+
+def _meshes(scene: Scene) -> Iterator[Fault]:
+    """Keys of mesh files that no object with the mesh makes use of."""
+    users: dict[Path, list[Object]] = {}
+    for (path, source), thing in zip(_sources(scene), scene.objects, strict=True):
+        if isinstance(source, MeshFile):
+            users.setdefault(path, []).append(thing)
+    for path, things in users.items():
+        if all(thing.material is not None for thing in things):
+            fact = "is not used, its objects have materials of their own; leave these, or this, out"
+            yield (*path, "materials"), fact
+        if all((thing.shading or scene.shading) == "constant" for thing in things):
+            for key in ("source", "weights", "crease"):
+                fact = "is not used, the rate constant shades by polygons' own normals; leave it out"
+                yield (*path, "normals", key), fact
+
+
+def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
+    """Keys of one object, its material's among them."""
+    path: Path = ("objects", number)
+    model = scene.material_of(thing)
+    if model is not None and model.isotropic:
+        yield (*path, "grain"), f"is not used, the model {dict(model)['model']} has none; leave it out"
+    own = _sources(scene)[number][1]
+    if thing.override and thing.material is None and getattr(own, "materials", False):
+        fact = "replaces all that the mesh file selects by one material; give the object a material"
+        yield (*path, "override"), fact
+    x, y, z = thing.transform.scale
+    if thing.transform.fit is not None and x == y == z > 0:
+        yield (*path, "transform", "scale"), "is not used, fit says the size; leave one of them out"
+    if model is not None:
+        said = ("materials", thing.material) if isinstance(thing.material, str) else (*path, "material")
+        for where in (said, (*path, "override")):
+            for name in _colored_by(model):
+                fact = "is not used, a colour reads r, g and b; leave it out"
+                yield (*where, *name.split("."), "channel"), fact
+
+
+def _colored_by(model: Any) -> Iterator[str]:
+    """Paths of the colours of a model that vary by an image."""
+    for name, value in model.varying().items():
+        *parts, last = name.split(".")
+        owner: Description = model
+        for part in parts:
+            owner = getattr(owner, part)
+        if isinstance(value, Texture) and any(isinstance(m, Three) for m in marks(owner.fields()[last].kind)):
+            yield name

@@ -6,11 +6,12 @@ is equal, but to load what makes it takes a quarter of a small render.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
 
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from illumcli.records import Value
 
@@ -105,19 +106,47 @@ class Many(Value):
 
 
 class Three(Value):
-    """Three numbers in a list; where `spread`, one number stands for three equal ones."""
+    """Three numbers in a list; other ways to write them are made such a list by `written`, a function."""
 
     each: Within
-    spread: bool = False
+    written: Callable[[Any], Any] | None = None
 
     def schema(self, of: Any) -> CoreSchema:
         listed = core_schema.tuple_positional_schema([self.each.schema()] * 3, strict=False)
-        return core_schema.no_info_before_validator_function(spread, listed) if self.spread else listed
+        if self.written is None:
+            return listed
+        return core_schema.no_info_before_validator_function(self.written, listed)
 
 
 def spread(value: Any) -> Any:
     """One number as three equal ones; anything else unchanged."""
     return (value,) * 3 if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+HEX = "^#([0-9A-Fa-f]{3}|[0-9A-Fa-f]{6})$"
+"""A colour as style sheets write it; of three digits each stands for two equal ones."""
+
+
+def color(value: Any) -> Any:
+    """The three linear numbers of a colour: from one number, three numbers or text like `#ff8800`, in sRGB.
+
+    Raises
+    ------
+    PydanticCustomError
+        Of type `color`, for anything else.
+    """
+    if isinstance(value, str) and re.fullmatch(HEX, value):
+        digits = value[1:] if len(value) == 7 else "".join(2 * digit for digit in value[1:])
+        return tuple(_linear(int(digits[k : k + 2], 16) / 255) for k in (0, 2, 4))
+    listed = spread(value)
+    if not isinstance(listed, list | tuple) or len(listed) != 3:
+        raise PydanticCustomError("color", "no colour")
+    return listed
+
+
+def _linear(code: float) -> float:
+    """Linear light of an sRGB value, as `pixels.from_srgb` without numpy."""
+    return code / 12.92 if code <= 0.04045 else float(((code + 0.055) / 1.055) ** 2.4)
 
 
 class Before(Value):
@@ -191,6 +220,6 @@ Share: TypeAlias = Annotated[float, Within(ge=0, le=1)]
 
 Vector: TypeAlias = Annotated[tuple[float, float, float], Three(Within(ge=-LARGEST))]
 Direction: TypeAlias = Annotated[Vector, After(nonzero)]
-Color: TypeAlias = Annotated[tuple[float, float, float], Three(Within(ge=0), spread=True)]
-Albedo: TypeAlias = Annotated[tuple[float, float, float], Three(Within(ge=0, le=1), spread=True)]
+Color: TypeAlias = Annotated[tuple[float, float, float], Three(Within(ge=0), color)]
+Albedo: TypeAlias = Annotated[tuple[float, float, float], Three(Within(ge=0, le=1), color)]
 Name: TypeAlias = Annotated[str, Text(r"^[A-Za-z_][\w-]*$")]

@@ -451,6 +451,65 @@ def test_the_root_of_the_disk_is_not_allowed_by_standing_in_it(scene_naming, wri
         resolve(scene_naming("/etc/e.obj"), "/etc/e.obj")
 
 
+# colours
+
+WAYS = "must be one number, three numbers or '#rrggbb' in quotes"
+
+
+COLORED = """\
+version: 1
+film: {background: "COLOR"}
+ambient: "COLOR"
+depth_cue: {near: 1, far: 2, color: "COLOR"}
+materials:
+  clay: {model: lambert, diffuse: "COLOR"}
+  gold: {model: cook_torrance, fresnel: {F: schlick, f0: "COLOR"}}
+objects: [{mesh: a.obj, material: clay, override: {diffuse: "COLOR"}}]
+lights: [{light: directional, direction: [0, -1, 0], irradiance: "COLOR"}]
+"""
+
+
+@pytest.mark.parametrize("text", ["#bc8000", "#BC8000"])
+def test_colours_may_be_written_as_srgb_anywhere(write, text):
+    scene = load(write(COLORED.replace("COLOR", text))).scene
+    half = ((0xBC / 255 + 0.055) / 1.055) ** 2.4  # IEC 61966-2-1
+    quarter = ((0x80 / 255 + 0.055) / 1.055) ** 2.4
+    model = scene.material_of(scene.objects[0])
+    found = [scene.film.background, scene.ambient.color, scene.depth_cue.color, model.diffuse,
+             scene.materials["gold"].fresnel.f0, scene.lights[0].irradiance]  # fmt: skip
+    for color in found:
+        assert color == pytest.approx((half, quarter, 0.0), abs=1e-15)
+
+
+def test_three_digits_stand_for_six_and_dark_values_for_the_toe(write):
+    path = write(GOOD)
+    short, long = (load(path, [f"materials.clay.diffuse={c}"]).scene.materials["clay"].diffuse
+                   for c in ("#f80", "#ff8800"))  # fmt: skip
+    assert short == long
+    dark = load(path, ['film={background: "#010203"}']).scene.film.background
+    assert dark == pytest.approx([k / 255 / 12.92 for k in (1, 2, 3)], abs=1e-18)
+
+
+@pytest.mark.parametrize("value", ["red", "[1, 2]", "{r: 1}", '"#12"', "#12", "true", "[]"])
+def test_what_is_no_colour_is_told_all_three_ways(problems, value):
+    for path in ("film.background", "materials.clay.diffuse", "lights.key.intensity", "ambient"):
+        if (path, value) == ("ambient", "{r: 1}"):
+            continue  # a mapping says color and form there
+        (line,) = problems(GOOD, f"{path}={value}")
+        assert line.startswith(f"-D {path}={value}: {WAYS}"), line
+
+
+def test_ambient_names_its_forms_too(problems):
+    (line,) = problems(GOOD + "ambient: copled\n")
+    assert line == f"s.yaml:16:1: ambient: {WAYS}, or a form (separate, coupled), is text 'copled'"
+
+
+def test_a_colour_that_yaml_takes_for_a_comment_is_told(problems):
+    lines = problems(GOOD + "ambient: #808080\nfilm2: # no colour\n")
+    assert lines[0] == 's.yaml:16:1: ambient: #808080 is a comment here; write "#808080" in quotes'
+    assert "unknown key 'film2'" in lines[1]
+
+
 # a mesh instead of a scene
 
 

@@ -149,6 +149,8 @@ def values(part: dict[str, Any], name: str = "") -> st.SearchStrategy[Any]:
             return st.floats(low, min(high, top), allow_subnormal=False, **open_ends)
         case "string":
             pattern = part.get("pattern", "")
+            if pattern.startswith("^#"):
+                return st.from_regex(pattern, fullmatch=True)
             return (
                 st.just("0.5r") if pattern.endswith("r$") else st.just(FREE[name]) if name in FREE else WORDS
             )

@@ -11,7 +11,7 @@ from pydantic_core import core_schema
 from illumcli.description import Description
 from illumcli.docstrings import field_docs, summary
 from illumcli.scene.spec import Scene
-from illumcli.values import spread
+from illumcli.values import HEX, color, spread
 from illumcli.variants import members
 
 EXTENDS = {
@@ -20,6 +20,11 @@ EXTENDS = {
     "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
 }
 
+SRGB = {
+    "type": "string",
+    "pattern": HEX,
+    "description": "A colour in sRGB, made linear: '#rrggbb', or '#rgb' for equal digits.",
+}
 MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
 
 
@@ -98,10 +103,12 @@ class _Schema(GenerateJsonSchema):
         return {**made, "additionalProperties": False} if "patternProperties" in made else made
 
     def function_before_schema(self, schema: core_schema.BeforeValidatorFunctionSchema) -> JsonSchemaValue:
-        """One number may stand for three."""
+        """One number may stand for three, or a text for a colour."""
         made = super().function_before_schema(schema)
         if schema["function"]["function"] is spread:
             return {"anyOf": [made["items"], made]}
+        if schema["function"]["function"] is color:
+            return {"anyOf": [made["items"], SRGB, made]}
         return made
 
     def function_after_schema(self, schema: core_schema.AfterValidatorFunctionSchema) -> JsonSchemaValue:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from illumcli import values
 from illumcli.description import Description
-from illumcli.values import By, Tag, Three, Within
+from illumcli.values import By, Tag, Three, Within, spread
 
 
 class Texture(Description):
@@ -57,9 +57,7 @@ HalfHeight: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=1.57)]]
 Spread: TypeAlias = Varying[Annotated[float, Within(ge=0, le=1.5708)]]
 # indices of refraction
 Index: TypeAlias = Varying[Annotated[float, Within(ge=0.01, le=1e3)]]
-IndexColor: TypeAlias = Varying[
-    Annotated[tuple[float, float, float], Three(Within(ge=0.01, le=1e3), spread=True)]
-]
+IndexColor: TypeAlias = Varying[Annotated[tuple[float, float, float], Three(Within(ge=0.01, le=1e3), spread)]]
 ExtinctionColor: TypeAlias = Varying[
-    Annotated[tuple[float, float, float], Three(Within(ge=0, le=1e3), spread=True)]
+    Annotated[tuple[float, float, float], Three(Within(ge=0, le=1e3), spread)]
 ]

@@ -134,6 +134,18 @@ def _choice(value: Any, facts: Mapping[str, Any]) -> str:
     return f"must be {facts['expected']}, is {shown(value)}"
 
 
+def _color(value: Any, facts: Mapping[str, Any]) -> str:
+    own = f"a list of {len(value)}" if isinstance(value, list | tuple) else shown(value)
+    return f"must be {COLOR}, is {own}"
+
+
+def _ambient(value: Any, facts: Mapping[str, Any]) -> str:
+    return f"must be {COLOR}, or a form (separate, coupled), is {shown(value)}"
+
+
+COLOR = "one number, three numbers or '#rrggbb' in quotes"
+
+
 def _tag(value: Any, facts: Mapping[str, Any]) -> str:
     known, tag = tuple(re.findall(r"'([^']*)'", facts["expected_tags"])), str(facts["tag"])
     return f"no {facts['discriminator'][1:-1]} '{short(tag)}'; {suggestion(tag, known)}"
@@ -165,6 +177,8 @@ _WORDS: dict[str, Callable[[Any, Mapping[str, Any]], str]] = {
     "less_than_equal": _bound("at most", "le"),
     "too_long": lambda value, facts: _length(facts["max_length"], value),
     "too_short": lambda value, facts: f"must have at least {facts['min_length']} part, has {len(value)}",
+    "color": _color,
+    "ambient": _ambient,
     "literal_error": _choice,
     "union_tag_invalid": _tag,
     "union_tag_not_found": lambda value, facts: f"missing key {facts['discriminator']}",

@@ -42,6 +42,8 @@ def parse(text: str, problems: list[Problem]) -> Override | None:
     if not equals or not all(steps) or len(steps) > MAX_DEPTH:
         problems.append(Problem(place, (), "write PATH=VALUE, as in -D film.samples=16"))
         return None
+    if value.strip().startswith("#"):  # a colour; YAML would take it for a comment
+        return Override(steps, Node(value.strip(), place), path.strip())
     node, found = source.read(value.encode("utf-8", "surrogateescape"), "", place)
     problems += found
     return None if node is None or found else Override(steps, node, path.strip())

@@ -30,6 +30,7 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f]")
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_UNQUOTED = re.compile(r"[ \t]*(#[0-9A-Fa-f]{3,8})[ \t]*\r?$", re.MULTILINE)
 _WORDS: dict[str, Scalar] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -290,6 +291,9 @@ class _Composer:
         text = event.value
         if not event.implicit[0] or event.style:
             return text
+        if not text and (color := _UNQUOTED.match(self.text, event.end_mark.index)):
+            self.problem(mark, path, f'{color[1]} is a comment here; write "{color[1]}" in quotes')
+            return color[1]
         if text in _WORDS:
             return _WORDS[text]
         if _NOT_FINITE.fullmatch(text):

@@ -237,9 +237,14 @@ class Film(Description):
 
 
 def _ambient(value: Any) -> Any:
-    if isinstance(value, str):
+    if value in FORMS:
         return {"form": value, "color": 1.0}
-    return {"color": value} if isinstance(value, int | float | list | tuple) else value
+    if isinstance(value, str) and not value.startswith("#"):
+        raise PydanticCustomError("ambient", "neither a form nor a colour")
+    return {"color": value} if isinstance(value, str | int | float | list | tuple) else value
+
+
+FORMS = ("separate", "coupled")
 
 
 class Ambient(Description):

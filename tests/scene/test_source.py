@@ -127,6 +127,27 @@ def test_nine_rows_are_refused(parser, row):
     assert fact in found
 
 
+@pytest.mark.parametrize("limit", [33, 64, 1000])
+@pytest.mark.parametrize("row", ["deep flow", "deep lines"])
+def test_the_depth_limit_is_ours_wherever_the_parsers_own_stands(parser, monkeypatch, limit, row):
+    parse = source.yaml.parse
+
+    def limited(text, **options):
+        """As newer parsers scan: a depth of their own is met before the first event is handed out."""
+        depth = 0
+        for index, character in enumerate(text):
+            depth += character == "["
+            if depth > limit:
+                line = text.count("\n", 0, index)
+                mark = source.yaml.Mark("", index, line, index - text.rfind("\n", 0, index) - 1, None, None)
+                raise source.yaml.scanner.ScannerError("while increasing flow level", mark, "too deep", mark)
+        return parse(text, **options)
+
+    monkeypatch.setattr(source.yaml, "parse", limited)
+    text, fact = NINE[row]
+    assert faults(text) == [fact]
+
+
 @pytest.mark.parametrize(
     "text", [b"{a: " * 50_000, b"- " * 100_000, b"? " * 100_000, b"&a " * 50_000, b"!a " * 50_000]
 )

@@ -177,24 +177,45 @@ class _Composer:
     aliases: int = 0
 
     def document(self, start: Place) -> Node | None:
-        events = yaml.parse(self.text, Loader=_LOADER)
-        root = None
+        """The one document, or None after adding to `problems` why it cannot be read."""
         try:
-            for event in events:
-                if isinstance(event, yaml.DocumentStartEvent):
-                    if root is not None:
-                        self.refuse(event.start_mark, "a second document; a scene file holds one")
-                    root = self.node(next(events), events, (), 1)
+            return self.root() or Node(None, start)
         except _Refused:
             return None
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
-            self.problems.append(Problem(self.place(mark) if mark else start, (), _syntax(error)))
+            syntax = Problem(self.place(mark) if mark else start, (), _syntax(error))
+            self.problems.append((self.refusal_before(mark) if mark else None) or syntax)
             return None
         except (yaml.YAMLError, ValueError, OverflowError) as error:  # ValueError: an escape beyond Unicode
             self.problems.append(Problem(start, (), f"not YAML: {' '.join(str(error).split())}"))
             return None
-        return root or Node(None, start)
+
+    def root(self) -> Node | None:
+        """The root of the one document; None where there is none."""
+        events = yaml.parse(self.text, Loader=_LOADER)
+        root = None
+        for event in events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                if root is not None:
+                    self.refuse(event.start_mark, "a second document; a scene file holds one")
+                root = self.node(next(events), events, (), 1)
+        return root
+
+    def refusal_before(self, mark: Any) -> Problem | None:
+        """What is refused in the text before `mark`, where the parser stopped.
+
+        The parser scans ahead of its events, and newer ones stop at a depth of their own: what comes before
+        that place is read alone, so that the limits here decide, whatever the parser's are.
+        """
+        before = _Composer(self.text[: mark.index], self.place)
+        try:
+            before.root()
+        except _Refused:
+            return before.problems[-1]
+        except (yaml.YAMLError, ValueError, OverflowError):
+            pass
+        return None
 
     def refuse(self, mark: Any, fact: str) -> None:
         self.problem(mark, (), fact)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -62,8 +64,17 @@ def test_readme_names_every_scene():
         assert f"`{stem}`" in text, scene.name
 
 
-def test_ci_runs_the_readmes_test_command():
-    text = (ROOT / "README.md").read_text()
-    command = ".venv/bin/python -m pytest -n 2"
-    assert f"\n{command}\n" in text
-    assert (ROOT / ".ci" / "run").read_text().rstrip().endswith(command)
+def test_ci_runs_the_readmes_two_commands():
+    said = subprocess.run([ROOT / ".ci" / "readme"], capture_output=True, text=True, check=True).stdout
+    first, second = said.splitlines()
+    assert f"```sh\n{first}\n{second}\n```\n" in (ROOT / "README.md").read_text()
+    assert first.startswith("python3 -m venv ")
+    assert " -m pytest " in second
+
+
+def test_ci_tries_the_lowest_versions_that_are_allowed():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *itertools.chain(*project["optional-dependencies"].values())]
+    lowest = subprocess.run([ROOT / ".ci" / "lowest"], capture_output=True, text=True, check=True).stdout
+    assert sorted(lowest.split()) == sorted(each.replace(">=", "==") for each in wanted)
+    assert (ROOT / ".ci" / "lowest.txt").read_text() == lowest

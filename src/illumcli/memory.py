@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import sys
 from functools import cache
@@ -17,6 +16,8 @@ def keep_freed_memory() -> None:
     By default every temporary array above 128 KiB goes back to the system and is faulted in again, page
     by page: that is more than half the time of a pass over 16384 lanes (camera rays: 2.1 ms against 0.9 ms).
     """
+    import ctypes  # a start that needs none of this does not wait for it
+
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(MAP_THRESHOLD, 1 << 26)
         libc.mallopt(TRIM_THRESHOLD, 1 << 27)

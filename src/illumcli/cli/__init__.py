@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import signal
 import sys
-from contextlib import suppress
 from importlib import import_module
 from types import FrameType
 from typing import Any
@@ -14,7 +14,12 @@ from typing import Any
 import click
 
 from illumcli import __version__
-from illumcli.errors import IllumError
+from illumcli.cli._streams import open_standard_streams
+from illumcli.errors import IllumError, LimitError, OutputError
+from illumcli.memory import refuse_little
+
+_TO_LOAD = 160 << 20
+"""Bytes without which the linear algebra of numpy ends the process while it loads, by its own exit code."""
 
 STOPS = (signal.SIGINT, signal.SIGTERM)
 
@@ -44,6 +49,7 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
+        refuse_little(_TO_LOAD)
         module = name.replace("-", "_")
         return getattr(import_module(f"illumcli.cli.{module}"), module)
 
@@ -83,37 +89,57 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # threads are ours: those of numpy's linear algebra would only spin beside them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    output = open_standard_streams()
     status = 1
     try:
-        code = illum.main(standalone_mode=False)
+        status = _status()
         sys.stdout.flush()
-        status = code if isinstance(code, int) else 0
-    except IllumError as error:
-        click.echo(f"{error}", err=True)
-        status = error.exit_code
-    except click.ClickException as error:
-        error.show()
-        status = error.exit_code
+        if output.fault is not None and status == 0:
+            fact = f"standard output: cannot be written: {output.fault.strerror}"
+            status = _told(OutputError(f"{fact}; send it elsewhere, as in > FILE"))
+        sys.stderr.flush()
     except _Stopped as stop:
         _die_by(stop.number)
-    except BrokenPipeError:
-        _die_by(signal.SIGPIPE)
-    except OSError as error:  # an operating system that refuses what nobody expects it to
-        place = f"{error.filename}: " if error.filename else ""
-        click.echo(f"{place}{error.strerror or error}; check the disk and the permissions", err=True)
-    except ImportError as error:  # most often too little memory to map a library
-        said = str(error).strip().splitlines()[-1:] or ["no reason given"]
-        click.echo(f"a library cannot be loaded: {said[0]}; free memory, or install it again", err=True)
-    except (MemoryError, RuntimeError) as error:
-        if isinstance(error, RuntimeError) and "start new thread" not in str(error):  # it wants memory, too
-            raise
-        click.echo("out of memory; make the film, the meshes or the samples smaller", err=True)
-        status = 4
-    with suppress(OSError):  # what was printed before an error
-        sys.stdout.flush()
     # to take the interpreter apart costs an eighth of a small render, and after an error it may wait for
     # threads of the ray core that could not start
     os._exit(status)
+
+
+def _status() -> int:
+    """Run the command and tell what goes wrong; the exit code: 1 is for faults of the program alone."""
+    try:
+        code = illum.main(standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except IllumError as error:
+        return _told(error)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except MemoryError:
+        return _told(LimitError(_LITTLE_MEMORY))
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        fact = f"{place}{error.strerror or error}"
+        if error.errno == errno.ENOMEM:
+            return _told(LimitError(_LITTLE_MEMORY))
+        if error.errno in (errno.EMFILE, errno.ENFILE):
+            return _told(LimitError(f"{fact}; raise the limit on open files (ulimit -n)"))
+        return _told(OutputError(f"{fact}; check the disk and the permissions"))
+    except ImportError as error:  # most often too little memory to map a library
+        said = str(error).strip().splitlines()[-1:] or ["no reason given"]
+        return _told(LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again"))
+    except RuntimeError as error:
+        if "start new thread" not in str(error):
+            raise
+        return _told(LimitError(_LITTLE_MEMORY))
+
+
+_LITTLE_MEMORY = "out of memory; make the film, the meshes or the samples smaller"
+
+
+def _told(error: IllumError) -> int:
+    click.echo(f"{error}", err=True)
+    return error.exit_code
 
 
 class _Stopped(BaseException):

@@ -366,12 +366,17 @@ def _write_at(file: BinaryIO, data: NDArray[np.uint8], at: int) -> None:
         view, at = view[count:], at + count
 
 
-def default_folder() -> Path:
-    """Where entries are kept: ILLUM_CACHE, else `illum` in the user's cache folder (XDG_CACHE_HOME)."""
+def default_folder() -> Path | None:
+    """Where entries are kept: ILLUM_CACHE, else `illum` in the user's cache folder (XDG_CACHE_HOME).
+
+    None for a user without a home folder.
+    """
     if own := os.environ.get("ILLUM_CACHE"):
         return Path(own)
     base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "illum"
+    if not os.path.isabs(base):
+        base = os.path.join(os.environ.get("HOME", os.path.expanduser("~")), ".cache")
+    return Path(base) / "illum" if os.path.isabs(base) else None
 
 
 def default_limit() -> int:

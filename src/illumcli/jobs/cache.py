@@ -27,7 +27,7 @@ class Listing(Value):
 
 def listing() -> Listing:
     """What the store holds."""
-    store = opened_store()
+    store = _opened()
     found = []
     for entry in store.entries():
         try:
@@ -60,7 +60,7 @@ def ago(seconds: float) -> str:
 
 def verify() -> tuple[int, dict[Path, str]]:
     """The number of sound entries, and what is wrong with the others, which are removed."""
-    store = opened_store()
+    store = _opened()
     count = len(store.entries())
     faults = store.faults()
     for path in faults:
@@ -70,7 +70,7 @@ def verify() -> tuple[int, dict[Path, str]]:
 
 def prune(size: str | None = None) -> list[Entry]:
     """Take the least recently used entries away until the rest has at most `size`, the limit by default."""
-    store = opened_store()
+    store = _opened()
     try:
         limit = store.limit if size is None else size_of(size)
     except ValueError:
@@ -80,7 +80,14 @@ def prune(size: str | None = None) -> list[Entry]:
 
 def clear() -> list[Entry]:
     """Take everything away."""
-    return _pruned(opened_store(), 0)
+    return _pruned(_opened(), 0)
+
+
+def _opened() -> Store:
+    store = opened_store()
+    if store is None:
+        raise InputError("there is no home folder to keep anything in; name one by ILLUM_CACHE")
+    return store
 
 
 def _pruned(store: Store, limit: int) -> list[Entry]:

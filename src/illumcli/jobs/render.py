@@ -152,16 +152,17 @@ def run(
     return [target.path for target in work.targets], report
 
 
-def opened_store() -> Store:
-    """The store that the user's environment names.
+def opened_store() -> Store | None:
+    """The store that the user's environment names; None for a user who has no home folder.
 
     Raises
     ------
     InputError
         ILLUM_CACHE_SIZE says no size.
     """
+    folder = default_folder()
     try:
-        return Store(default_folder(), default_limit())
+        return Store(folder, default_limit()) if folder is not None else None
     except ValueError as error:
         raise InputError(f"ILLUM_CACHE_SIZE: {error}; write it as 500M or 4G") from None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -272,7 +273,9 @@ def _with(tree: Node, path: source.Path, node: Node) -> Node:
 
 def _roots(folder: Path) -> tuple[Path, ...]:
     """The scene's folder, its parent and the current one, none of them the whole disk; those allowed."""
-    near = [each.resolve() for each in (folder, folder.resolve().parent, Path.cwd())]
+    near = [each.resolve() for each in (folder, folder.resolve().parent)]
+    with suppress(OSError):  # a current folder that was removed opens nothing
+        near.append(Path.cwd().resolve())
     given = [Path(text).resolve() for text in os.environ.get("ILLUM_ALLOW", "").split(os.pathsep) if text]
     return tuple([each for each in near if each != each.parent] + given)
 

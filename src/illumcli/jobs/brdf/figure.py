@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from illumcli.errors import IllumError
+from illumcli.errors import InputError
 from illumcli.jobs.brdf import views
 from illumcli.models._base import IlluminationModel
 from illumcli.pixels import to_srgb
@@ -40,14 +40,14 @@ def drawn(
 
     Raises
     ------
-    IllumError
+    InputError
         matplotlib is not installed.
     """
     try:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
     except ImportError:
-        raise IllumError(
+        raise InputError(
             "pictures of BRDFs need matplotlib; install it: pip install 'illumcli[plot]', or write --csv"
         ) from None
     height = {"polar": 2.1, "sphere": 2.4, "plane": 1.5, "lobe": 2.3}

@@ -1,0 +1,77 @@
+"""Standard streams that are closed, full or read by nobody: the work is done, the exit code is its own."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+CLOSED = [
+    " ".join(some) for count in range(1, 4) for some in itertools.combinations(("<&-", ">&-", "2>&-"), count)
+]
+SCENE = "version: 1\nfilm: {width: 8, height: 6, samples: 1}\nobjects: [{mesh: {shape: sphere}}]\n"
+PIECES = [
+    ["schema"],
+    ["render", "s.yaml", "-o", "s.exr", "--force"],
+    ["render", "none.yaml"],
+    ["rendr"],
+    ["--help"],
+]
+
+
+def shell(folder, words, redirected):
+    """Run the command in bash; the exit code, what stdout and stderr got where they are open."""
+    command = shlex.join([sys.executable, "-m", "illumcli", *words])
+    done = subprocess.run(
+        ["bash", "-c", f"{command} {redirected}"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("streams")
+    (path / "s.yaml").write_text(SCENE)
+    return path
+
+
+@pytest.mark.parametrize("closed", CLOSED)
+def test_closed_streams_change_no_end(folder, closed):
+    for words in PIECES:
+        (folder / "s.exr").unlink(missing_ok=True)
+        code, out, said = shell(folder, words, closed)
+        assert code == (2 if words in (["render", "none.yaml"], ["rendr"]) else 0), (words, said)
+        assert "Traceback" not in said
+        assert bool(out) == (code == 0 and ">&-" not in closed.split()), words
+        assert (folder / "s.exr").exists() == ("s.yaml" in words), words
+
+
+def test_no_file_gets_the_number_of_a_closed_stream(folder):
+    done = shell(folder, ["render", "s.yaml", "-o", "v.exr", "-v"], ">&- 2>&-")
+    assert done[0] == 0
+    compared = shell(folder, ["compare", "v.exr", "v.exr", "--no-flip"], "")
+    assert compared[0] == 0, compared
+
+
+def test_a_reader_that_leaves_stops_nothing(folder):
+    for words in (["schema"], ["render", "s.yaml", "-o", "p.exr", "--force"]):
+        command = shlex.join([sys.executable, "-m", "illumcli", *words])
+        script = f"{command} | exec 3<&0-; echo ${{PIPESTATUS[0]}}"
+        done = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+        assert (done.stdout, done.stderr) == ("0\n", ""), words
+    assert (folder / "p.exr").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+def test_only_paths_that_cannot_be_printed_are_an_error(folder):
+    words = ["render", "s.yaml", "-o", "f.exr", "--force"]
+    code, _, said = shell(folder, words, ">/dev/full")
+    assert (code, len(said.splitlines())) == (5, 1)
+    assert said.startswith("standard output: cannot be written: No space left on device")
+    assert (folder / "f.exr").exists()
+    assert shell(folder, [*words, "-v"], "2>/dev/full")[:2] == (0, "f.exr\n")
+    assert shell(folder, ["render", "none.yaml"], ">/dev/full 2>/dev/full")[0] == 2

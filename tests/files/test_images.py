@@ -489,6 +489,27 @@ def test_linear_textures_in_single_precision_are_as_they_are(tmp_path):
     np.testing.assert_array_equal(read_texture(tmp_path / "a.exr", "linear"), texels)
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "expected"),
+    [
+        ("a.exr", "half", 0.5),
+        ("a.exr", "float", 0.5),
+        ("a.hdr", "float", 0.5),
+        ("a.tif", "float", 0.5),
+        ("a.tif", "uint16", 0.2140411),
+        ("a.png", "uint16", 0.2140411),
+        ("a.png", "uint8", 0.2158605),  # 128 / 255
+    ],
+)
+def test_the_type_of_its_pixels_says_how_a_texture_codes_light(tmp_path, name, kind, expected):
+    buffer = oiio.ImageBuf(oiio.ImageSpec(4, 4, 3, kind))
+    buffer.set_pixels(oiio.ROI(), np.full((4, 4, 3), 0.5, np.float32))
+    assert buffer.write(str(tmp_path / name))
+    np.testing.assert_allclose(read_texture(tmp_path / name), expected, rtol=1e-4)
+    other = {0.5: ("srgb", 0.2140411)}.get(expected, ("linear", 0.5))
+    np.testing.assert_allclose(read_texture(tmp_path / name, other[0]), other[1], rtol=5e-3)
+
+
 def test_textures_that_are_not_finite_are_refused(tmp_path):
     texels = noise(4, 4, 3)
     texels[1, 1, 0] = np.nan

@@ -166,13 +166,16 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
         return source.metadata()
 
 
-def read_texture(path: str | os.PathLike[str], space: Literal["srgb", "linear"]) -> NDArray[np.float32]:
+def read_texture(
+    path: str | os.PathLike[str], space: Literal["srgb", "linear"] | None = None
+) -> NDArray[np.float32]:
     """(H, W, C) float32, linear; the first row is the top of the image.
 
     Parameters
     ----------
     space
         `srgb`: decoded by the sRGB curve, alpha excepted. `linear`: values as stored, integers as 0..1.
+        By default the pixels' own type says: `linear` for floats, `srgb` for integers.
 
     Raises
     ------
@@ -182,6 +185,7 @@ def read_texture(path: str | os.PathLike[str], space: Literal["srgb", "linear"])
     with _Source(Path(path)) as source:
         colours = [c for c, name in enumerate(source.names) if name.rpartition(".")[2] != "A"]
         small = source.dtype == np.uint8
+        space = space or ("srgb" if source.encoded else "linear")
         texels = np.concatenate(list(source.bands(np.uint8 if small else np.float32)))
     steps = np.arange(256) / 255
     if small:
@@ -323,7 +327,7 @@ class _Source:
 
     @property
     def encoded(self) -> bool:
-        return self.dtype.kind == "u" and self._format != "openexr"
+        return self.dtype.kind in "iu" and self._format != "openexr"
 
     def order(self, names: tuple[str, ...]) -> list[int] | None:
         """Where each of `names` is among the file's channels; None where the file has that very order."""

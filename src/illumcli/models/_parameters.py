@@ -14,8 +14,9 @@ class Texture(Description):
 
     texture: str
     """Path of the image, from the scene's folder."""
-    space: Literal["srgb", "linear"] = "srgb"
-    """How the file's numbers code light; a texture of a scalar is data and wants `linear`."""
+    space: Literal["srgb", "linear"] | None = None
+    """How the file's numbers code light: by default linear where they are floats, as in EXR and HDR, and
+    sRGB where they are integers; integers that are data, as most scalars, want `linear`."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     wrap: Literal["repeat", "clamp"] = "repeat"
     channel: Literal["r", "g", "b", "a"] = "r"

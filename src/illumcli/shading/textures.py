@@ -146,14 +146,14 @@ def varying(
     materials: Materials,
     object_names: Sequence[str],
     purpose: str,
-    read: Callable[[str, str], Floats],
+    read: Callable[[str, str | None], Floats],
 ) -> Varying:
     """Everything the materials on some surface vary by, read, checked against the meshes, and within range.
 
     Parameters
     ----------
     read : callable
-        Path and space of a texture -> (H, W, C) linear image.
+        Path and space of a texture -> (H, W, C) linear image; without a space its pixels' type says.
 
     Raises
     ------

@@ -36,6 +36,14 @@ def chunks(path):
     return found
 
 
+def test_plain_numbers_name_no_curve(tmp_path):
+    with ImageWriter(tmp_path / "a.png", 2, 1, {"Y": "uint8"}, srgb=False) as writer:
+        writer.write_band(0, np.array([[[1], [2]]], np.uint8))
+    assert [kind for kind, _ in chunks(tmp_path / "a.png")] == [b"IHDR", b"IDAT", b"IEND"]
+    with ImageWriter(tmp_path / "b.exr", 2, 1, {"Y": "float"}, srgb=False) as writer:
+        writer.write_band(0, np.zeros((1, 2, 1), np.float32))
+
+
 def noise(height, width, channels=3, dtype=np.uint8):
     top = np.iinfo(dtype).max
     return np.random.default_rng(4).integers(0, top, (height, width, channels), dtype, endpoint=True)

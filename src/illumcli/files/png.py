@@ -26,7 +26,7 @@ _PIECE = 1 << 16  # bytes compressed at once, whatever the bands: zlib's answer 
 
 
 class PngFile:
-    """Rows to a PNG file, sRGB; colour is not premultiplied, values go to the file as they are.
+    """Rows to a PNG file; colour is not premultiplied, values go to the file as they are.
 
     Parameters
     ----------
@@ -34,6 +34,9 @@ class PngFile:
         Y, Y A, R G B or R G B A of one type.
     metadata : mapping of name to number, text or tuple of them
         Kept as text.
+    srgb : bool
+        Whether the values are display values and the file says so. Without, they are numbers, and readers are
+        told of no curve.
 
     Raises
     ------
@@ -42,7 +45,13 @@ class PngFile:
     """
 
     def __init__(
-        self, path: Path, width: int, height: int, channels: Mapping[str, str], metadata: Mapping[str, Any]
+        self,
+        path: Path,
+        width: int,
+        height: int,
+        channels: Mapping[str, str],
+        metadata: Mapping[str, Any],
+        srgb: bool = True,
     ) -> None:
         self._path = path
         self._dtype = np.dtype(next(iter(channels.values()))).newbyteorder(">")
@@ -56,8 +65,9 @@ class PngFile:
         bits = 8 * self._dtype.itemsize
         kind = _COLOUR_TYPES[tuple(channels)]
         self._chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0))
-        self._chunk(b"sRGB", b"\0")
-        self._chunk(b"gAMA", (45455).to_bytes(4))  # for readers that do not know sRGB
+        if srgb:
+            self._chunk(b"sRGB", b"\0")
+            self._chunk(b"gAMA", (45455).to_bytes(4))  # for readers that do not know sRGB
         for name, value in metadata.items():
             said = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
             if said.isascii():

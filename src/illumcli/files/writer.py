@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TypeAlias
@@ -57,6 +58,8 @@ class ImageWriter:
     metadata : mapping of name to number, text or tuple of them
         EXR keeps integers of 32 bits, floats in single precision, texts and tuples of one kind; larger
         integers become text. PNG keeps text alone.
+    srgb : bool
+        Whether a PNG holds display values, and says so; else plain numbers.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class ImageWriter:
         height: int,
         channels: Mapping[str, ChannelType],
         metadata: Metadata | None = None,
+        srgb: bool = True,
     ) -> None:
         self._named = os.fspath(path)
         suffix = Path(path).suffix.lower()
@@ -92,7 +96,7 @@ class ImageWriter:
         self._file: Any = None  # a PngFile or an ExrFile, once it is open
         if no_utf8(os.path.realpath(path)):
             raise InputError(f"{shown(os.path.realpath(path))}: {NO_UTF8}")
-        open_file = _format(suffix)
+        open_file = _format(suffix, srgb)
         self._part = Part(path)
         with self._or_nothing():
             self._file = open_file(self._part.path, width, height, self._channels, metadata or {})
@@ -186,10 +190,10 @@ class ImageWriter:
             raise
 
 
-def _format(suffix: str) -> Any:
+def _format(suffix: str, srgb: bool) -> Any:
     """What writes such files; loaded before a part exists, for a signal meanwhile may end the process."""
     if suffix == ".png":
-        return PngFile
+        return partial(PngFile, srgb=srgb)
     from illumcli.files.images import ExrFile  # OpenImageIO loads as long as a small picture takes
 
     return ExrFile

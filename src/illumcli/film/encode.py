@@ -55,6 +55,18 @@ def picture(
     return out
 
 
+def plain(band: NDArray[np.float32], place: str = "picture", y0: int = 0, x0: int = 0) -> NDArray[np.uint8]:
+    """(h, W, C) uint8: numbers 0..1 as a PNG stores them that is no picture of light, round(255 v).
+
+    Raises
+    ------
+    IllumError
+        NaN or Inf in `band`.
+    """
+    refuse_nonfinite(band, NAMES[band.shape[-1]], place, y0, x0)
+    return np.rint(np.clip(band, 0, 1) * 255).astype(np.uint8)
+
+
 def exposed(linear: NDArray[np.float32], stops: float) -> NDArray[np.float32]:
     """`linear` times 2**stops; exact for whole stops, infinite beyond float32."""
     with np.errstate(over="ignore"):

@@ -20,8 +20,8 @@ from illumcli import __version__
 from illumcli.errors import InputError, OutputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.store import Store, default_folder, default_limit
-from illumcli.film.encode import picture
-from illumcli.film.preview import viewable
+from illumcli.film.encode import picture, plain
+from illumcli.film.preview import reading, viewable
 from illumcli.geometry.repairs import Repairs
 from illumcli.jobs.limits import refuse_disk, refuse_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs, repairs_data
@@ -350,7 +350,12 @@ def _render_view(
         writers = [
             files.enter_context(
                 ImageWriter(
-                    target.path, view.width, view.height, channels(scene, target), metadata(scene, target)
+                    target.path,
+                    view.width,
+                    view.height,
+                    channels(scene, target),
+                    metadata(scene, target, frame),
+                    srgb=target.layers[0].kind == "light",
                 )
             )
             for target in targets
@@ -398,17 +403,24 @@ def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any
     parts = {layer.name: composed(scene, layer, layers) for layer in target.layers}
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]
-        camera = target.view.camera
-        distance = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
-        scale = frame.radius if layer.name == "position" else distance
-        shown = viewable(layer.name, parts[layer.name], scale, frame.centre)
-        exposure = 0.0 if layer.data else scene.film.exposure
-        return picture(shown, exposure, 8, str(target.path), tile.y, tile.x)
+        if layer.kind == "light":
+            return picture(parts[layer.name], scene.film.exposure, 8, str(target.path), tile.y, tile.x)
+        shown = viewable(layer.name, parts[layer.name], preview_scale(target, frame), frame.centre)
+        return plain(shown, str(target.path), tile.y, tile.x)
     seen: dict[str, NDArray[np.float32]] = {}
     for layer in _beauty_first(target.layers):
         for k, name in enumerate(_channels(scene, layer)):
             seen.setdefault(name, parts[layer.name][..., k])
     return np.stack(list(seen.values()), axis=-1)
+
+
+def preview_scale(target: Target, frame: Any) -> float:
+    """What pictures count distances in [scene units]: the scene's radius for positions, the way from the
+    camera to its target for depths."""
+    if target.layers[0].name == "position":
+        return float(frame.radius)
+    camera = target.view.camera
+    return float(np.linalg.norm(np.subtract(camera.target, camera.position)))
 
 
 def composed(scene: Any, layer: Layer, layers: Planes) -> NDArray[np.float32]:
@@ -424,9 +436,15 @@ def composed(scene: Any, layer: Layer, layers: Planes) -> NDArray[np.float32]:
     return values + np.moveaxis(behind, 0, -1)
 
 
-def metadata(scene: Any, target: Target) -> dict[str, Any]:
+def metadata(scene: Any, target: Target, frame: Any) -> dict[str, Any]:
     """What a file says of itself."""
     view = target.view
+    if target.path.suffix.lower() == ".exr":
+        values = {"illum:depth": "distance from the eye's plane in scene units, 0 where nothing is seen"}
+    elif target.layers[0].kind != "light":
+        values = reading(target.layers[0].name, preview_scale(target, frame), frame.centre)
+    else:
+        values = {}
     return {
         "Software": f"illum {__version__}",
         "illum:version": __version__,
@@ -437,7 +455,7 @@ def metadata(scene: Any, target: Target) -> dict[str, Any]:
         "illum:seed": str(scene.seed),
         "illum:exposure": scene.film.exposure,
         "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
-        "illum:depth": "distance from the eye's plane in scene units, 0 where nothing is seen",
+        **values,
     }
 
 

@@ -315,7 +315,8 @@ class Outputs(Description):
     layers: Annotated[tuple[Layer, ...], Many(least=1)] = ("beauty",)
     files: Annotated[tuple[str, ...], Many(least=1)] = ("{scene}.{camera}.png",)
     """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
-    file per layer (`{layer}` in its name when there are several)."""
+    file per layer (`{layer}` in its name when there are several): light as sRGB, all else as plain numbers;
+    text in the file says how to read them."""
     colour: Literal["half", "float"] = "half"
     """Precision of colour in EXR; depth, positions, normals and ids are always 32-bit."""
 

@@ -7,10 +7,13 @@ import pytest
 
 from illumcli.errors import InputError
 from illumcli.files.writer import ImageWriter
+from illumcli.geometry.repairs import Repair
 from illumcli.jobs.check import run as check
+from illumcli.jobs.render import run
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar
 from illumcli.pixels import from_srgb
+from illumcli.plan import artifacts
 from illumcli.plan.execute import Tally, bands, run_once
 from illumcli.plan.plan import plan
 from illumcli.scene.load import load
@@ -295,3 +298,58 @@ def test_a_mesh_library_brings_its_textures(tmp_path, picture, print_):
     level = from_srgb(np.array(200 / 255))
     np.testing.assert_allclose(beauty[0, 0], [level, 0, 0], rtol=1e-5)
     np.testing.assert_allclose(beauty[7, 7], [level] * 3, rtol=1e-5)
+
+
+OWN = """mtllib own.mtl
+v -1 0 1
+v 1 0 1
+v 1 0 -1
+v -1 0 -1
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+usemtl m
+f 1/1 2/2 3/3 4/4
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A scene of a mesh with its own library, and the same with its plain colour."""
+
+    def write(library, mesh=OWN):
+        (tmp_path / "own.mtl").write_text(library)
+        (tmp_path / "own.obj").write_text(mesh)
+        scene = SCENE.replace("material: printed", "").format(
+            material="{model: lambert}", mesh="{file: own.obj, materials: true}", ambient="0"
+        )
+        (tmp_path / "own.yaml").write_text(scene)
+        return tmp_path / "own.yaml"
+
+    return write
+
+
+@pytest.mark.parametrize("mesh", [OWN, OWN.replace("vt ", "#").replace("1/1 2/2 3/3 4/4", "1 2 3 4")])
+def test_a_texture_of_a_meshes_own_that_cannot_be_used_leaves_its_colour(own, picture, tmp_path, mesh):
+    (tmp_path / "print.png").write_bytes(b"no image at all")
+    beauty, repairs = picture(own("newmtl m\nKd 0.2 0.4 0.6\nmap_Kd print.png\n", mesh))
+    plain, _ = picture(own("newmtl m\nKd 0.2 0.4 0.6\n", mesh))
+    np.testing.assert_array_equal(beauty["beauty"], plain["beauty"])
+    told = [each for what, each in repairs.items() if "textures that cannot be used left out" in what]
+    assert told == [Repair(1, "own.mtl:3")]
+
+
+def test_a_folder_that_was_copied_has_its_own_textures(own, tmp_path, monkeypatch):
+    """What is kept of a mesh does not say where its folder was."""
+    monkeypatch.setattr(artifacts, "worth", lambda seconds, size: True)
+    write_image(tmp_path / "print.png", np.full((2, 2, 3), 200))
+    scene = own("newmtl m\nmap_Kd print.png\n")
+    first, _ = run(scene, pattern=str(tmp_path / "first.png"))
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for name in ("own.obj", "own.mtl", "own.yaml", "print.png"):
+        (tmp_path / name).rename(copy / name)
+    again, report = run(copy / "own.yaml", pattern=str(copy / "again.png"))
+    assert "store" in {where for reused in report.reused.values() for where in reused.values()}
+    assert again[0].read_bytes() == first[0].read_bytes()

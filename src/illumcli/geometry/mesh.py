@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.repairs import Repairs
-from illumcli.records import Record
+from illumcli.records import Record, Value
+
+
+class Substitute(Value):
+    """What stands in for a texture of a mesh's own material that cannot be used."""
+
+    value: tuple[float, ...]  # linear colour
+    first: str = ""  # where the file names the texture, as `Repair.first` has it
 
 
 class Mesh(Record):
@@ -35,7 +42,10 @@ class Mesh(Record):
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     """Per vertex, (V,) or (V, k), every property the file has; vertex colours are `color`, (V, 3) linear."""
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """Material name -> keys of a scene's material, as the file's own library describes them."""
+    """Material name -> keys of a scene's material, as the file's own library describes them. The path of a
+    texture begins as that of the mesh; in a mesh that is kept between runs it starts at the mesh's folder."""
+    substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
+    """Material name -> key -> what stands in for the texture there; white where nothing is said."""
     repairs: Repairs = field(default_factory=dict)
     """What was wrong and put right or left out while reading; places are relative to the mesh's file."""
 

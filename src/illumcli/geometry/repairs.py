@@ -44,13 +44,12 @@ def located(repairs: Repairs, file: str) -> Repairs:
     file : str
         Path of the mesh, or the name of what is no file.
     """
-    folder = PurePath(file).parent
-    return {
-        what: Repair(
-            each.count, file + each.first if each.first[:1] in ("", ":") else str(folder / each.first)
-        )
-        for what, each in repairs.items()
-    }
+    return {what: Repair(each.count, path_of(each.first, file)) for what, each in repairs.items()}
+
+
+def path_of(place: str, file: str) -> str:
+    """`Repair.first` of a mesh file, with the path of its file."""
+    return file + place if place[:1] in ("", ":") else str(PurePath(file).parent / place)
 
 
 def joined(parts: Iterable[Repairs]) -> Repairs:

@@ -21,7 +21,7 @@ from illumcli.demand import Recipe
 from illumcli.files.store import Store
 from illumcli.frame import Frame
 from illumcli.geometry.assemble import CornerVectors, Placed, Standing, World
-from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.repairs import Repair
 from illumcli.plan.keys import Keys, code
 from illumcli.plan.stages import MeshRepairs, Tile
@@ -44,7 +44,18 @@ Left out: the ray core, whose tree Embree does not give away, and what is made f
 """
 CLASSES = {
     cls.__name__: cls
-    for cls in (Mesh, Standing, World, Placed, Frame, CornerVectors, MeshRepairs, Repair, Numbering)
+    for cls in (
+        Mesh,
+        Standing,
+        World,
+        Placed,
+        Frame,
+        CornerVectors,
+        MeshRepairs,
+        Repair,
+        Numbering,
+        Substitute,
+    )
 }
 
 

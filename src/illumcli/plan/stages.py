@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
 from illumcli.shading.ambient import ambient_light
 from illumcli.shading.ambient import coupled as coupled_light
-from illumcli.shading.materials import Materials, Numbering, Token, materials
+from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
 from illumcli.shading.materials import numbering as number_materials
 from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
@@ -70,7 +71,13 @@ def mesh(source: Any) -> Mesh:
     made = read_mesh(source.path)
     if source.has_changed:
         raise InputError(f"{source.path}: changed while it was read; run again once it is whole")
-    return made
+    # a mesh is kept by its content: what it names is found again where its folder is then
+    folder = source.path.parent
+    libraries = {
+        name: textures_at(keys, lambda path: str(Path(path).relative_to(folder)))
+        for name, keys in made.materials.items()
+    }
+    return replace(made, materials=libraries)
 
 
 def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
@@ -259,7 +266,7 @@ def materials_of(
         token: model.at({"file": str(measured[model.file].path)}) if hasattr(model, "file") else model
         for token, model in models.items()
     }
-    libraries = {name: mesh.materials for name, mesh in zip(imported, meshes, strict=False) if name}
+    libraries = {name: mesh for name, mesh in zip(imported, meshes, strict=False) if name}
     return materials(numbering, found, libraries)
 
 

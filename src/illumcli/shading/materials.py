@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.geometry.assemble import World
+from illumcli.geometry.mesh import Mesh, Substitute
+from illumcli.geometry.repairs import path_of
 from illumcli.models._base import IlluminationModel
 from illumcli.records import Record
 
@@ -87,6 +89,13 @@ class Materials(Record):
     names: tuple[str, ...]
     numbering: Numbering
     lobes: tuple[Mapping[str, Any], ...]
+    substitutes: tuple[Mapping[str, Substitute] | None, ...] = ()
+    """By number, of materials of a mesh's own library: what stands in for textures that cannot be used."""
+
+    def substitute(self, number: int, path: str) -> Substitute | None:
+        """What stands in for the texture of a parameter; None where it must be usable, as a scene's must."""
+        own = self.substitutes[number] if self.substitutes else None
+        return None if own is None else own.get(path, Substitute((1.0, 1.0, 1.0)))
 
     def number(self, world: World, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
@@ -94,7 +103,7 @@ class Materials(Record):
 
 
 def materials(
-    numbering: Numbering, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Any]
+    numbering: Numbering, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Mesh]
 ) -> Materials:
     """The materials that are numbered.
 
@@ -103,30 +112,42 @@ def materials(
     known : mapping
         Those of the scene, its objects and the default.
     libraries : mapping
-        Mesh -> its own library: name -> keys of a material.
+        Mesh by name, those whose own library is used.
     """
-    models = tuple(
-        imported_model(libraries[token[1]][token[2]]) if token[0] == "mesh" else known[token]
-        for token in numbering.tokens
-    )
+    models: list[IlluminationModel] = []
+    substitutes: list[Mapping[str, Substitute] | None] = []
+    for token in numbering.tokens:
+        if token[0] == "mesh":
+            mesh, folder = libraries[token[1]], Path(token[1]).parent
+            models.append(imported_model(mesh.materials[token[2]], folder))
+            own = mesh.substitutes.get(token[2], {})
+            substitutes.append(
+                {key: Substitute(each.value, path_of(each.first, token[1])) for key, each in own.items()}
+            )
+        else:
+            models.append(known[token])
+            substitutes.append(None)
     names = tuple(token[-1] for token in numbering.tokens)
-    return Materials(models, names, numbering, tuple(model.lobes() for model in models))
+    lobes = tuple(model.lobes() for model in models)
+    return Materials(tuple(models), names, numbering, lobes, tuple(substitutes))
 
 
-def imported_model(description: Mapping[str, Any]) -> IlluminationModel:
-    """A model from the keys that a mesh file's own library gives.
-
-    Its textures lie where the library says, not in the scene's folder: their paths are made absolute.
-    """
+def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:
+    """A model from the keys that a mesh file's own library gives; `folder` is that of the mesh."""
     from illumcli.variants import member
 
-    keys = {
-        name: {**value, "texture": str(Path(value["texture"]).absolute())}
+    keys = textures_at(description, lambda path: str(folder / path))
+    return member("illumcli.models", str(keys["model"])).validated(keys)
+
+
+def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> dict[str, Any]:
+    """The keys of a material, the path of each texture in them as `place` has it."""
+    return {
+        key: {**value, "texture": place(value["texture"])}
         if isinstance(value, Mapping) and "texture" in value
         else value
-        for name, value in description.items()
+        for key, value in description.items()
     }
-    return member("illumcli.models", str(keys["model"])).validated(keys)
 
 
 def colors_at(table: Sequence[Any], material: Ids) -> Vectors:

@@ -164,13 +164,12 @@ def varying(
     problems: list[str] = []
     repairs: dict[str, Repair] = {}
 
-    def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute | None:
+    def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute:
         within = parameter_range(materials.models[number], path)
         where = f"material {materials.names[number]}: {path}"
         found = [_lacks(world, value, i, object_names[i], where, within.width) for i in used_by[number]]
         if any(found):
-            problems.extend(filter(None, found))
-            return None
+            raise InputError(filter(None, found))
         if isinstance(value, VertexValues):
             table = _table(world, value.vertex, used_by[number], within.width)
             return Attribute(_clipped(table, within, f"vertex values beyond {where}", repairs), within)
@@ -184,16 +183,28 @@ def varying(
         mine: dict[str, Map | Attribute] = {}
         for path, value in (paths(model, purpose) if used_by[number] else {}).items():
             try:
-                made = source(number, path, value)
+                mine[path] = source(number, path, value)
             except InputError as error:
-                problems.extend(error.problems)
-            else:
-                if made is not None:
-                    mine[path] = made
+                substitute = materials.substitute(number, path)
+                if substitute is None:
+                    problems.extend(error.problems)
+                else:  # the trouble of a mesh's own material refuses nothing
+                    note(
+                        repairs,
+                        f"textures that cannot be used left out ({error.problems[0]})",
+                        substitute.first,
+                    )
+                    mine[path] = _uniform(substitute.value, parameter_range(model, path))
         of_material.append(mine)
     if problems:
         raise InputError(dict.fromkeys(problems))
     return Varying(tuple(of_material), repairs)
+
+
+def _uniform(value: Sequence[float], within: Range) -> Map:
+    """An image of one colour."""
+    texel = np.clip(np.asarray(value[: within.width], F), F(within.low), F(within.high))
+    return Map(texel.reshape(1, 1, -1), "nearest", "repeat", within)
 
 
 def _objects_of(world: World, materials: Materials) -> list[list[int]]:

@@ -137,14 +137,14 @@ def test_companions_outside_the_folder_are_not_looked_at(tmp_path, monkeypatch, 
     folder.mkdir()
     (folder / "out").symlink_to(tmp_path)
     (folder / "m.obj").write_text(f"mtllib {name}\nv 0 0 0\n")
-    assert companions(folder / "m.obj") == []
+    assert companions(folder / "m.obj") == [folder / Path(name).name]
 
 
 def test_companions_are_all_that_a_mesh_may_name(tmp_path: Path) -> None:
     from illumcli.geometry.readers import companions
 
-    (tmp_path / "m.obj").write_text("# a\n mtllib my stuff.mtl\nmtllib \0.mtl\nv 0 0 0\n")
-    (tmp_path / "my stuff.mtl").write_text("newmtl a\nmap_Kd -clamp on wood%20.png\n  map_Ks s.png\n")
+    (tmp_path / "m.obj").write_text("# a\n MtlLib \\\nmy stuff.mtl\nmtllib \0.mtl\nv 0 0 0\n")
+    (tmp_path / "my stuff.mtl").write_text("newmtl a\nmap_Kd -clamp on wood%20.png\n  map_kd\t s.png\n")
     names = {path.relative_to(tmp_path).as_posix() for path in companions(tmp_path / "m.obj")}
     assert {"my stuff.mtl", "wood .png", "s.png"} <= names
     assert not any("\0" in name for name in names)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import pkgutil
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
-from illumcli.errors import InputError, LimitError
+from illumcli.errors import IllumError, InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 
+MOST_WORDS = 128  # of a line that names files, with the blanks between them
 OTHER_SUFFIXES = {".glb": "gltf"}  # read by the module of another name
 
 
@@ -48,42 +50,60 @@ def _readers() -> dict[str, str]:
 
 def companions(path: Path) -> list[Path]:
     """The files that a mesh file may name, whether they are there or not: material libraries with their
-    textures, buffers; more of them than are read, never fewer."""
+    textures, buffers; more of them than are read, never fewer, and none outside the folder of the mesh."""
     suffix = path.suffix.lower()
     if suffix == ".obj":
-        libraries = _named(path, rb"^\s*mtllib[ \t]+(.*)")
+        libraries = _named(path, _LIBRARY, path.parent)
         images = [
             each
             for library in libraries
             if library.is_file()
-            for each in _named(library, rb"^\s*map_.*?[ \t](.*)")
+            for each in _named(library, _IMAGE, path.parent)
         ]
         return [*libraries, *images]
     if suffix in (".gltf", ".glb"):
-        return _named(path, rb'"uri"\s*:\s*"([^"]{1,4096})"')
+        return _named(path, _URI, path.parent)
     return []
 
 
-def _named(path: Path, pattern: bytes) -> list[Path]:
-    """The paths that the text of `path` gives, each whole and word by word; none outside its folder, which no
-    reader follows."""
-    from urllib.parse import unquote
+_LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
+_IMAGE = re.compile(rb"map_kd[ \t]([^\r\n]*)", re.IGNORECASE)
+_URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
+
+def _named(path: Path, pattern: re.Pattern[bytes], folder: Path) -> list[Path]:
+    """The paths inside `folder` that the text of `path` may mean where it names files."""
     from illumcli.geometry.readers._files import beside, content
 
     try:
         data = content(path)
-    except InputError:  # whoever reads the file says what is wrong with it
+    except IllumError:  # whoever reads the file says what is wrong with it
         return []
-    word = b"mtllib" if b"mtllib" in pattern else b"map_" if b"map_" in pattern else b'"uri"'
-    if word not in data:
-        return []
+    if pattern is _LIBRARY and b"\\" in data:  # a line that goes on in the next
+        data = re.sub(rb"\\[ \t]*\r?\n", b" ", data)
+    names = dict.fromkeys(name for said in pattern.findall(data) for name in _names(said))
     found: dict[Path, None] = {}
-    for match in re.finditer(pattern, data, re.MULTILINE):
-        said = match[1].decode("utf-8", "surrogateescape").strip()
-        if "\0" in said or said.startswith("data:"):
-            continue
-        for name in (said, *said.split()):
+    for name in names:
+        for start in (path, folder / path.name):
             with suppress(InputError):
-                found[beside(path, unquote(name), str(path))] = None
+                found[beside(start, name, str(path), folder)] = None
     return list(found)
+
+
+def _names(said: bytes) -> Iterator[str]:
+    """The names that may be meant: all of it, what follows any word, each word; with folders and without."""
+    from urllib.parse import unquote
+
+    from illumcli.geometry.readers._files import LONGEST_NAME
+    from illumcli.geometry.readers._text import decoded, without_comment
+
+    text = decoded(said[:LONGEST_NAME]).strip()
+    if text.startswith("data:"):
+        return
+    words = re.split(r"(\s+)", text)
+    tails = ("".join(words[k:]) for k in range(0, min(len(words), MOST_WORDS), 2))
+    for name in (*tails, *words[:MOST_WORDS:2]):
+        for each in (name, unquote(name), without_comment(name).rstrip(), name.strip("\"'")):
+            if each and "\0" not in each:
+                yield each
+                yield PureWindowsPath(each).name

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path, PureWindowsPath
 
 from illumcli.errors import InputError, LimitError
 
 LARGEST_FILE = 4 << 30  # [bytes]
+LONGEST_NAME = 4096  # letters of a path
 
 
 def content(path: Path) -> bytes:
@@ -32,19 +34,56 @@ def content(path: Path) -> bytes:
     return data
 
 
-def beside(path: Path, name: str, place: str) -> Path:
-    """The file that `path` calls `name`; it lies in the folder of `path` or below, or `InputError` is raised.
+def beside(path: Path, name: str, place: str, folder: Path | None = None) -> Path:
+    """The file that `path` calls `name`; it lies in `folder` or below, or `InputError` is raised.
 
-    Links are followed first. `place` begins the message, as ``path:line``. The file need not exist.
+    Links are followed first. `place` begins the message, as ``path:line``; `folder` is that of `path` by
+    default. The file need not exist.
     """
     way = "copy the file beside the mesh and name it alone"
     if Path(name).is_absolute() or PureWindowsPath(name).drive:
         raise InputError(f"{place}: '{name}' is an absolute path; {way}")
     target = path.parent / name.replace("\\", "/")
     try:
-        inside = target.resolve().is_relative_to(path.parent.resolve())
+        inside = target.resolve().is_relative_to((folder or path.parent).resolve())
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(f"{place}: '{name}' is no usable path ({error}); {way}") from None
     if not inside:
         raise InputError(f"{place}: '{name}' leads out of the folder of the mesh; {way}")
     return target
+
+
+OUTSIDE, MISSING = "outside the folder of the mesh", "that are not there"
+TAKEN = "replaced by those of the same name in it"
+
+
+def nearby(path: Path, name: str, folder: Path) -> tuple[Path | None, str]:
+    """The file that `path` calls `name` and, where that is none inside `folder`, what is the matter with it.
+
+    A name that leads out of the folder, or to what is not there, stands for the file of that name in the
+    folder of `path` or in `folder`, if there is one. Nothing outside is opened or looked at.
+
+    Parameters
+    ----------
+    path : Path
+        A file in `folder` or below it: the mesh or its library.
+    name : str
+        With slashes of either kind.
+
+    Returns
+    -------
+    Path or None, {"", OUTSIDE, MISSING}
+    """
+    if not 0 < len(name) <= LONGEST_NAME:
+        return None, MISSING
+    matter = MISSING
+    last = PureWindowsPath(name).name
+    for start, said in ((path, name), (path, last), (folder / path.name, last)):
+        try:
+            found = beside(start, said, "", folder)
+        except InputError:
+            matter = OUTSIDE
+            continue
+        if said and os.path.isfile(found):
+            return found, "" if said == name and start == path else matter
+    return None, matter

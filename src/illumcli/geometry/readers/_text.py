@@ -73,7 +73,7 @@ class Text(Value):
     def line(self, index: int) -> str:
         """The content of a line, without blanks around it."""
         start = self.starts[index]
-        return self.data[start : self.data.index(b"\n", start)].decode("utf-8", "replace").strip()
+        return decoded(self.data[start : self.data.index(b"\n", start)]).strip()
 
     def number(self, index: int) -> int:
         """Number of a line in the file, from 1."""
@@ -97,6 +97,19 @@ class Text(Value):
         for i in range(keyword):
             data[starts + i] = 32
         return Block(self, lines, data, starts)
+
+
+def decoded(line: bytes) -> str:
+    """A line as text: UTF-8, else Latin-1."""
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
+
+
+def without_comment(text: str) -> str:
+    """`text` up to a # that begins a word."""
+    return re.split(r"(?:^|(?<=\s))#", text, maxsplit=1)[0]
 
 
 def keyword(word: bytes) -> int:

@@ -15,9 +15,7 @@ Wavefront Technologies (1992). Advanced Visualizer manual, appendix B1: object f
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -29,7 +27,7 @@ from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import _mtl
 from illumcli.geometry.readers._color import linear
-from illumcli.geometry.readers._files import beside, content
+from illumcli.geometry.readers._files import TAKEN, content, nearby
 from illumcli.geometry.readers._polygons import Ints, polygons
 from illumcli.geometry.readers._text import Block, Text, keyword
 from illumcli.geometry.repairs import Repair, joined, note
@@ -66,8 +64,8 @@ def read(path: Path) -> Mesh:
         return _resolved(faces, references[slot], counts, _Rows(lines[of], size, _NAMES[of]))
 
     corners = rows(0, b"v", len(vertices))
-    materials, found = _materials(path, text, rest.libraries)
-    repairs = dict(joined([repairs, found]))
+    library = _libraries(path, text, rest.libraries)
+    repairs = dict(joined([repairs, library.repairs]))
     material_names, polygon_materials = _selected(rest.materials, lines[b"f"])
     group_names, polygon_groups = _selected(rest.groups, lines[b"f"])
     return polygons(
@@ -85,7 +83,8 @@ def read(path: Path) -> Mesh:
         polygon_groups=polygon_groups,
         polygon_smoothing=_smoothing(rest.smoothing, lines[b"f"]),
         attributes={} if color is None else {"color": color},
-        materials=materials,
+        materials=library.materials,
+        substitutes=library.substitutes,
         repairs=repairs,
         place=lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}",
     )
@@ -297,21 +296,25 @@ def _is_off(group: str) -> bool:
     return group.lower() in ("off", "null") or group.strip("0") == ""
 
 
-def _materials(
-    path: Path, text: Text, libraries: list[tuple[int, str]]
-) -> tuple[dict[str, Mapping[str, Any]], dict[str, Repair]]:
+def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> _mtl.Library:
     """Every material of the libraries, the first of a name, and what was left out of them."""
-    materials: dict[str, Mapping[str, Any]] = {}
-    repairs: dict[str, Repair] = {}
-    for names, line in {names: line for line, names in reversed(libraries)}.items():
-        place = text.place(line)
-        whole = beside(path, names, place)
-        files = [whole] if os.path.exists(whole) else [beside(path, name, place) for name in names.split()]
-        for library in files:
-            if not os.path.exists(library):
-                note(repairs, "missing material library", f":{text.number(line)}")
+    whole = _mtl.Library()
+    for names, line in {names: line for line, names in reversed(statements)}.items():
+        place = f":{text.number(line)}"
+        for file, matter in _library_files(path, names):
+            if matter:
+                note(whole.repairs, f"material libraries {matter} {TAKEN if file else 'left out'}", place)
+            if file is None:
                 continue
-            found, left_out = _mtl.read(library)
-            materials = {**found, **materials}
-            repairs = dict(joined([repairs, left_out]))
-    return materials, repairs
+            found = _mtl.read(file, path.parent)
+            whole.materials.update({**found.materials, **whole.materials})
+            whole.substitutes.update({**found.substitutes, **whole.substitutes})
+            whole.repairs.update(joined([whole.repairs, found.repairs]))
+    return whole
+
+
+def _library_files(path: Path, names: str) -> list[tuple[Path | None, str]]:
+    """The file of the one name with blanks, or those of several names, and what is the matter with each."""
+    whole = nearby(path, names.strip("\"'"), path.parent)
+    several = [nearby(path, name, path.parent) for name in names.split()]
+    return several if whole[0] is None and any(file for file, _ in several) else [whole]

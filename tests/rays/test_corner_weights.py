@@ -13,7 +13,7 @@ from illumcli.geometry.assemble import CornerVectors, place, polygon_centres, ro
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
 from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
-from illumcli.rays.surface import bend
+from illumcli.rays.surface import Facets, quadratic
 
 F = np.float32
 TURNED = rotation(0, 33) @ rotation(1, 12) @ rotation(2, 71)
@@ -279,20 +279,24 @@ def test_the_mean_of_polygons_of_any_size():
     np.testing.assert_allclose(found, centres.position[[0, 2, 1, 0]], atol=1e-6)
 
 
-def test_quadratic_normals_of_a_quad_have_its_edges_terms_and_none_of_a_diagonal():
-    """Between two equal edges of a rectangle the normal is that of the edge, for every t."""
+def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across():
+    """A rectangle whose normals agree and lean along two of its edges: as if these were swept across."""
     width = np.linspace(0, 1, 21).astype(F)
-    up, way = np.array([0.6, 0, 0.8], F), np.array([1, 0, 0], F)
+    lean = np.array([0.6, 0, 0.8])
+    mesh = Mesh(
+        np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], float),
+        np.arange(4, dtype=np.int32),
+        np.array([0, 4], np.int32),
+    )
+    world = place([mesh], [np.eye(4)])
     for t in (0.0, 0.3, 1.0):
-        w = [(1 - width) * (1 - F(t)), width * (1 - F(t)), width * F(t), (1 - width) * F(t)]
-        x = [0, 1, 1, 0], [0, 0, 1, 1]
-        n = columns(np.tile(up, (len(width), 1)))
-
-        def corner(k, w=w, x=x):
-            place = columns(np.tile(np.array([x[0][k], x[1][k], 0], F), (len(width), 1)))
-            return place, columns(np.tile(up, (len(width), 1))), w[k]
-
-        bend(n, 4, corner)
-        share = (1 - t) ** 2 + t**2
-        wanted = up - (width * (1 - width) * 3 * 1.2 * share)[:, None] * way
-        np.testing.assert_allclose(n, wanted, atol=1e-6)
+        at = np.stack([2 * width - 1, np.full_like(width, t - 0.5)], axis=1) / world.frame.radius
+        a, b, c = (world.vertices[world.triangles[0, k], :2].astype(float) for k in range(3))
+        u, v = np.linalg.solve(np.stack([b - a, c - a], axis=1), (at - a).T)  # beyond the triangle too
+        first = np.zeros(len(width), np.int32)
+        weights = corner_weights(world, planar_polygons(world), first, u.astype(F), v.astype(F))
+        normals = CornerVectors(columns(lean[None], F), np.zeros(4, np.int32))
+        facets = Facets(at, columns(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_))
+        bent = lean - (width * (1 - width) * 3 * 1.2)[:, None] * [1, 0, 0]
+        wanted = bent / np.linalg.norm(bent, axis=1)[:, None]
+        np.testing.assert_allclose(quadratic(world, normals, weights, facets), wanted, atol=2e-6)

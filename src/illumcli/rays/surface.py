@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
-from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners
+from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
 from illumcli.rays.offsets import effective_edge
 from illumcli.rays.tracer import Closest
 from illumcli.records import Record
@@ -97,8 +97,10 @@ def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, face
 
     Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
     b = 3 ((n0 + n1).delta / delta.delta) delta, so that on average it stays at right angles to the edge: an
-    inflection between two equal normals shows, which linear interpolation loses. Over a polygon the edge
-    terms are weighed by products of the weights of their ends, which reduces to the edge's own form there.
+    inflection between two equal normals shows, which linear interpolation loses. Over a triangle the edge
+    terms are weighed by products w_i w_j of the weights of their ends, over a planar polygon of more corners
+    by w_i w_j / (w_i + w_j): each reduces to the edge's own form there, and between two parallel edges of a
+    quad the second is linear.
 
     References
     ----------
@@ -111,11 +113,12 @@ def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, face
             end = rows(normals.values, normals.index.take(group.corner(world, k)))
             return rows(world.vertices, group.vertex(world, k)), end, group.weight(k)
 
+        share = np.multiply if isinstance(group, TriangleCorners) else between
         if group.lane is None:
-            bend(n, group.count, corner)
+            bend(n, group.count, corner, share)
         else:
             part = rows(n, group.lane)
-            bend(part, group.count, corner)
+            bend(part, group.count, corner, share)
             n[group.lane] = part
     return with_facet(facing(unit(n), facet.behind), facet.ng)
 
@@ -124,8 +127,22 @@ Corner: TypeAlias = tuple[Vectors, Vectors, Lanes]
 """(M, 3) place of a corner, its unit normal, (M,) its weight."""
 
 
-def bend(n: Vectors, count: int, corner: Callable[[int], Corner]) -> None:
-    """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit."""
+def between(first: Lanes, last: Lanes) -> Lanes:
+    """(M,) w_i w_j / (w_i + w_j) for the weights of an edge's ends; 0 where one is not positive."""
+    product = np.maximum(first, 0) * np.maximum(last, 0)
+    return np.divide(product, first + last, out=np.zeros_like(product), where=product > 0)
+
+
+def bend(
+    n: Vectors,
+    count: int,
+    corner: Callable[[int], Corner],
+    share: Callable[[Lanes, Lanes], Lanes] = np.multiply,
+) -> None:
+    """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit.
+
+    `share` is how much of an edge's term there is, by the weights of its ends.
+    """
     first = last = corner(0)
     for k in range(1, count + 1):
         following = corner(k) if k < count else first
@@ -134,7 +151,7 @@ def bend(n: Vectors, count: int, corner: Callable[[int], Corner]) -> None:
         slope = np.divide(
             3 * dot(last[1] + following[1], delta), square, out=np.zeros_like(square), where=square > 0
         )
-        n -= (last[2] * following[2] * slope)[:, None] * delta
+        n -= (share(last[2], following[2]) * slope)[:, None] * delta
         last = following
 
 

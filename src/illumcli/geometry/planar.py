@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, columns, cross, dot, length, rows, unit
-from illumcli.geometry.assemble import World, moved
+from illumcli.geometry.assemble import CornerVectors, World, moved
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
 from illumcli.records import Record
@@ -27,6 +27,8 @@ The Jacobian of the bilinear map is 0 at a corner of 180 degrees, and coordinate
 """
 MOST_CORNERS = 128
 """Work and memory of a hit go with the corners of its polygon; larger ones are interpolated by triangles."""
+ALIKE = 1e-6
+"""By components: unit normals nearer than this are one, rounded."""
 SAME_AREA = 1e-6
 """Triangles of a simple polygon cover it once: their areas add up to its own but for this share."""
 
@@ -55,13 +57,19 @@ class PlanarPolygons(Record):
         return len(self.first_corner)
 
 
-def planar_polygons(world: World) -> PlanarPolygons | None:
+def planar_polygons(world: World, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of a World; None where all is triangles.
 
     Corners are taken in double precision as the meshes have them, before they are rounded for the ray core.
     Polygons that cross themselves, or have no area, are left out.
+
+    Parameters
+    ----------
+    normals : CornerVectors, optional
+        Given where nothing but these is interpolated: polygons whose corners all have one normal, as those of
+        a box, are left out too.
     """
-    first, size, points, vertices = _candidates(world)
+    first, size, points, vertices = _candidates(world, normals)
     if not len(first):
         return None
 
@@ -108,7 +116,9 @@ def planar_polygons(world: World) -> PlanarPolygons | None:
     return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices)
 
 
-def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
+def _candidates(
+    world: World, normals: CornerVectors | None
+) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
     """First corner and size of polygons that may be planar; place, in radii, and vertex of their corners."""
     firsts, sizes, places, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for placed in world.placed:
@@ -117,6 +127,10 @@ def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDAr
             continue
         size = np.diff(mesh.starts)
         which = np.flatnonzero((size > 3) & (size <= MOST_CORNERS))
+        if normals is not None:
+            which = which[_is_uneven(normals, mesh.starts + placed.first_corner)[which]]
+        if not which.size:
+            continue
         size, first = size[which].astype(np.int64), mesh.starts[which].astype(np.int64)
         corner = np.repeat(first - np.cumsum(size) + size, size) + np.arange(size.sum())
         vertex = mesh.corners[corner]
@@ -132,6 +146,14 @@ def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDAr
         columns(np.concatenate(places)),
         np.concatenate(vertices),
     )
+
+
+def _is_uneven(normals: CornerVectors, starts: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(P,) True for polygons whose corners differ in their normals by more than rounding."""
+    n = rows(normals.values, normals.index[starts[0] : starts[-1]])
+    first = np.repeat(starts[:-1] - starts[0], np.diff(starts))
+    apart = np.abs(n - rows(n, first)).max(axis=1)
+    return np.asarray(np.maximum.reduceat(apart, starts[:-1] - starts[0]) > ALIKE)
 
 
 def _across(normal: Vectors) -> Vectors:

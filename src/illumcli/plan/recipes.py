@@ -14,7 +14,7 @@ from illumcli.geometry.readers import companions
 from illumcli.layers import FIXED, Layer, of_light, shadow_of
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
-from illumcli.models._parameters import Texture
+from illumcli.models._parameters import Texture, VertexValues
 from illumcli.plan import stages
 from illumcli.plan.doubled import error_recipes
 from illumcli.records import Value
@@ -131,6 +131,18 @@ def is_ambient(scene: Scene) -> bool:
     return models is None or any(_glows(model, model.ambient_color()) for model in models)
 
 
+def is_by_normals(scene: Scene) -> bool:
+    """Are shading normals all that is interpolated between corners, and linearly?"""
+    models = candidates(scene)
+    return (
+        not {"gouraud", "quadratic"} & set(rates(scene))
+        and not any(is_baked(scene))
+        and "t" not in reached_words(scene)
+        and models is not None
+        and not any(isinstance(each, VertexValues) for each in _varied(models))
+    )
+
+
 def weighs_ambient(scene: Scene) -> bool:
     """Is the ambient light weighed by obscurance, traced or baked?"""
     return scene.obscurance is not None or any(is_baked(scene))
@@ -182,7 +194,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         *_geometry(scene, loaded, rate, unseen),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
-        Recipe.of(stages.planar_polygons),
+        Recipe.of(stages.planar_polygons, **({"normals": "corner_normals"} if is_by_normals(scene) else {})),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
         Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
         Recipe.of(stages.hits),

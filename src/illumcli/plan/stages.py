@@ -224,9 +224,10 @@ def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
     return surface.uv_tangents(world, uvs)
 
 
-def planar_polygons(world: World) -> PlanarPolygons | None:
-    """The planar polygons of more than three corners; None where there are none."""
-    return planar.planar_polygons(world)
+def planar_polygons(world: World, normals: CornerVectors | None = None) -> PlanarPolygons | None:
+    """The planar polygons of more than three corners, where `normals` are given those over which these vary;
+    None where there are none."""
+    return planar.planar_polygons(world, normals)
 
 
 def polygon_centres(world: World) -> PolygonCentres:

@@ -28,6 +28,7 @@ EXPECTED = {
     "unused vertices": (2, "bad.obj:4"),
     "faces without area": (2, "bad.obj:10"),
     "normals not finite or of no length": (1, "bad.obj:8"),
+    "faces that run clockwise about their normals": (1, "bad.obj:12"),
 }
 
 

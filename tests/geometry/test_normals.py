@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import lzma
+from dataclasses import replace
 from importlib.resources import files
 from itertools import product
 
@@ -20,6 +21,7 @@ from illumcli.geometry.normals import (
     newell_plane,
     plane_solve,
     polygon_normals,
+    reversed_polygons,
     vertex_normal,
 )
 
@@ -166,7 +168,8 @@ def test_the_files_normals_are_kept_and_the_bad_ones_replaced():
 
 
 def test_corners_without_a_normal_of_the_file_are_computed_and_not_called_bad():
-    mesh = cube(normals=np.array([[0, 0, 3.0]]), corner_normals=np.array([-1] + [0] * 23, np.int32))
+    own = 3 * polygon_normals(cube())
+    mesh = cube(normals=own, corner_normals=np.array([-1, *np.repeat(range(6), 4)[1:]], np.int32))
     made = corner_normals(mesh)
     np.testing.assert_allclose(made.normals[made.index[0]], -CORNER)
     assert made.repairs == {}
@@ -198,3 +201,40 @@ def test_an_empty_mesh_has_none():
     for crease in (None, 30.0):
         assert corner_normals(empty, crease=crease).index.shape == (0,)
     assert polygon_normals(empty, "plane").shape == (0, 3)
+
+
+def leaning(*normals, faces=((0, 1, 2, 3),)):
+    """A square in the plane z = 0, seen counter-clockwise from above, with a normal per vertex."""
+    corners = np.concatenate(faces).astype(np.int32)
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    return ragged(*faces, vertices=square, normals=np.array(normals, float), corner_normals=corners)
+
+
+def test_polygons_are_reversed_only_where_every_normal_is_clearly_on_the_other_side():
+    down, level, bad = [0.3, 0, -1], [1, 0, -0.005], [0, 0, 0]
+    assert reversed_polygons(leaning(down, down, down, down)).tolist() == [True]
+    assert reversed_polygons(leaning(down, down, down, [1, 0, 0.2])) is None
+    assert reversed_polygons(leaning(down, down, down, level)) is None
+    assert reversed_polygons(leaning(down, down, down, bad)) is None
+    assert reversed_polygons(cube()) is None
+    lacking = leaning(down, down, down, down)
+    assert reversed_polygons(replace(lacking, corner_normals=np.array([0, 1, 2, -1], np.int32))) is None
+    both = leaning(down, down, down, [0, 0, -1], faces=((0, 1, 2, 3), (3, 2, 1, 0)))
+    assert reversed_polygons(both).tolist() == [True, False]
+
+
+def test_computed_normals_of_reversed_polygons_lie_on_the_side_of_the_files():
+    square = leaning(*[[0.1, 0, -1]] * 4)
+    loose = [[2, 0, 0], [3, 0, 0], [3, 1, 0], [2, 1, 0]]
+    mesh = replace(
+        square,
+        vertices=np.concatenate([square.vertices, loose]),
+        corners=np.arange(8, dtype=np.int32),
+        starts=np.array([0, 4, 8], np.int32),
+        corner_normals=np.array([0, 1, 2, 3, -1, -1, -1, -1], np.int32),
+    )
+    found = corner_normals(mesh)
+    np.testing.assert_allclose(found.normals[found.index[4:]], np.tile([0, 0, 1], (4, 1)), atol=1e-12)
+    touching = replace(mesh, corners=np.array([0, 1, 2, 3, 2, 1, 4, 7], np.int32))
+    found = corner_normals(touching)
+    assert (found.normals[found.index[6:], 2] == 1).all()  # no polygon beside is turned

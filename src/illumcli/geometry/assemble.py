@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, columns
 from illumcli.frame import Frame
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.normals import reversed_polygons
 from illumcli.geometry.triangulate import triangulate
 from illumcli.records import Record
 
@@ -22,6 +23,7 @@ class Placed(Record):
     mesh: Mesh
     matrix: NDArray[np.float64]  # (4, 4), object to scene
     mirrored: bool  # the matrix turns left into right: corners run the other way round
+    reversed: NDArray[np.bool_] | None  # (P,) polygons turned round to the side of the file's normals
     first_vertex: int
     first_corner: int
     first_polygon: int
@@ -163,11 +165,17 @@ def without_polygons(mesh: Mesh) -> Mesh:
 
 
 def place(
-    meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]], frame: Frame | None = None
+    meshes: Sequence[Mesh],
+    matrices: Sequence[NDArray[np.float64]],
+    frame: Frame | None = None,
+    by_file: Sequence[bool] | None = None,
 ) -> World:
     """Mesh i under matrix i, all in one World of unit radius: in `frame`, or in that of all these meshes.
 
-    The move and the scaling happen in float64, before anything is rounded to float32.
+    Triangles run counter-clockwise seen from outside: those of mirrored objects and of polygons that run
+    clockwise about their file's normals are turned round; `by_file` says of which objects these normals are
+    used, by default of all. The move and the scaling happen in float64, before
+    anything is rounded to float32.
     """
     frame = frame or stand(meshes, matrices).frame
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
@@ -176,11 +184,10 @@ def place(
         cut = triangulate(mesh)
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
         own = cut.corners[:, ::-1] if mirrored else cut.corners
-        placed.append(
-            Placed(
-                mesh, matrix, mirrored, first["vertex"], first["corner"], first["polygon"], first["triangle"]
-            )
-        )
+        against = reversed_polygons(mesh) if by_file is None or by_file[number] else None
+        if against is not None:
+            own = np.where(against[cut.polygon][:, None], own[:, ::-1], own)
+        placed.append(Placed(mesh, matrix, mirrored, against, *first.values()))
         vertices.append(moved(mesh, matrix))
         triangles.append(mesh.corners[own] + np.int32(first["vertex"]))
         corners.append(own + np.int32(first["corner"]))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import area_vectors
+from illumcli.geometry.normals import area_vectors, reversed_polygons
 from illumcli.geometry.repairs import Repair, Repairs
 
 Place: TypeAlias = Callable[[str, int], str]
@@ -24,8 +24,8 @@ def numbered(part: str, index: int) -> str:
 def faults(mesh: Mesh, place: Place = numbered) -> Repairs:
     """What was put right already, then what rendering lives with.
 
-    Faces without area are never hit, zero normals are replaced by computed ones, unused vertices count for
-    nothing, not even for the scene's size.
+    Faces without area are never hit, zero normals are replaced by computed ones, faces that run clockwise
+    about their normals are turned round, unused vertices count for nothing, not even for the scene's size.
     """
     used = np.zeros(len(mesh.vertices), np.bool_)
     used[mesh.corners] = True
@@ -36,6 +36,8 @@ def faults(mesh: Mesh, place: Place = numbered) -> Repairs:
     if mesh.normals is not None:
         sound = np.isfinite(mesh.normals).all(axis=1) & np.any(mesh.normals, axis=1)
         wrong["normals not finite or of no length"] = ("normal", ~sound)
+    if (against := reversed_polygons(mesh)) is not None:
+        wrong["faces that run clockwise about their normals"] = ("face", against)
     return {**mesh.repairs, **_counted(wrong, place), **mesh.repairs}
 
 

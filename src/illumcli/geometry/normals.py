@@ -30,6 +30,7 @@ PolygonMethod: TypeAlias = Literal["cross", "edge_average", "newell", "plane"]
 Weights: TypeAlias = Literal["equal", "area", "angle"]
 
 EPS = np.finfo(np.float64).eps
+AGAINST = -0.01  # cosine below which a normal lies clearly on the other side of its polygon
 SAME_ANGLE = 1e-9  # [rad] polygons that meet at exactly the crease angle are still averaged
 
 
@@ -75,6 +76,23 @@ def polygon_normals(mesh: Mesh, method: PolygonMethod = "newell") -> Vectors:
         normals = normals * np.where(dot(normals, newell) < 0, -1.0, 1.0)[:, None]
     found = dot(normals, normals) > 0
     return np.where((found & (dot(newell, newell) > 0))[:, None], normals, newell)
+
+
+def reversed_polygons(mesh: Mesh) -> NDArray[np.bool_] | None:
+    """(P,) True for polygons that run clockwise seen from where the file's normals point; None if none does.
+
+    At every corner the normal and the polygon's own make a cosine below `AGAINST`. A polygon of which some
+    normals lie on either side, as a card of foliage has them, keeps its side, and so does one that lacks
+    normals.
+    """
+    if mesh.normals is None or mesh.corner_normals is None or not mesh.polygon_count:
+        return None
+    own, good = _file_normals(mesh.normals)
+    polygon = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
+    cosine = dot(rows(own, mesh.corner_normals), rows(polygon_normals(mesh), polygon))
+    against = (cosine < AGAINST) & (mesh.corner_normals >= 0) & good[mesh.corner_normals]
+    found: NDArray[np.bool_] = np.logical_and.reduceat(against, mesh.starts[:-1])
+    return found if found.any() else None
 
 
 def area_vectors(mesh: Mesh) -> Vectors:
@@ -132,7 +150,7 @@ def corner_normals(
     kept = named & good[mesh.corner_normals]
     if kept.all():
         return CornerNormals(own, mesh.corner_normals.astype(np.int32), {})
-    made = _computed(mesh, weights, crease, polygon_method)
+    made = _computed(mesh, weights, crease, polygon_method, reversed_polygons(mesh))
     index = np.where(kept, mesh.corner_normals, np.where(made.index < 0, -1, made.index + len(own)))
     bad = int(np.count_nonzero(named & ~kept))
     repairs = {**made.repairs, **({"zero or non-finite normals": bad} if bad else {})}
@@ -266,9 +284,18 @@ def _file_normals(normals: NDArray[np.float64]) -> tuple[Vectors, NDArray[np.boo
     return unit(scaled), good
 
 
-def _computed(mesh: Mesh, weights: Weights, crease: float | None, method: PolygonMethod) -> CornerNormals:
+def _computed(
+    mesh: Mesh,
+    weights: Weights,
+    crease: float | None,
+    method: PolygonMethod,
+    turned: NDArray[np.bool_] | None = None,
+) -> CornerNormals:
+    """Normals made from polygons, those that are `turned`, (P,), with their other side."""
     polygons = polygon_normals(mesh, method)
     weight = _corner_weights(mesh, weights, polygons)
+    if turned is not None:
+        polygons = np.where(turned[:, None], -polygons, polygons)
     owner = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
     if crease is None:
         sums, total = _vertex_sums(mesh, weight, polygons, owner)

@@ -413,7 +413,11 @@ def shape_of(scene: Scene, world: World, number: int, report: Report) -> Shape:
             continue
         turned = own @ cofactors(linear).T * (-1 if placed.mirrored else 1) if kind == "normal" else own
         attributes[kind] = turned
-    triangles = world.triangles[world.objects == number] - np.int32(placed.first_vertex)
+    mine = world.objects == number
+    triangles = world.triangles[mine] - np.int32(placed.first_vertex)
+    if placed.reversed is not None:  # files keep the order of their corners
+        other_way = placed.reversed[world.polygons[mine] - placed.first_polygon]
+        triangles[other_way] = triangles[other_way, ::-1]
     vertices = mesh.vertices @ linear.T + placed.matrix[:3, 3]
     return Shape(name, vertices, mesh.corners, mesh.starts, triangles, attributes)
 

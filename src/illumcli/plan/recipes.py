@@ -291,6 +291,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
     how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
     methods = tuple("newell" if said is None else said.polygon for said in normals)
     parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
+    by_file = tuple(said is None or said.source == "file" for said in normals)
     flat = tuple(own == "constant" or scene.terminator == "none" for own in rate)
     every = "every_mesh" if unseen else "meshes"
     called = tuple(
@@ -308,7 +309,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
             meshes=every,
         ),
         Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
-        Recipe.of(stages.world),
+        Recipe.of(partial(stages.world, by_file), "world"),
         Recipe.of(stages.frame),
         Recipe.of(partial(stages.repairs, called), "repairs"),
         Recipe.of(stages.tracer_over, "tracer"),

@@ -112,9 +112,10 @@ def left(unseen: tuple[int, ...], meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
     )
 
 
-def world(meshes: tuple[Mesh, ...], standing: Standing) -> World:
-    """All triangles, placed, recentred and scaled to unit radius."""
-    return assemble.place(meshes, standing.matrices, standing.frame)
+def world(by_file: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing) -> World:
+    """All triangles, placed, recentred and scaled to unit radius; `by_file` says of which objects the
+    file's normals are used."""
+    return assemble.place(meshes, standing.matrices, standing.frame, by_file)
 
 
 def frame(standing: Standing) -> Frame:
@@ -243,7 +244,9 @@ def polygon_normals(methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: W
     for mesh, method, placed in zip(meshes, methods, world.placed, strict=True):
         turned = of_mesh(mesh, method) @ assemble.cofactors(placed.matrix[:3, :3]).T
         size = np.linalg.norm(turned, axis=1, keepdims=True)
-        sign = -1 if placed.mirrored else 1
+        sign: Any = -1 if placed.mirrored else 1
+        if placed.reversed is not None:
+            sign = np.where(placed.reversed, -sign, sign)[:, None]
         parts.append(np.divide(sign * turned, size, out=np.zeros_like(turned), where=size > 0))
     return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 

@@ -49,6 +49,10 @@ class Corners(Record):
         """(m,) weight of corner k."""
         raise NotImplementedError
 
+    def end_weight(self, k: int) -> Lanes:
+        """(m,) weight of corner k as an end of an edge."""
+        return self.weight(k)
+
     def corner(self, world: World, k: int) -> Ids:
         """(m,) number of corner k among the World's corners."""
         raise NotImplementedError
@@ -112,7 +116,8 @@ class TriangleCorners(Corners):
 
 
 class PolygonCorners(Corners):
-    """Weights in planar polygons; the last corner stands for those that a polygon of the class lacks."""
+    """Weights in planar polygons; for corners that a polygon of the class lacks its first stands, without
+    any weight."""
 
     planar: PlanarPolygons
     polygon: Ids  # (m,) row of `planar`
@@ -128,9 +133,13 @@ class PolygonCorners(Corners):
         weight: Lanes = self.weights[k]
         return weight
 
+    def end_weight(self, k: int) -> Lanes:
+        """The same; beyond the last corner that of the first, where the last edge ends."""
+        return np.where(self.last < k, self.weights[0], self.weights[k])
+
     def number(self, first: NDArray[np.int32], k: int) -> Ids:
         """(m,) number of corner k, where those of polygon q have the numbers from ``first[q]`` on."""
-        return np.asarray(first.take(self.polygon) + np.minimum(self.last, np.int32(k)))
+        return first.take(self.polygon) + np.where(self.last < k, np.int32(0), np.int32(k))
 
     def corner(self, world: World, k: int) -> Ids:
         return self.number(self.planar.first_corner, k)
@@ -347,14 +356,17 @@ def _mean_value(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(count, m) mean value coordinates in polygons whose last corner fills them up to `count`."""
+    """(count, m) mean value coordinates in polygons whose first corner fills them up to `count`."""
     weights = np.empty((count, len(x)))
     number = np.arange(count, dtype=np.int32)[:, None]
     width = max(BLOCK // count, 1)
     for begin in range(0, len(x), width):
         part = slice(begin, begin + width)
-        at = start[part] + np.minimum(number, last[part])
+        at = start[part] + np.where(number <= last[part], number, 0)
         weights[:, part] = _mean_value_of(flat[:, 0].take(at) - x[part], flat[:, 1].take(at) - y[part])
+    for k in range(1, count):  # what the corners that fill up have is the first one's
+        weights[0] += np.where(last < k, weights[k], 0)
+        weights[k] = np.where(last < k, 0, weights[k])
     return weights
 
 
@@ -363,7 +375,7 @@ def _mean_value_of(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np
 
     w_i = (tan(a_{i-1} / 2) + tan(a_i / 2)) / r_i, where a_i is the angle that edge i is seen under. Tangents
     are formed without cancellation; on an edge they are the inverse of `TINY` in place of infinite. Corners
-    that stand at one place, as those that fill up, share what one of them would weigh.
+    that follow each other at one place share what one of them would weigh.
     """
     following_x, following_y = np.roll(x, -1, axis=0), np.roll(y, -1, axis=0)
     r = np.sqrt(x * x + y * y)

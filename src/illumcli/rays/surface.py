@@ -111,7 +111,7 @@ def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, face
 
         def corner(k: int, group: Corners = group) -> Corner:
             end = rows(normals.values, normals.index.take(group.corner(world, k)))
-            return rows(world.vertices, group.vertex(world, k)), end, group.weight(k)
+            return rows(world.vertices, group.vertex(world, k)), end, group.end_weight(k)
 
         share = np.multiply if isinstance(group, TriangleCorners) else between
         if group.lane is None:

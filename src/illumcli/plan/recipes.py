@@ -14,7 +14,7 @@ from illumcli.geometry.readers import companions
 from illumcli.layers import FIXED, Layer, of_light, shadow_of
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
-from illumcli.models._parameters import Texture, VertexValues
+from illumcli.models._parameters import Texture
 from illumcli.plan import stages
 from illumcli.plan.doubled import error_recipes
 from illumcli.records import Value
@@ -131,18 +131,6 @@ def is_ambient(scene: Scene) -> bool:
     return models is None or any(_glows(model, model.ambient_color()) for model in models)
 
 
-def is_by_normals(scene: Scene) -> bool:
-    """Are shading normals all that is interpolated between corners, and linearly?"""
-    models = candidates(scene)
-    return (
-        not {"gouraud", "quadratic"} & set(rates(scene))
-        and not any(is_baked(scene))
-        and "t" not in reached_words(scene)
-        and models is not None
-        and not any(isinstance(each, VertexValues) for each in _varied(models))
-    )
-
-
 def weighs_ambient(scene: Scene) -> bool:
     """Is the ambient light weighed by obscurance, traced or baked?"""
     return scene.obscurance is not None or any(is_baked(scene))
@@ -186,6 +174,8 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
+    # where normals are interpolated linearly, and nothing else for the points, most polygons need no weights
+    of_normals = {"corner_weights": "normal_weights" if set(rate) == {"phong"} else "corner_weights"}
     whole = {"planar_polygons": "planar_polygons"} if smooth or any(is_baked(scene)) else {}
     at_samples = AT_SAMPLES.issuperset(rate)
     grains = tuple(thing.grain for thing in scene.objects)
@@ -194,13 +184,15 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         *_geometry(scene, loaded, rate, unseen),
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
-        Recipe.of(stages.planar_polygons, **({"normals": "corner_normals"} if is_by_normals(scene) else {})),
+        Recipe.of(stages.planar_polygons),
+        Recipe.of(stages.planar_polygons, "uneven_polygons", normals="corner_normals"),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
         Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
         Recipe.of(stages.hits),
         Recipe.of(stages.facets),
         Recipe.of(stages.corner_weights, **whole),
-        Recipe.of(partial(stages.points, rate), "points", **smooth, **flat),
+        Recipe.of(stages.corner_weights, "normal_weights", planar_polygons="uneven_polygons"),
+        Recipe.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
         Recipe.of(stages.point_weights),
         Recipe.of(stages.material),
         Recipe.of(stages.view_vectors, "v"),
@@ -209,7 +201,12 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.ray_origins),
         *_terminator(smooth),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
-        Recipe.of(partial(stages.obscurance_normals, rate), "obscurance_normals", normals="corner_normals"),
+        Recipe.of(
+            partial(stages.obscurance_normals, rate),
+            "obscurance_normals",
+            normals="corner_normals",
+            **of_normals,
+        ),
         *_obscurance(scene, loaded, unseen),
         Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
         Recipe.of(stages.emission, **_varying(scene, "emission")),

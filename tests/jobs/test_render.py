@@ -116,6 +116,18 @@ def test_the_report_says_what_happened(illum, scene, tmp_path):
     assert {"seconds", "scene_hash", "versions", "repairs", "threads"} <= set(report)
 
 
+def test_what_half_precision_clamps_is_said_with_v(illum, scene, tmp_path):
+    bright = ("render", scene, "-D", "lights.0.intensity=1e9", "-o")
+    said = illum(*bright, "half.exr", "-v").stderr
+    (line,) = [line for line in said.splitlines() if "65504" in line]
+    count = int(line.split(": ")[1].split()[0])
+    channels = read_image(tmp_path / "half.exr").channels
+    assert count == sum(int((channels[name] == 65504).sum()) for name in "RGB") > 0
+    assert "outputs.colour: float" in line
+    assert "65504" not in illum(*bright, "again.exr").stderr
+    assert "65504" not in illum(*bright, "float.exr", "-v", "-D", "outputs.colour=float").stderr
+
+
 def test_a_mesh_alone_is_rendered_in_the_studio(illum, tmp_path):
     (tmp_path / "t.obj").write_text(TRIANGLE)
     small = ["-D", "film.width=40", "-D", "film.height=30", "-D", "film.samples=1"]

@@ -90,6 +90,9 @@ def render(
             click.echo(f"{scene}: {line}", err=True)
         for warning in done.warnings:
             click.echo(warning, err=True)
+        if verbose and done.clamped:
+            fact = f"{done.clamped} values beyond 65504, the largest of half precision, are written as that"
+            click.echo(f"{scene}: {fact}; outputs.colour: float keeps them", err=True)
         if verbose:
             for camera, reused in done.reused.items():
                 for name, where in reused.items():

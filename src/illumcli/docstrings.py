@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import sys
+from collections.abc import Sequence
 from functools import cache
 
 
@@ -23,6 +25,15 @@ def summary(cls: type) -> str:
     """The first paragraph of a class's own docstring, or of its module's where it has none."""
     text = vars(cls).get("__doc__") or sys.modules[cls.__module__].__doc__ or ""
     return _one_line(inspect.cleandoc(text).partition("\n\n")[0])
+
+
+def choices(text: str, names: Sequence[str]) -> list[str]:
+    """What a field's text says of each value it may have, as in "`name`: what it is."; empty where it leaves
+    one out."""
+    quoted = "|".join(map(re.escape, names))
+    parts = re.split(rf"`({quoted})`: ", text)
+    said = dict(zip(parts[1::2], parts[2::2], strict=True))
+    return [said[name].strip() for name in names] if said.keys() >= set(names) else []
 
 
 @cache

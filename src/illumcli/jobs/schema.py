@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from illumcli.description import Description
-from illumcli.docstrings import field_docs, summary
+from illumcli.docstrings import choices, field_docs, summary
 from illumcli.scene.spec import Scene
 from illumcli.values import HEX, color, spread
 from illumcli.variants import members
@@ -25,6 +26,8 @@ SRGB = {
     "pattern": HEX,
     "description": "A colour in sRGB, made linear: '#rrggbb', or '#rgb' for equal digits.",
 }
+NULL = {"type": "null"}
+REFERENCE = "#/$defs/"
 MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
 
 
@@ -34,10 +37,59 @@ def run() -> str:
 
 
 def schema() -> dict[str, Any]:
-    """The schema of scenes, all members of the open families included."""
-    made = schema_of(Scene)
-    made["properties"] = {"extends": EXTENDS, **made["properties"]}
-    return {"$schema": GenerateJsonSchema.schema_dialect, **made, "title": "illum scene"}
+    """The schema of scenes, all members of the open families included.
+
+    A scene that extends another need not say what the other says, and may take parts of it away.
+    """
+    whole = schema_of(Scene)
+    whole["properties"] = {"extends": EXTENDS, **whole["properties"]}
+    parts = whole.pop("$defs")
+    partial = _Partial(parts)
+    return {
+        "$schema": GenerateJsonSchema.schema_dialect,
+        "title": "illum scene",
+        "description": whole["description"],
+        "type": "object",
+        "if": {"required": ["extends"]},
+        "then": partial.of(whole),
+        "else": whole,
+        "$defs": parts | partial.made,
+    }
+
+
+class _Partial:
+    """Schemas of mappings that complete others: no key is required, and null removes one.
+
+    What stands in lists replaces, so it is whole.
+    """
+
+    def __init__(self, parts: Mapping[str, Any]) -> None:
+        self._parts = parts
+        self.made: dict[str, Any] = {}
+        """By name: the parts that were asked for."""
+
+    def of(self, schema: Mapping[str, Any]) -> dict[str, Any]:
+        """The schema of what may complete that which `schema` describes."""
+        made = {key: value for key, value in schema.items() if key not in ("required", "discriminator")}
+        if "$ref" in made:
+            made["$ref"] = self._reference(made["$ref"])
+        for key in ("properties", "patternProperties"):
+            if key in made:
+                made[key] = {name: self._or_null(self.of(part)) for name, part in made[key].items()}
+        if found := [each for key in ("oneOf", "anyOf") for each in made.pop(key, ())]:
+            made["anyOf"] = [self.of(each) for each in found]  # what says not what it is may be any of them
+        return made
+
+    def _or_null(self, schema: dict[str, Any]) -> dict[str, Any]:
+        about: dict[str, Any] = {key: schema.pop(key) for key in ("description", "default") if key in schema}
+        return {**about, "anyOf": [schema, NULL]}
+
+    def _reference(self, reference: str) -> str:
+        name = reference.removeprefix(REFERENCE)
+        if f"{name}.part" not in self.made:
+            self.made[f"{name}.part"] = {}  # it may refer to itself
+            self.made[f"{name}.part"] = self.of(self._parts[name])
+        return f"{reference}.part"
 
 
 def schema_of(cls: type[Description]) -> dict[str, Any]:
@@ -55,6 +107,13 @@ def _named(part: Any) -> Any:
     return {**made, "ref": made["cls"].__name__} if "cls" in made else made
 
 
+def _describe_choices(part: dict[str, Any], text: str) -> None:
+    """Put what a field's text says of each choice beside the choices, as editors show it."""
+    for inner in [part, part.get("items", {}), *part.get("anyOf", ())]:
+        if "enum" in inner and (said := choices(text, inner["enum"])):
+            inner["enumDescriptions"] = said
+
+
 class _Schema(GenerateJsonSchema):
     """pydantic's schema with our texts, without titles that only repeat a key."""
 
@@ -64,8 +123,9 @@ class _Schema(GenerateJsonSchema):
         properties, required = {}, []
         for name, field in schema["fields"].items():
             part = properties[name] = self.generate_inner(field)
-            if name in docs:
-                part["description"] = docs[name]
+            if text := docs.get(name) or ("const" in part and summary(cls)):
+                part["description"] = text
+                _describe_choices(part, text)
             if part.get("default") == {}:  # what is described by all its defaults
                 del part["default"]
             says_what = isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT

@@ -26,8 +26,11 @@ class Polynomial(Description):
 
     law: Literal["polynomial"]
     c1: NonNegative = 1.0
+    """Constant part of the divisor."""
     c2: NonNegative = 0.0
+    """What it grows by per scene unit."""
     c3: NonNegative = 0.0
+    """What it grows by per squared scene unit."""
 
     def check(self) -> None:
         """Something must divide."""

@@ -17,7 +17,7 @@ from illumcli.values import Color, Vector
 class Point(Light):
     light: Literal["point"]
     position: Vector
-    """[scene units]"""
+    """Where it is [scene units]."""
     intensity: Color = (1.0, 1.0, 1.0)
     """[W/sr] under the inverse square; a plain factor under the other laws."""
     attenuation: Law = written({"law": "inverse_square"})

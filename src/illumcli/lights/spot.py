@@ -18,7 +18,7 @@ from illumcli.values import Color, Share, Vector, Within
 class Spot(Light):
     light: Literal["spot"]
     position: Vector
-    """[scene units]"""
+    """Where it is [scene units]."""
     target: Vector = (0.0, 0.0, 0.0)
     """A point on the axis [scene units]."""
     angle: Annotated[float, Within(gt=0, le=180)] = 30.0

@@ -156,10 +156,11 @@ class Material(Description):
 
     F: Literal["material"] = "material"
     name: Literal["water", "plastic", "glass", "diamond", "copper", "aluminium"] = "plastic"
-    """Row of the table: F0 of water 0.02, plastic 0.05, glass 0.08 (dense flint), diamond 0.17, ..."""
+    """Row of the table, by its F0. `water`: 0.02. `plastic`: 0.05. `glass`: 0.08, dense flint. `diamond`:
+    0.17. `copper`: 0.95, 0.64, 0.54. `aluminium`: 0.91, 0.92, 0.92."""
     curve: Literal["dielectric", "schlick"] = "dielectric"
-    """How the table's F0 goes on to grazing: by the index it implies with k = 0, or by Schlick's curve. For
-    metals the implied index is fictitious."""
+    """How the table's F0 goes on to grazing. `dielectric`: by the index it implies with k = 0, which for
+    metals is fictitious. `schlick`: by Schlick's curve."""
 
     def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c."""
@@ -176,8 +177,8 @@ class Shifted(Description):
     ior: Index = 10.0
     """eta, the average index that tells how fast the colour shifts."""
     grazing: Literal["white", "light"] = "white"
-    """Colour at grazing. `white` lets the light keep its colour; `light` is the text's wording taken
-    literally, which applies the colour of the light twice."""
+    """Colour at grazing. `white`: the light keeps its colour. `light`: the text's wording taken literally,
+    which applies the colour of the light twice."""
 
     def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c; `light` is the light's colour, largest component 1."""

@@ -15,12 +15,15 @@ class Texture(Description):
     texture: str
     """Path of the image, from the scene's folder."""
     space: Literal["srgb", "linear"] | None = None
-    """How the file's numbers code light: by default linear where they are floats, as in EXR and HDR, and
-    sRGB where they are integers; integers that are data, as most scalars, want `linear`."""
+    """How the file's numbers code light; by default linear where they are floats, as in EXR and HDR, and sRGB
+    where they are integers. `srgb`: by the sRGB curve, as pictures do. `linear`: as they are, for integers
+    that are data, as most scalars."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
+    """`bilinear`: between the four texels around. `nearest`: the texel itself."""
     wrap: Literal["repeat", "clamp"] = "repeat"
+    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border."""
     channel: Literal["r", "g", "b", "a"] = "r"
-    """The channel a scalar parameter reads."""
+    """The channel a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
 
 
 class VertexValues(Description):

@@ -48,7 +48,8 @@ class CookTorrance(IlluminationModel):
     fresnel: Fresnel = written({"F": "dielectric"})
     """F, what a facet reflects at each angle."""
     convention: Literal["microfacet", "printed"] = "microfacet"
-    """Constants: normalised D over 4 n_l n_v, or those of the texts over pi n_l n_v."""
+    """Constants. `microfacet`: a normalised D over 4 n_l n_v. `printed`: those of the texts over pi n_l
+    n_v."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {
         "diffuse_lobe": ("diffuse", "diffuse_weight"),

@@ -80,7 +80,7 @@ class OrenNayar(IlluminationModel):
     sigma: Spread = 0.3
     """sigma, standard deviation of the facets' slope angle [rad]: 0 is Lambert, 0.5 clay or plaster."""
     form: Literal["full", "qualitative"] = "full"
-    """All terms with the second bounce, or the authors' simple A and B."""
+    """`full`: all terms with the second bounce. `qualitative`: the authors' simple A and B."""
 
     reciprocal: ClassVar[bool] = True
     physical: ClassVar[bool] = True

@@ -45,13 +45,17 @@ class Normals(Description):
     """How a mesh gets the normals that shading interpolates."""
 
     source: Literal["file", "computed"] = "file"
-    """`file`: the file's own where it has them, computed ones elsewhere."""
+    """`file`: the file's own where it has them, computed ones elsewhere. `computed`: made from the polygons,
+    whatever the file has."""
     weights: Literal["angle", "area", "equal"] = "angle"
-    """What each polygon counts for in a vertex normal."""
+    """What each polygon counts for in a vertex normal. `angle`: its angle at the vertex, so that it does not
+    matter how faces are cut into polygons. `area`: its area. `equal`: as much as any other."""
     crease: Annotated[float, Within(ge=0, le=180)] | None = None
     """Polygons that meet at more than this keep their edge sharp [degrees]."""
     polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
-    """How a polygon's own normal is found."""
+    """How a polygon's own normal is found. `newell`: by Newell's sum over all corners, which suits every
+    polygon. `cross`: by the edges at the first corner. `edge_average`: as the mean over all corners of the
+    edges' cross products. `plane`: of the plane through the first three corners."""
 
 
 class MeshFile(Description):
@@ -60,6 +64,7 @@ class MeshFile(Description):
     file: str
     """Path, from the scene's folder."""
     normals: Normals = NOTHING
+    """Where the normals that shading interpolates come from."""
     materials: bool = False
     """True: import the materials that the file's own library describes."""
     obscurance: str | None = None
@@ -92,7 +97,7 @@ class Transform(Description):
     """Scale and move what is rotated so that half its box's diagonal is this long and it stands on y = 0,
     centred on the y axis [scene units]."""
     translate: Vector = (0.0, 0.0, 0.0)
-    """[scene units]"""
+    """By how much it is moved along x, y and z [scene units]."""
     matrix: tuple[Row, Row, Row, Row] | None = None
     """Four rows, applied last to column vectors; the last one is 0 0 0 1."""
 
@@ -110,6 +115,7 @@ class Grain(Description):
     """Grain in rings about an axis, as on a turned or brushed disc."""
 
     axis: Direction = (0.0, 1.0, 0.0)
+    """Direction of the axis, in the object's own coordinates."""
     centre: Vector = (0.0, 0.0, 0.0)
     """A point on the axis, in the object's own coordinates before its transform."""
 
@@ -134,15 +140,18 @@ class Object(Description):
     mesh: NameOrMesh
     """The name of a mesh, the path of a mesh file, or a mesh described in place."""
     name: Name | None = None
-    """By default `object1` and so on."""
+    """Names the object in messages, overrides and files; by default `object1` and so on."""
     material: NameOrMaterial | None = None
     """The name of a material, or one described in place; by default the materials that the mesh file
     selects by name, and light grey Lambert for what selects none."""
     override: dict[str, Any] = NOTHING
     """Parameters of the material that this object has otherwise."""
     transform: Transform = NOTHING
+    """Where it stands, and how large."""
     shading: Rate | None = None
-    """By default the scene's."""
+    """How often its material is evaluated; by default as often as the scene says. `constant`: once per
+    polygon. `gouraud`: once per vertex, intensities interpolated. `phong`: once per sample, normals
+    interpolated linearly. `quadratic`: once per sample, normals interpolated quadratically."""
     grain: AnyGrain | None = None
     """Tangent of anisotropic materials: a direction the grain follows, or rings about an axis;
     by default the direction of growing u."""
@@ -150,14 +159,17 @@ class Object(Description):
 
 class _Camera(Description):
     position: Vector = (1.8, 1.9, 3.6)
-    """[scene units]; the default looks at an object fitted to radius 1."""
+    """Where the eye is [scene units]; by default where it sees an object fitted to radius 1."""
     target: Vector = (0.0, 0.75, 0.0)
+    """What it looks at, the middle of the picture [scene units]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Any vector not along the line of sight; where it is, another axis is taken."""
     width: Count | None = None
-    """[pixels]; by default the film's."""
+    """Width of its picture [pixels]; by default the film's."""
     height: Count | None = None
+    """Height of its picture [pixels]; by default the film's."""
     samples: Count | None = None
+    """Samples per pixel; by default the film's."""
 
     def check(self) -> None:
         """The line of sight must have a direction."""
@@ -198,6 +210,8 @@ class Filter(Description):
     """The pixel filter, by sampling positions from it: pixels share no samples."""
 
     filter: Literal["box", "tent", "gaussian"] = "box"
+    """`box`: all samples of the pixel weigh the same. `tent`: less, the farther from the pixel's centre.
+    `gaussian`: by a bell curve, the softest."""
     width: Positive = 1.0
     """Support of box and tent, and two standard deviations of the Gaussian, either side [half pixels]."""
 
@@ -223,13 +237,16 @@ class Film(Description):
     """Size and sampling of the picture."""
 
     width: Count = 1280
+    """Width of the picture [pixels]."""
     height: Count = 720
+    """Height of the picture [pixels]."""
     samples: Count = 4
     """Per pixel; 1 looks through the pixel's centre."""
     adaptive: Annotated[Adaptive, Before(_adaptive, written=Adaptive | Count)] | None = None
     """Take all samples only where fewer differ; a number says how many every pixel gets. By default every
     pixel gets all."""
     filter: Filter = NOTHING
+    """From which part of and around a pixel its samples come."""
     background: Color | None = None
     """Behind everything; by default nothing, with alpha 0."""
     exposure: Annotated[float, Within(ge=-64, le=64)] = 0.0
@@ -251,9 +268,10 @@ class Ambient(Description):
     """I_a, light from everywhere, weighed by obscurance."""
 
     color: Color = (0.0, 0.0, 0.0)
+    """I_a, its colour; black is none."""
     form: Literal["separate", "coupled"] = "separate"
-    """`separate`: k_a I_a w + direct. `coupled`, as one text prints it: (k_a I_a + direct) w + I_d, with
-    I_d the direct light before the material; it counts direct light twice."""
+    """`separate`: k_a I_a w + direct. `coupled`: (k_a I_a + direct) w + I_d, as one text prints it, with I_d
+    the direct light before the material; it counts direct light twice."""
 
 
 AmbientText: TypeAlias = Ambient | Color | Literal["separate", "coupled"]  # how a scene may write it
@@ -294,11 +312,11 @@ class Obscurance(Description):
     """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
     less error where mu is smooth. `random`: independent rays, for scale."""
     faces: Literal["count", "ignore", "one_sided"] = "count"
-    """Faces met from behind `count` like others, are passed through (`ignore`), or let the ray go
-    (`one_sided`)."""
+    """What becomes of a ray that meets a face from behind. `count`: the face hides like any other. `ignore`:
+    the ray passes through. `one_sided`: it counts as free."""
     about: Literal["shading", "geometric"] = "shading"
-    """What the hemisphere stands about: the interpolated normal that direct light is shaded with, or the
-    polygon's own. Directions that point below the polygon are mirrored at its plane."""
+    """What the hemisphere stands about. `shading`: the interpolated normal that direct light is shaded with;
+    directions that point below the polygon are mirrored at its plane. `geometric`: the polygon's own."""
 
 
 Layer: TypeAlias = Literal[
@@ -313,12 +331,21 @@ class Outputs(Description):
     """What is written."""
 
     layers: Annotated[tuple[Layer, ...], Many(least=1)] = ("beauty",)
+    """What is made of the scene. `beauty`: the picture. `ambient`: its ambient light alone. `diffuse`: the
+    diffuse lobes under all lights. `specular`: the highlights under all lights. `emission`: what surfaces
+    emit. `lights`: the light of every lamp by itself, a layer each. `shadows`: 1 where a lamp reaches, 0 in
+    its shadow, a layer each. `obscurance`: w, 1 where open. `alpha`: the share of the pixel that is covered.
+    `depth`: distance from the eye's plane [scene units]. `position`: of the surface [scene units]. `normal`:
+    the one that is shaded with. `geometric_normal`: the triangle's own. `uv`: texture coordinates.
+    `object_id`: number of the object, from 1. `material_id`: number of the material, from 1. `triangle_id`:
+    number of the triangle, from 1. `error`: one standard error of the pixel's luminance."""
     files: Annotated[tuple[str, ...], Many(least=1)] = ("{scene}.{camera}.png",)
     """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
     file per layer (`{layer}` in its name when there are several): light as sRGB, all else as plain numbers;
     text in the file says how to read them."""
     colour: Literal["half", "float"] = "half"
-    """Precision of colour in EXR; depth, positions, normals and ids are always 32-bit."""
+    """Precision of colour in EXR; depth, positions, normals and ids are always 32-bit. `half`: 16 bits, up to
+    65504. `float`: 32 bits."""
 
 
 class Scene(Description):
@@ -331,24 +358,34 @@ class Scene(Description):
     cameras: dict[Name, Camera] = NOTHING
     """Several cameras by name; instead of `camera`."""
     film: Film = NOTHING
+    """Size and sampling of the picture."""
     shading: Rate = "phong"
-    """How often the model is evaluated."""
+    """How often the model is evaluated. `constant`: once per polygon. `gouraud`: once per vertex, intensities
+    interpolated. `phong`: once per sample, normals interpolated linearly. `quadratic`: once per sample,
+    normals interpolated quadratically."""
     terminator: Literal["smooth", "none"] = "smooth"
-    """Where shadows of smooth shading begin: `smooth`, on the surface that the normals imply, so that coarse
-    polygons cast no shadow on its lit side; `none`, on the polygons themselves."""
+    """Where shadows of smooth shading begin. `smooth`: on the surface that the normals imply, so that coarse
+    polygons cast no shadow on its lit side. `none`: on the polygons themselves."""
     ambient: Annotated[Ambient, Before(_ambient, written=AmbientText)] = NOTHING
-    """Colour, form or both of the light from everywhere."""
+    """Colour, form or both of the light from everywhere. `separate`: it is added to the direct light.
+    `coupled`: it is weighed together with it, as one text prints it."""
     obscurance: Obscurance | None = None
-    """By default w = 1 and no ray is cast for it."""
+    """How the ambient light is weighed by what surrounds a point; by default w = 1 and no ray is cast for
+    it."""
     depth_cue: DepthCue | None = None
     """Fade the beauty with the distance from the eye; by default not."""
     meshes: dict[Name, MeshSource] = NOTHING
+    """Files and shapes by name, for objects to share."""
     materials: dict[Name, AnyModel] = NOTHING
+    """Illumination models with their parameters by name, for objects and mesh files to select."""
     objects: tuple[Object, ...] = ()
+    """What is seen: meshes with their material and place."""
     lights: tuple[AnyLight, ...] = ()
+    """Lamps and suns; without any, what is lit is lit by ambient light alone."""
     outputs: Outputs = NOTHING
+    """Layers and files that are written."""
     seed: Annotated[int, Whole(ge=0, le=2**32 - 1)] = 0
-    """Of every random number."""
+    """Of every random number: the same seed makes the same picture."""
 
     def check(self) -> None:
         """Names must lead somewhere."""

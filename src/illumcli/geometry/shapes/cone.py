@@ -15,7 +15,9 @@ from illumcli.values import Positive
 class Cone(Shape):
     shape: Literal["cone"] = "cone"
     radius: Positive = 1.0
+    """Of the base [scene units]."""
     height: Positive = 2.0
+    """From the base to the apex, along y [scene units]."""
     segments: Segments = 96
     """Facets around."""
     rings: Rings = 1

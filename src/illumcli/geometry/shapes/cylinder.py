@@ -15,7 +15,9 @@ from illumcli.values import Positive
 class Cylinder(Shape):
     shape: Literal["cylinder"] = "cylinder"
     radius: Positive = 1.0
+    """[scene units]"""
     height: Positive = 2.0
+    """From bottom to top, along y [scene units]."""
     segments: Segments = 96
     """Facets around."""
     rings: Rings = 1

@@ -15,6 +15,7 @@ from illumcli.values import Positive
 class Disc(Shape):
     shape: Literal["disc"] = "disc"
     radius: Positive = 1.0
+    """[scene units]"""
     segments: Segments = 96
     """Facets around."""
     rings: Rings = 1

@@ -42,8 +42,9 @@ class Implicit(Shape):
     f: FormulaText
     """Formula of x, y and z: + - * / **, pi, e, sin cos tan sinh cosh tanh exp log sqrt abs atan2 min max."""
     low: Vector = (-1.0, -1.0, -1.0)
+    """Lowest corner of the box that is searched."""
     high: Vector = (1.0, 1.0, 1.0)
-    """Corners of the box that is searched."""
+    """Highest corner of that box."""
     resolution: Annotated[int, Whole(ge=2, le=512)] = 64
     """Cubic cells along the longest edge of the box; parts thinner than a cell may be missed."""
 

@@ -35,9 +35,13 @@ class Parametric(Shape):
     x: FormulaText
     """Formula of u and v: + - * / **, pi, e, sin cos tan sinh cosh tanh exp log sqrt abs atan2 min max."""
     y: FormulaText
+    """Formula of u and v, as x."""
     z: FormulaText
+    """Formula of u and v, as x."""
     u: Range = (0.0, 1.0)
+    """First and last u."""
     v: Range = (0.0, 1.0)
+    """First and last v."""
     resolution: CellsByCells = (64, 64)
     """Quads along u and v."""
     flip: bool = False

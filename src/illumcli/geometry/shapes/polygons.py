@@ -18,6 +18,7 @@ Face = Annotated[tuple[Annotated[int, Whole(ge=0)], ...], Many(least=3)]
 class Polygons(Shape):
     shape: Literal["polygons"] = "polygons"
     vertices: Annotated[tuple[Vector, ...], Many(least=3, most=1_000_000)]
+    """Positions, at least three [scene units]."""
     faces: Annotated[tuple[Face, ...], Many(least=1, most=1_000_000)]
     """Vertex numbers of each face, from 0, counter-clockwise seen from outside."""
     normals: tuple[Vector, ...] | None = None

@@ -19,6 +19,7 @@ from illumcli.values import Positive, Whole
 class Sphere(Shape):
     shape: Literal["sphere"] = "sphere"
     radius: Positive = 1.0
+    """[scene units]"""
     segments: Segments = 96
     """Facets around."""
     rings: Annotated[int, Whole(ge=2, le=2048)] = 48

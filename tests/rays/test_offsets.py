@@ -7,7 +7,7 @@ import pytest
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.jobs.stress.rays import grazing, icosphere, surface_points, world_of
-from illumcli.rays.offsets import lifted, terminator_offset
+from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
 from illumcli.rays.tracer import Tracer
 
 F = np.float32
@@ -80,15 +80,20 @@ def test_a_plate_a_millionth_above_the_floor_still_shades_it(height):
     assert Tracer(vertices, faces).occluded(origins, d.astype(F)).all()
 
 
-def test_terminator_offset_reaches_the_sphere_and_leaves_hollows_alone(ball):
+def test_the_mean_way_to_the_tangent_planes_reaches_the_sphere_and_leaves_hollows_alone(ball):
     vertices, faces = ball
     corners = tuple(np.asfortranarray(vertices[faces[:, k]]) for k in range(3))
-    third = np.full(len(faces), 1 / 3)
     centre = np.mean(corners, axis=0)
-    lift = terminator_offset(centre, corners, corners, (third, third, third))
+    lift = 1 / 3 * sum(to_tangent_plane(centre, corner, corner) for corner in corners)
     assert (np.linalg.norm(centre + lift, axis=1) >= 1).all()
-    hollow = tuple(-corner for corner in corners)
-    assert not terminator_offset(centre, corners, hollow, (third, third, third)).any()
+    for corner in corners:
+        assert not to_tangent_plane(centre, corner, -corner).any()
+
+
+def test_a_way_is_shortened_to_its_bound_and_never_lengthened():
+    way = np.asfortranarray([[0.0, 3, 4], [0, 0.3, 0.4], [0, 0, 0]])
+    short = bounded(way, np.array([1.0, 1, 1]))
+    np.testing.assert_allclose(short, [[0, 0.6, 0.8], [0, 0.3, 0.4], [0, 0, 0]])
 
 
 def test_a_needle_turned_out_of_its_axes_does_not_hit_itself():

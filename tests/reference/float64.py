@@ -136,14 +136,19 @@ def render(setup):
         below = np.minimum(((position - setup.vertices[corner[:, k]]) * normal).sum(1), 0)
         lifted -= (weight[:, k] * below)[:, None] * normal
     # lit is what the polygon's own ray says, or the ray from that point where nothing lies on the way to it
-    # (every mesh here is one smooth part, so nothing else can stand nearby)
+    # and nothing of the other body stands nearby
     tiny = SELF * radius
     start, height = position + tiny * ng, np.linalg.norm(lifted - position, axis=1)
     own, *_ = intersect(setup, start, l, tiny, distance - tiny)
     implied, *_ = intersect(setup, lifted + tiny * ng, l, tiny, distance - tiny)
     up = (lifted - position) / np.maximum(height, 1e-300)[:, None]
     way, *_ = intersect(setup, start, up, tiny, height - tiny)
-    delta = (lit & ((own < 0) | ((height > 0) & (implied < 0) & (way < 0)))).astype(float)
+    along = unit(l - np.minimum((l * ng).sum(1), 0)[:, None] * ng)
+    width = np.linalg.norm(np.ptp(setup.vertices[corner], axis=1), axis=1)
+    near, *_ = intersect(setup, start, along, tiny, np.minimum(2 * width, distance - tiny))
+    body = len(setup.faces) // 2
+    alone = (near < 0) | (near // body == number // body)
+    delta = (lit & ((own < 0) | ((height > 0) & (implied < 0) & (way < 0) & alone))).astype(float)
 
     model = Scene.validated({"version": 1, "materials": {"m": setup.material}}).materials["m"]
     given = {name: np.asfortranarray(value[lit]) for name, value in (("n", n), ("l", l), ("v", -d))}
@@ -157,8 +162,10 @@ def render(setup):
     draws = dither(stream(0, "obscurance"), x[seen], y[seen], np.zeros(len(seen), int))
     table = spiral_table(setup.rays).astype(float).transpose(0, 2, 1)
     pattern = table[(draws[1] * len(table)).astype(int)]
-    frame = turned_frame(np.asfortranarray(ng.astype(np.float32)), (2 * np.pi * draws[0]).astype(np.float32))
+    frame = turned_frame(np.asfortranarray(n.astype(np.float32)), (2 * np.pi * draws[0]).astype(np.float32))
     ways = np.matmul(pattern, frame.astype(float)).reshape(-1, 3)
+    plane = np.repeat(ng, setup.rays, axis=0)
+    ways -= 2 * np.minimum((ways * plane).sum(1), 0)[:, None] * plane
     starts = np.repeat(position + SELF * radius * ng, setup.rays, axis=0)
     closed, *_ = intersect(setup, starts, ways, SELF * radius)
     w = (closed < 0).reshape(-1, setup.rays).mean(axis=1)

@@ -526,10 +526,14 @@ def smooth_parts(world: World, normals: CornerVectors) -> SmoothParts:
 
 
 def smooth_surface(
-    world: World, hits: Hits, facets: Facets, smooth_parts: SmoothParts, normals: CornerVectors
+    world: World,
+    corner_weights: CornerWeights,
+    facets: Facets,
+    smooth_parts: SmoothParts,
+    normals: CornerVectors,
 ) -> shadows.SmoothSurface:
     """The samples on the surface that their normals imply."""
-    return shadows.SmoothSurface(world, normals, smooth_parts, hits, facets)
+    return shadows.SmoothSurface(world, normals, smooth_parts, corner_weights, facets)
 
 
 def shadow(

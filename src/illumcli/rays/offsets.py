@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +11,6 @@ SHARE = 4 * 2.0**-24
 """Four times the distance at which false self-hits begin; contact gaps of 1e-6 radii still shade."""
 
 ULP = 2.0**-23
-TERMINATOR_SHARE = 1 / 3
-"""Of a polygon's diameter: how far off it a shadow ray may start at most. On a sphere a terminator offset of
-0.24 (a cube's faces) to 0.27 (an octahedron's) is wanted, on finer ones less."""
 LONGEST = 100.0
 """No sliver counts as longer than this [radii]: its rays start 2.4e-5 radii off at most."""
 
@@ -61,32 +55,21 @@ def lifted(position: NDArray[np.float64], ng: Vectors, edge: Lanes) -> Vectors:
     return columns(step, F)
 
 
-def terminator_offset(
-    position: Vectors,
-    corners: Sequence[Vectors],
-    normals: Sequence[Vectors],
-    weights: Sequence[Lanes],
-) -> Vectors:
-    """(N, 3) the way from `position` to the mean of its projections on the corners' tangent planes.
+def to_tangent_plane(position: Vectors, corner: Vectors, normal: Vectors) -> Vectors:
+    """(N, 3) the way from each position up to the plane through `corner` with unit `normal`; 0 from above it.
 
-    A smooth-shaded mesh lights points that its flat facets shade; a shadow ray that starts there leaves
-    the curved surface the normals imply. Where the surface is hollow the way is 0, and it is never longer
-    than `TERMINATOR_SHARE` of the longest distance between two corners.
+    The mean of these ways, by the weights of a polygon's corners, leads to the curved surface that the
+    corners' normals imply.
 
     References
     ----------
-    Hanika, J. (2021). Hacking the shadow terminator. Ray Tracing Gems II, chapter 4. The bound is ours:
-    normals may say anything.
+    Hanika, J. (2021). Hacking the shadow terminator. Ray Tracing Gems II, chapter 4.
     """
-    way = np.zeros_like(position)
-    for corner, normal, weight in zip(corners, normals, weights, strict=True):
-        below = np.minimum(dot(position - corner, normal), 0)
-        way -= (weight * below)[:, None] * normal
-    height, most = length(way), TERMINATOR_SHARE * diameter(corners)
-    return way * np.divide(most, height, out=np.ones_like(height), where=height > most)[:, None]
+    below = np.minimum(dot(position - corner, normal), 0)
+    return -below[:, None] * normal
 
 
-def diameter(corners: Sequence[Vectors]) -> Lanes:
-    """(N,) the longest distance between two corners of each polygon, given corner by corner."""
-    squares = [dot(side, side) for a, b in combinations(corners, 2) for side in (np.subtract(a, b),)]
-    return np.sqrt(np.maximum.reduce(squares))
+def bounded(way: Vectors, most: Lanes) -> Vectors:
+    """(N, 3) `way`, no longer than `most`."""
+    size = length(way)
+    return way * np.divide(most, size, out=np.ones_like(size), where=size > most)[:, None]

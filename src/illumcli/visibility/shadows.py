@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.smooth_parts import SmoothParts
-from illumcli.rays.offsets import diameter, lifted, terminator_offset
-from illumcli.rays.surface import Facets, Hits, corner_rows, facing
+from illumcli.rays.corner_weights import Corners, CornerWeights
+from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
+from illumcli.rays.surface import Facets, facing
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record
 from illumcli.visibility.arriving import Lit
 
+TERMINATOR_SHARE = 1 / 3
+"""Of the diagonal of a polygon's bounding box: how far off it a shadow ray may start at most; normals may say
+anything. A sphere wants up to 0.24 (a cube's faces) or 0.27 (an octahedron's), finer ones less."""
 NEARBY = 2.0
-"""Polygon diameters within which whatever is not part of the same smooth surface shadows a sample."""
+"""Such diagonals within which whatever is not part of the same smooth surface shadows a sample."""
 
 
 class SmoothSurface(Record):
@@ -33,7 +37,7 @@ class SmoothSurface(Record):
     world: World
     normals: CornerVectors
     parts: SmoothParts
-    hits: Hits
+    weights: CornerWeights
     facets: Facets
 
 
@@ -64,14 +68,12 @@ def _implied_reached(
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
     # Where the implied surface lies above each sample; on flat polygons it is the polygon itself.
-    world, facets = smooth.world, smooth.facets
-    triangle = smooth.hits.triangle.take(sample)
-    u, v = smooth.hits.u.take(sample), smooth.hits.v.take(sample)
+    facets = smooth.facets
+    weights = smooth.weights.take(sample)
     position = rows(facets.position, sample)
-    corners = [rows(world.vertices, world.triangles[:, k].take(triangle)) for k in range(3)]
-    at = corner_rows(world, triangle, smooth.normals)
-    ends = [facing(rows(smooth.normals.values, index), facets.behind.take(sample)) for index in at]
-    offset = terminator_offset(columns(position, F), corners, ends, (1 - u - v, u, v))
+    width = _box_diagonals(smooth.world, weights)
+    offset = _terminator_offset(smooth, weights, columns(position, F), facets.behind.take(sample))
+    offset = bounded(offset, TERMINATOR_SHARE * width)
     curved = np.flatnonzero(length(offset) > 0)
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
@@ -85,11 +87,37 @@ def _implied_reached(
     # What stands nearby in the light's direction shadows the sample, unless it is the surface itself.
     own, ng = columns(rows(origins, sample.take(curved))), rows(facets.ng, sample.take(curved))
     hit = tracer.closest(own, _above(_at(l, curved), ng))
-    near = np.minimum(NEARBY * diameter([_at(corner, curved) for corner in corners]), _at(distance, curved))
-    same = smooth.parts.joined(_at(triangle, curved), np.maximum(hit.triangle, 0))
+    near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
+    same = smooth.parts.joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
     reached = np.zeros(len(sample), np.bool_)
     reached[curved[(hit.distance >= near) | same]] = True
     return reached
+
+
+def _terminator_offset(
+    smooth: SmoothSurface, weights: CornerWeights, position: Vectors, behind: NDArray[np.bool_]
+) -> Vectors:
+    """(B, 3) the way from samples on polygons to the surface that the normals at their corners imply."""
+    world, normals = smooth.world, smooth.normals
+
+    def way(group: Corners, k: int) -> Vectors:
+        normal = rows(normals.values, normals.index.take(group.corner(world, k)))
+        corner = rows(world.vertices, group.vertex(world, k))
+        if group.lane is None:
+            return to_tangent_plane(position, corner, facing(normal, behind))
+        return to_tangent_plane(rows(position, group.lane), corner, facing(normal, behind.take(group.lane)))
+
+    return weights.joined(way)
+
+
+def _box_diagonals(world: World, weights: CornerWeights) -> Lanes:
+    """(B,) the diagonal of the bounding box of the polygon under each sample, in radii."""
+    out = np.empty(len(weights), F)
+    for group in weights.groups:
+        corners = [rows(world.vertices, group.vertex(world, k)) for k in range(group.count)]
+        size = length(np.maximum.reduce(corners) - np.minimum.reduce(corners))
+        out[slice(None) if group.lane is None else group.lane] = size
+    return out
 
 
 def _at(values: NDArray[Any], index: NDArray[np.intp]) -> NDArray[Any]:

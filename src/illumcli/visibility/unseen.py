@@ -25,8 +25,7 @@ from illumcli.frame import Frame
 from illumcli.geometry.order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
-from illumcli.rays.offsets import TERMINATOR_SHARE
-from illumcli.visibility.shadows import NEARBY
+from illumcli.visibility.shadows import NEARBY, TERMINATOR_SHARE
 
 ROOM = 1e-4
 """Radii by which everything is taken to be larger: rays in single precision, the second shot of rays that

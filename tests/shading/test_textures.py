@@ -67,6 +67,19 @@ def test_repeat_shows_the_image_again_and_clamp_its_border(lookup):
     np.testing.assert_array_equal(bilinear(FOUR, at(0, 0.25), "clamp")[:, 0], [3])
 
 
+@pytest.mark.parametrize("lookup", [bilinear, nearest])
+def test_mirror_turns_every_second_image(lookup):
+    inside = at(0.1, 0.2, 0.6, 0.9, 0.99, 0.5)
+    mirrored = lookup(FOUR, at(1, 1) - inside, "mirror")
+    for step in ((1, 1), (-1, 3)):
+        found = lookup(FOUR, inside + F(step), "mirror")
+        np.testing.assert_allclose(found, mirrored, atol=1e-5)
+    np.testing.assert_allclose(
+        lookup(FOUR, inside + F((4, -2)), "mirror"), lookup(FOUR, inside, "clamp"), atol=1e-5
+    )
+    np.testing.assert_array_equal(lookup(FOUR, at(1, 0.25, 2, 0.25), "mirror")[:, 0], [4, 3])
+
+
 def test_a_uv_just_below_zero_stays_inside():
     assert np.isfinite(bilinear(FOUR, at(-1e-9, -1e-9, 1e30, -1e30), "repeat")).all()
 
@@ -203,6 +216,28 @@ def test_vertex_colours_are_interpolated(scene, picture, tmp_path):
     np.testing.assert_allclose(beauty[..., 1], np.tile(1 - across[:, None], (1, 8)), atol=1e-6)
 
 
+def test_values_are_multiplied_by_a_factor_and_by_an_attribute(scene, picture, print_, tmp_path):
+    (tmp_path / "sheet.ply").write_text(PLY)
+    across = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
+    up = 1 - across.T
+    tinted = "{model: lambert, diffuse: {vertex: color, factor: [0.5, 1, 0]}}"
+    beauty = picture(scene(tinted, "sheet.ply"))[0]["beauty"]
+    np.testing.assert_allclose(beauty, np.stack([across / 2, up, 0 * up], axis=-1), atol=1e-6)
+
+    # the colours stand for uv too: red grows with u, green with v
+    plain = picture(scene("{model: lambert, diffuse: {texture: print.png}}"))[0]["beauty"]
+    keys = "{texture: print.png, uv: color, vertex: color, factor: [1, 0.5, 1]}"
+    beauty = picture(scene(f"{{model: lambert, diffuse: {keys}}}", "sheet.ply"))[0]["beauty"]
+    expected = plain * np.stack([across, up / 2, 0 * up], axis=-1)
+    np.testing.assert_allclose(beauty, expected, atol=1e-6)
+
+    number = "{texture: print.png, space: linear, channel: g, factor: 0.25, vertex: worn, uv: color}"
+    layers, repairs = picture(scene(f"{{model: oren_nayar, sigma: {number}}}", "sheet.ply"))
+    assert np.isfinite(layers["beauty"]).all()
+    clipped = "vertex values beyond material printed: sigma clipped to 0..1.5708"
+    assert {what: each.count for what, each in repairs.items()} == {clipped: 1}
+
+
 def test_ambient_and_emission_vary_too(scene, picture, print_):
     keys = "{model: strauss, color: {texture: print.png}, smoothness: 0, emission: {texture: print.png}}"
     layers, _ = picture(scene(keys, ambient="0.5"), "ambient", "emission")
@@ -229,6 +264,17 @@ def test_ambient_and_emission_vary_too(scene, picture, print_):
             "sheet.ply",
             "object sheet: material printed: sigma is a number and the vertex attribute 'color' has 3 "
             "numbers per vertex; name another",
+        ),
+        (
+            "{model: lambert, diffuse: {texture: print.png, uv: worn}}",
+            "sheet.ply",
+            "object sheet: material printed: diffuse wants uv and the vertex attribute 'worn' has 1 "
+            "numbers per vertex; name another",
+        ),
+        (
+            "{model: lambert, diffuse: {texture: print.png, vertex: paint}}",
+            "{shape: plane}",
+            "object sheet: material printed: diffuse wants the vertex attribute 'paint'; the mesh has: none",
         ),
         (
             "{model: lambert, diffuse: {texture: print.png}}",

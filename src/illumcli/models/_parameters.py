@@ -20,10 +20,17 @@ class Texture(Description):
     that are data, as most scalars."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """`bilinear`: between the four texels around. `nearest`: the texel itself."""
-    wrap: Literal["repeat", "clamp"] = "repeat"
-    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border."""
+    wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
+    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border. `mirror`: the image again,
+    mirrored every second time."""
     channel: Literal["r", "g", "b", "a"] = "r"
     """The channel a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
+    factor: values.Color = (1.0, 1.0, 1.0)
+    """What each value is multiplied by; a scalar parameter takes the first number."""
+    vertex: str | None = None
+    """Name of a per-vertex attribute that each value is multiplied by as well, as vertex colours are."""
+    uv: str | None = None
+    """Name of a per-vertex attribute of two numbers to look the image up by; by default the mesh's own uv."""
 
 
 class VertexValues(Description):
@@ -31,6 +38,8 @@ class VertexValues(Description):
 
     vertex: str
     """Name of the attribute: `color` for vertex colours, or a scalar property of the file."""
+    factor: values.Color = (1.0, 1.0, 1.0)
+    """What each value is multiplied by; a scalar parameter takes the first number."""
 
 
 def _kind(value: Any) -> str:

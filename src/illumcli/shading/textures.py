@@ -36,8 +36,8 @@ def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
     ----------
     image : (H, W, C) float32, from the top
     uv : (N, 2) float32, v upwards
-    wrap : {'repeat', 'clamp'}
-        What lies outside: the image again, or its border.
+    wrap : {'repeat', 'clamp', 'mirror'}
+        What lies outside: the image again, its border, or the image mirrored every second time.
     """
     x, y = _texels(image, uv, wrap)
     left, low = np.floor(x - F(0.5)), np.floor(y - F(0.5))
@@ -60,7 +60,12 @@ FILTERS: dict[str, Callable[[Floats, Floats, str], Floats]] = {"bilinear": bilin
 
 def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
     """Distance from the left and from the bottom of the image, in texels."""
-    inside = uv - np.floor(uv) if wrap == "repeat" else np.clip(uv, 0, 1)
+    if wrap == "clamp":
+        inside = np.clip(uv, 0, 1)
+    else:
+        inside = uv - np.floor(uv)
+        if wrap == "mirror":
+            inside = np.where(np.floor(uv) % 2 == 1, 1 - inside, inside)
     height, width = image.shape[:2]
     return inside[:, 0] * F(width), inside[:, 1] * F(height)
 
@@ -68,7 +73,7 @@ def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
 def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
     """Column or row numbers within the image, of numbers at most one beyond it."""
     whole = number.astype(np.int64)
-    if wrap == "clamp":
+    if wrap != "repeat":  # beyond the border of a mirrored image its own texels come again
         return np.clip(whole, 0, count - 1)
     return whole + count * (whole < 0) - count * (whole >= count)
 
@@ -107,6 +112,14 @@ def parameter_range(model: IlluminationModel, path: str) -> Range:
     return Range(width, low, LARGEST if number.le is None else number.le)
 
 
+class Attribute(Record):
+    """Values at the World's vertices that a parameter is interpolated from, within its range."""
+
+    values: Floats  # (V, C)
+    within: Range
+    factor: Floats | None = None  # (C,) what each is multiplied by, where it is not 1
+
+
 class Map(Record):
     """An image that a parameter is looked up in, within the parameter's range."""
 
@@ -114,13 +127,9 @@ class Map(Record):
     filter: str
     wrap: str
     within: Range
-
-
-class Attribute(Record):
-    """Values at the World's vertices that a parameter is interpolated from, within its range."""
-
-    values: Floats  # (V, C)
-    within: Range
+    factor: Floats | None = None  # (C,)
+    vertex: Floats | None = None  # (V, C) values at the World's vertices that multiply the texels as well
+    uv: Floats | None = None  # (V, 2) where to look, in place of the meshes' own uv
 
 
 class Varying(Record):
@@ -170,13 +179,19 @@ def varying(
         found = [_lacks(world, value, i, object_names[i], where, within.width) for i in used_by[number]]
         if any(found):
             raise InputError(filter(None, found))
-        if isinstance(value, VertexValues):
-            table = _table(world, value.vertex, used_by[number], within.width)
-            return Attribute(_clipped(table, within, f"vertex values beyond {where}", repairs), within)
-        image = _channels(read(value.texture, value.space), value, within.width, where)
-        return Map(
-            _clipped(image, within, f"texels beyond {where}", repairs), value.filter, value.wrap, within
+        factor = None if value.factor == (1.0, 1.0, 1.0) else np.array(value.factor, F)[: within.width]
+        table, uv = (
+            None if name is None else _table(world, name, used_by[number], width)
+            for name, width in ((value.vertex, within.width), (getattr(value, "uv", None), 2))
         )
+        if table is not None:
+            table = _clipped(table, within, f"vertex values beyond {where}", repairs)
+        if isinstance(value, VertexValues):
+            assert table is not None
+            return Attribute(table, within, factor)
+        image = _channels(read(value.texture, value.space), value, within.width, where)
+        image = _clipped(image, within, f"texels beyond {where}", repairs)
+        return Map(image, value.filter, value.wrap, within, factor, table, uv)
 
     of_material: list[dict[str, Map | Attribute]] = []
     for number, model in enumerate(materials.models):
@@ -222,23 +237,27 @@ def _lacks(
 ) -> str | None:
     """What object number `thing` lacks for a parameter to vary by `value`."""
     mesh = world.placed[thing].mesh
-    if isinstance(value, Texture):
-        if mesh.uvs is not None and mesh.corner_uvs is not None:
-            return None
+    if isinstance(value, Texture) and value.uv is None and (mesh.uvs is None or mesh.corner_uvs is None):
         return (
             f"object {name}: {where} is a texture and the mesh has no uv; export it with uv, or give a value"
         )
-    if value.vertex not in mesh.attributes:
-        known = ", ".join(sorted(mesh.attributes)) or "none"
-        return f"object {name}: {where} wants the vertex attribute '{value.vertex}'; the mesh has: {known}"
-    shape = mesh.attributes[value.vertex].shape
-    if len(shape) == 1 or shape[1] == 1 or (width == 3 and shape[1] >= 3):
-        return None
-    wanted = "a colour" if width == 3 else "a number"
-    return (
-        f"object {name}: {where} is {wanted} and the vertex attribute '{value.vertex}' has {shape[1]} "
-        "numbers per vertex; name another"
-    )
+    kind = "is a colour" if width == 3 else "is a number"
+    for attribute, wants, numbers in (
+        (value.vertex, kind, {1, width}),
+        (getattr(value, "uv", None), "wants uv", {2}),
+    ):
+        if attribute is None:
+            continue
+        if attribute not in mesh.attributes:
+            known = ", ".join(sorted(mesh.attributes)) or "none"
+            return f"object {name}: {where} wants the vertex attribute '{attribute}'; the mesh has: {known}"
+        size = mesh.attributes[attribute][:1].size
+        if size not in numbers and not 1 < max(numbers) < size:
+            return (
+                f"object {name}: {where} {wants} and the vertex attribute '{attribute}' has {size} "
+                "numbers per vertex; name another"
+            )
+    return None
 
 
 def _table(world: World, attribute: str, things: Sequence[int], width: int) -> Floats:
@@ -247,7 +266,7 @@ def _table(world: World, attribute: str, things: Sequence[int], width: int) -> F
     for thing in things:
         placed = world.placed[thing]
         values = placed.mesh.attributes[attribute].reshape(len(placed.mesh.vertices), -1)
-        out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :3] if width == 3 else values
+        out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :width]
     return out
 
 
@@ -327,9 +346,16 @@ def parameters(
             if isinstance(each, Attribute):
                 found = at.interpolate_vertices(world, each.values)
             else:
-                assert uvs is not None
-                uv = surface.uv(world, uvs, at) if uv is None else uv
-                found = FILTERS[each.filter](each.image, uv, each.wrap)
+                if each.uv is not None:
+                    place = at.interpolate_vertices(world, each.uv)
+                else:
+                    assert uvs is not None
+                    place = uv = surface.uv(world, uvs, at) if uv is None else uv
+                found = FILTERS[each.filter](each.image, place, each.wrap)
+                if each.vertex is not None:
+                    found = found * at.interpolate_vertices(world, each.vertex)
+            if each.factor is not None:
+                found = found * each.factor
             key = path, each.within.width
             whole = values.setdefault(key, np.zeros((len(material), each.within.width), F, order="F"))
             whole[lanes] = np.clip(found, F(each.within.low), F(each.within.high))  # sums round beyond

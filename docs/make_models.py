@@ -27,11 +27,11 @@ grain: an object's own (`grain:`), or the direction in which u grows.
 
 Any colour or number marked so may vary over the surface: `{texture: bark.png}` looks it up by uv, and
 `{vertex: color}` interpolates an attribute of the mesh. A texture of a number is data, not a picture:
-`{texture: rough.png, space: linear, channel: g}`. (0, 0) in uv is the lower left corner of the image. Either may
-have a `factor`; a texture may be multiplied by an attribute as well, `{texture: bark.png, vertex: color}`, and
-looked up by another attribute than the mesh's uv, `uv: uv1`. The samples of a pixel average what it covers
-(`film.samples`); there are no smaller copies of the image. Values beyond a parameter's range are clipped to it,
-and the report counts them.
+`{texture: rough.png, space: linear, channel: g}`. (0, 0) in uv is the lower left corner of the image. Either
+may have a `factor`; a texture may be multiplied by an attribute too, `{texture: bark.png, vertex: color}`,
+and looked up by another attribute than the mesh's uv, `uv: uv1`. The samples of a pixel average what it
+covers (`film.samples`); there are no smaller copies of the image. Values beyond a parameter's range are
+clipped to it, and the report counts them.
 
 ```sh
 illum models

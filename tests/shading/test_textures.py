@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import struct
+
 import numpy as np
 import pytest
 
@@ -399,3 +402,64 @@ def test_a_folder_that_was_copied_has_its_own_textures(own, tmp_path, monkeypatc
     again, report = run(copy / "own.yaml", pattern=str(copy / "again.png"))
     assert "store" in {where for reused in report.reused.values() for where in reused.values()}
     assert again[0].read_bytes() == first[0].read_bytes()
+
+
+def glb(path, image, materials):
+    """A GLB of the sheet from -1 to 1 at y = 0, its uv as the plane has them, with an image within."""
+    corners = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], "<f4").tobytes()
+    uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], "<f4").tobytes()  # v downwards
+    faces = np.array([0, 1, 2, 0, 2, 3], "<u2").tobytes()
+    blocks = [corners, uv, faces, image]
+    starts = np.cumsum([0, *map(len, blocks)])
+    document = {
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": int(start), "byteLength": len(block)}
+            for start, block in zip(starts, blocks, strict=False)
+        ],
+        "buffers": [{"byteLength": int(starts[-1])}],
+        "images": [{"bufferView": 3, "mimeType": "image/png"}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"magFilter": 9728}],
+        "materials": materials,
+    }
+    text = json.dumps(document).encode()
+    data = b"".join(blocks)
+    chunks = struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(data)) + b"BIN\0" + data
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+
+
+@pytest.mark.parametrize("image", ["whole", "cut"])
+def test_a_glb_brings_the_images_within(tmp_path, picture, print_, image):
+    (tmp_path / "assets").mkdir()
+    data = print_.read_bytes()
+    print_.unlink()
+    unlit = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 0.5, 1]}
+    materials = [{"pbrMetallicRoughness": unlit, "extensions": {"KHR_materials_unlit": {}}}]
+    glb(tmp_path / "assets" / "sheet.glb", data if image == "whole" else data[:60], materials)
+    path = tmp_path / "scene.yaml"
+    text = SCENE.format(
+        material="{model: lambert}", mesh="{file: assets/sheet.glb, materials: true}", ambient=0
+    )
+    path.write_text(text.replace(", material: printed", ""))
+    layers, repairs = picture(path)
+    level = from_srgb(np.array(200 / 255))
+    if image == "whole":
+        np.testing.assert_allclose(layers["beauty"][0, 0], [level, 0, 0], rtol=1e-5)
+        np.testing.assert_allclose(layers["beauty"][0, 7], [0, level, 0], rtol=1e-5)
+        np.testing.assert_allclose(layers["beauty"][7, 7], [level, level, level / 2], rtol=1e-5)
+        assert not repairs
+    else:
+        np.testing.assert_allclose(layers["beauty"], np.full((8, 8, 3), [1, 1, 0.5]))
+        (what,) = repairs
+        assert what.startswith("textures that cannot be used left out (assets/sheet.glb: images[0]: cannot")
+        assert repairs[what].first == "assets/sheet.glb: materials[0]"

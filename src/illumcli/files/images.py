@@ -11,12 +11,13 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.errors import InputError
+from illumcli.errors import InputError, OutputError
 from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, no_utf8, shown
 from illumcli.memory import refuse_little
 from illumcli.pixels import from_srgb
@@ -35,6 +36,7 @@ _HINTS: Mapping[str, Any] = {
     "colorInteropID": "lin_rec709_scene",
     "DateTime": "",  # no time of day: equal renders are equal files
 }
+_SIGNATURES = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"RIFF": ".webp"}
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
@@ -200,6 +202,25 @@ def read_texture(
     if space == "srgb":
         texels[..., colours] = from_srgb(texels[..., colours])
     return texels
+
+
+def read_embedded_texture(
+    data: bytes, name: str, space: Literal["srgb", "linear"] | None
+) -> NDArray[np.float32]:
+    """`read_texture` of an image that lies within another file; `name` is what it is called in messages.
+
+    OpenImageIO reads files alone: the image stands in a temporary one meanwhile.
+    """
+    suffix = next((suffix for start, suffix in _SIGNATURES.items() if data.startswith(start)), "")
+    try:
+        with NamedTemporaryFile(prefix="illum-", suffix=suffix) as file:
+            file.write(data)
+            file.flush()
+            return read_texture(file.name, space)
+    except OSError as error:
+        raise OutputError(f"{name}: no room to unpack it ({error.strerror}); set TMPDIR") from None
+    except InputError as error:
+        raise InputError([problem.replace(file.name, name) for problem in error.problems]) from None
 
 
 def flip(

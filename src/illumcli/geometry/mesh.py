@@ -46,6 +46,8 @@ class Mesh(Record):
     texture begins as that of the mesh; in a mesh that is kept between runs it starts at the mesh's folder."""
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
     """Material name -> key -> what stands in for the texture there; white where nothing is said."""
+    material_repairs: Repairs = field(default_factory=dict)
+    """What of the library is not as the file says; told where a scene uses it."""
     repairs: Repairs = field(default_factory=dict)
     """What was wrong and put right or left out while reading; places are relative to the mesh's file."""
 

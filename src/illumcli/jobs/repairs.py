@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from illumcli.errors import InputError
-from illumcli.geometry.repairs import HARMLESS, Repairs
+from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, Repairs
 from illumcli.plan.recipes import PURPOSES
 
 
@@ -21,9 +21,10 @@ def told(repairs: Repairs, verbose: bool = True) -> list[str]:
 
 def refuse_repairs(place: str, repairs: Repairs) -> None:
     """Raise InputError where anything needs a repair: every class, its count and its first place."""
-    if repairs:
+    wrong = {what: each for what, each in repairs.items() if what not in APPROXIMATED}
+    if wrong:
         way = "mend it, or leave --strict out"
-        raise InputError([f"{place}: {line}; {way}" for line in told(repairs)])
+        raise InputError([f"{place}: {line}; {way}" for line in told(wrong)])
 
 
 def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:
@@ -35,10 +36,10 @@ def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:
 
 
 def repairs(shared: Mapping[str, Any]) -> Repairs:
-    """What was put right in meshes, baked values and textures."""
+    """What was put right in meshes, their materials, baked values and textures."""
     return {
         what: each
         for name, made in shared.items()
-        if name in ("repairs", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
+        if name in ("repairs", "materials", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
         for what, each in made.repairs.items()
     }

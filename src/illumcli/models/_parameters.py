@@ -21,8 +21,8 @@ class Texture(Description):
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """`bilinear`: between the four texels around. `nearest`: the texel itself."""
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
-    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border. `mirror`: the image again,
-    mirrored every second time."""
+    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border. `mirror`: the image
+    again, every second time mirrored."""
     channel: Literal["r", "g", "b", "a"] = "r"
     """The channel a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
     factor: values.Color = (1.0, 1.0, 1.0)

@@ -284,13 +284,22 @@ class Images(Value):
 
     def __call__(self, path: str, space: Any) -> NDArray[np.float32]:
         """(H, W, C) linear image of a texture of the scene, or of a mesh's own library."""
-        from illumcli.files.images import read_texture
+        if (path, space) not in self.known:
+            self.known[path, space] = self._read(path, space)
+        return self.known[path, space]
+
+    def _read(self, path: str, space: Any) -> NDArray[np.float32]:
+        from illumcli.files.images import read_embedded_texture, read_texture
+        from illumcli.geometry.readers import embedded_image, image_within
         from illumcli.scene.load import resolve
 
-        if (path, space) not in self.known:
-            found = self.contents[path].path if path in self.contents else resolve(self.loaded, path)
-            self.known[path, space] = read_texture(found, space)
-        return self.known[path, space]
+        if path in self.contents:
+            return read_texture(self.contents[path].path, space)
+        if (within := image_within(path)) is None:
+            return read_texture(resolve(self.loaded, path), space)
+        file, number = within
+        data = embedded_image(resolve(self.loaded, file), number)
+        return read_embedded_texture(data, f"{file}: images[{number}]", space)
 
 
 def textures(

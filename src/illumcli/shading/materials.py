@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.geometry.assemble import World
 from illumcli.geometry.mesh import Mesh, Substitute
-from illumcli.geometry.repairs import path_of
+from illumcli.geometry.repairs import Repairs, joined, located, path_of
 from illumcli.models._base import IlluminationModel
 from illumcli.records import Record
 
@@ -89,6 +90,8 @@ class Materials(Record):
     names: tuple[str, ...]
     numbering: Numbering
     lobes: tuple[Mapping[str, Any], ...]
+    repairs: Repairs = field(default_factory=dict)
+    """What of the meshes' own libraries is not as their files say."""
     substitutes: tuple[Mapping[str, Substitute] | None, ...] = ()
     """By number, of materials of a mesh's own library: what stands in for textures that cannot be used."""
 
@@ -129,7 +132,9 @@ def materials(
             substitutes.append(None)
     names = tuple(token[-1] for token in numbering.tokens)
     lobes = tuple(model.lobes() for model in models)
-    return Materials(tuple(models), names, numbering, lobes, tuple(substitutes))
+    used = dict.fromkeys(token[1] for token in numbering.tokens if token[0] == "mesh")
+    repairs = joined(located(libraries[name].material_repairs, name) for name in used)
+    return Materials(tuple(models), names, numbering, lobes, repairs, tuple(substitutes))
 
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:
@@ -141,10 +146,12 @@ def imported_model(description: Mapping[str, Any], folder: Path) -> Illumination
 
 
 def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> dict[str, Any]:
-    """The keys of a material, the path of each texture in them as `place` has it."""
+    """The keys of a material, or of a part of one, the path of each texture in them as `place` has it."""
     return {
-        key: {**value, "texture": place(value["texture"])}
-        if isinstance(value, Mapping) and "texture" in value
+        key: place(value)
+        if key == "texture"
+        else textures_at(value, place)
+        if isinstance(value, Mapping)
         else value
         for key, value in description.items()
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pkgutil
 import re
 from collections.abc import Iterator
@@ -48,6 +49,27 @@ def _readers() -> dict[str, str]:
     return {f".{name}": name for name in names} | OTHER_SUFFIXES
 
 
+def image_within(texture: str) -> tuple[str, int] | None:
+    """The mesh file and the number of the image in it, where that is what a mesh's own library names as a
+    texture (`a.glb#images[2]`)."""
+    found = re.fullmatch(r"(.*)#images\[(\d+)\]", texture, re.DOTALL)
+    return (found[1], int(found[2])) if found else None
+
+
+def embedded_image(path: Path, number: int) -> bytes:
+    """An image as the mesh file `path` holds it, encoded.
+
+    Raises
+    ------
+    InputError
+        An image that is not there.
+    """
+    from illumcli.geometry.readers.gltf.document import open_document
+    from illumcli.geometry.readers.gltf.materials import image_bytes
+
+    return image_bytes(open_document(path), number)
+
+
 def companions(path: Path) -> list[Path]:
     """The files that a mesh file may name, whether they are there or not: material libraries with their
     textures, buffers; more of them than are read, never fewer, and none outside the folder of the mesh."""
@@ -81,13 +103,22 @@ def _named(path: Path, pattern: re.Pattern[bytes], folder: Path) -> list[Path]:
         return []
     if pattern is _LIBRARY and b"\\" in data:  # a line that goes on in the next
         data = re.sub(rb"\\[ \t]*\r?\n", b" ", data)
-    names = dict.fromkeys(name for said in pattern.findall(data) for name in _names(said))
+    texts = map(_unescaped, pattern.findall(data)) if pattern is _URI else pattern.findall(data)
+    names = dict.fromkeys(name for said in texts for name in _names(said))
     found: dict[Path, None] = {}
     for name in names:
         for start in (path, folder / path.name):
             with suppress(InputError):
                 found[beside(start, name, str(path), folder)] = None
     return list(found)
+
+
+def _unescaped(said: bytes) -> bytes:
+    """A text of JSON without its backslashes."""
+    try:
+        return str(json.loads(b'"' + said + b'"', strict=False)).encode("utf-8", "replace")
+    except ValueError:
+        return said
 
 
 def _names(said: bytes) -> Iterator[str]:

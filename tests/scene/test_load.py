@@ -321,6 +321,18 @@ def test_a_mapping_of_another_kind_replaces(write):
     assert scene.meshes["ball"].file == "ball.obj"
 
 
+def test_a_facet_distribution_or_fresnel_law_of_another_kind_replaces(write):
+    write(
+        "version: 1\nmaterials:\n  m: {model: cook_torrance, distribution: {D: beckmann, m: 0.2},"
+        " fresnel: {F: schlick, f0: 0.1}}\n",
+        "scenes/base.yaml",
+    )
+    text = "extends: base.yaml\nmaterials: {m: {distribution: {D: ggx}, fresnel: {F: dielectric}}}\n"
+    material = load(write(text)).scene.materials["m"]
+    assert (material.distribution.D, material.distribution.alpha) == ("ggx", 0.3)
+    assert (material.fresnel.F, material.fresnel.ior) == ("dielectric", 1.5)
+
+
 def test_of_several_bases_the_later_wins(write):
     write("version: 1\nseed: 1\nfilm: {width: 1, height: 1}\n", "scenes/a.yaml")
     write("seed: 2\nfilm: {width: 2}\n", "scenes/b.yaml")

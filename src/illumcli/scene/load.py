@@ -28,7 +28,7 @@ MAX_EXTENDS = 8  # files, one extending the next
 MAX_FILES = 64
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 STUDIO = Path(__file__).with_name("studio.yaml")
-CHOICES = ("model", "shape", "falloff", "law")  # keys that say what a mapping is
+CHOICES = ("model", "shape", "falloff", "law", "D", "F")  # keys that say what a mapping is
 PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides an object's `mesh`
 
 

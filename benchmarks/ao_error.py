@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from illumcli.jobs.ao_bake import Settings, bare, occluders_of, world_of
+from illumcli.jobs.ao_bake import Settings, bare, occluders_of, surfaces_of
 from illumcli.jobs.ao_bake_cast import Caster
 from illumcli.jobs.ao_bake_points import vertex_points
 from illumcli.visibility.obscurance import Method
@@ -34,9 +34,10 @@ def caster(
     """The bake of a mesh alone, and the points that cast rays."""
     loaded = bare(path, ())
     scene = loaded.scene
-    world = world_of(scene, loaded)
+    surfaces, _ = surfaces_of(scene, loaded)
+    world = surfaces.world
     settings = Settings(sampler=sampler, ground=ground)
-    vertices = vertex_points(world)
+    vertices = vertex_points(surfaces)
     method = Method(256, settings.obscurance().falloff, world.frame.radius, sampler)
     threads = len(os.sched_getaffinity(0))
     quiet = lambda what, done, of: None  # noqa: E731

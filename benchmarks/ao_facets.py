@@ -22,7 +22,7 @@ from illumcli.arrays import F, columns, dot, length, rows, unit
 from illumcli.demand import order
 from illumcli.jobs.ao_bake import bare
 from illumcli.plan.recipes import recipes
-from illumcli.plan.stages import obscurance_normals, ray_origins
+from illumcli.plan.stages import corner_weights, obscurance_normals, ray_origins
 from illumcli.rays.surface import Facets, Hits, facets
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Hemispheres, Method, estimates
@@ -60,13 +60,16 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     """Edges, and the mean jump of w about geometric and about shading normals, and of nothing but noise."""
     loaded = bare(path, ())
     made: dict[str, Any] = {}
-    for step in order(recipes(loaded.scene, loaded), ["world", "tracer", "corner_normals"]):
+    for step in order(
+        recipes(loaded.scene, loaded), ["world", "tracer", "corner_normals", "planar_polygons"]
+    ):
         made[step.makes] = step.make(made)
     world = made["world"]
     sides = []
     for side in shared_edges(world.triangles).T:
         hits, facet = beside(world, side)
-        n = obscurance_normals(["phong"], world, hits, facet, made["corner_normals"])
+        weights = corner_weights(world, hits, made["planar_polygons"])
+        n = obscurance_normals(["phong"], world, weights, facet, made["corner_normals"])
         sides.append((hits, facet, n))
     (_, left, n), (_, right, m) = sides
     polygon = [world.polygons[hits.triangle] for hits, _, _ in sides]

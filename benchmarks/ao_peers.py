@@ -31,7 +31,7 @@ import numpy as np
 from _bench import SMALL, Took, header, took
 from ao_error import caster
 from illumcli.arrays import F
-from illumcli.jobs.ao_bake import Settings, bare, occluders_of, world_of
+from illumcli.jobs.ao_bake import Settings, bare, occluders_of, surfaces_of
 from illumcli.jobs.ao_bake_cast import Caster
 from illumcli.jobs.ao_bake_points import vertex_points
 from illumcli.rays.sampling import GOLDEN
@@ -111,11 +111,12 @@ def at_error(each: Baker, aim: float, what: str) -> float:
 def illum(path: Path, truth: np.ndarray) -> Baker:
     """This program: all that `illum ao-bake` does between reading and writing."""
     loaded = bare(path, ())
-    world = world_of(loaded.scene, loaded)
+    surfaces, _ = surfaces_of(loaded.scene, loaded)
+    world = surfaces.world
     settings = Settings()
 
     def bake(rays: int) -> np.ndarray:
-        points = vertex_points(world).points
+        points = vertex_points(surfaces).points
         method = Method(rays, settings.obscurance().falloff, world.frame.radius)
         quiet = lambda what, done, of: None  # noqa: E731
         made = Caster(points, occluders_of(loaded.scene, world, settings), method, 0, THREADS, quiet)
@@ -133,9 +134,9 @@ def illum(path: Path, truth: np.ndarray) -> Baker:
 def peers(path: Path, own: Caster, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
     """Those that are installed."""
     loaded = bare(path, ())
-    world = world_of(loaded.scene, loaded)
+    world = surfaces_of(loaded.scene, loaded)[0].world
     vertices, faces = np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles)
-    origins, n = np.ascontiguousarray(own.points.origins), np.ascontiguousarray(own.points.n)
+    origins, n = np.ascontiguousarray(starts(own)), np.ascontiguousarray(own.points.n)
     found = []
     for name, make in {
         "Open3D": lambda: Baker("Open3D", open3d_script(vertices, faces, origins, n), truth),
@@ -150,6 +151,13 @@ def peers(path: Path, own: Caster, few: np.ndarray, truth: np.ndarray) -> list[B
     return found
 
 
+def starts(own: Caster) -> np.ndarray:
+    """(M, 3) one of the places around each point from which rays start."""
+    every = np.arange(len(own.points.number))
+    over = own.points.hemispheres(every, np.zeros(len(every)))
+    return over.origins[:: over.starts]
+
+
 def even(own: Caster, few: np.ndarray) -> np.ndarray:
     """What libigl tends to: the share of the hemisphere, without the cosine, that is open."""
     k = np.arange(REFERENCE)
@@ -158,11 +166,10 @@ def even(own: Caster, few: np.ndarray) -> np.ndarray:
     r = np.sqrt(1 - z * z)
     pattern = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1).astype(F)
     turns = np.random.default_rng(2).random(len(few)) * 2 * np.pi
-    out = np.empty(len(few))
+    out, origins = np.empty(len(few)), starts(own)
     for number, (lane, turn) in enumerate(zip(few, turns, strict=True)):
-        part = own.points.take(np.array([lane]))
-        d = pattern @ turned_frame(part.n, np.array([turn], F))[0]
-        o = np.repeat(np.ascontiguousarray(part.origins), REFERENCE, axis=0)
+        d = pattern @ turned_frame(own.points.n[lane : lane + 1], np.array([turn], F))[0]
+        o = np.repeat(np.ascontiguousarray(origins[lane : lane + 1]), REFERENCE, axis=0)
         out[number] = 1 - own.occluders[0].tracer.occluded(o, d).mean()
     return out
 

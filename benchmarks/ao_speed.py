@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from ao_error import caster
-from illumcli.arrays import F
+from illumcli.arrays import F, rows
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.visibility import obscurance
-from illumcli.visibility.obscurance import about, directions
+from illumcli.visibility.obscurance import about, directions, mirror_below
 
 REPEATS = 5
 SAMPLES = 256
@@ -37,16 +37,19 @@ def main() -> None:
     samples = np.full(len(lanes), SAMPLES)
     scene = bake.occluders[0].tracer._scene
     order = bake.order[np.isin(bake.order, lanes)]
-    keys = [stream(bake.seed, f"ao {what} 0") for what in ("turn", "phase")]
+    keys = [stream(bake.seed, f"ao {what} 0") for what in ("turn", "phase", "share")]
     at_once = max(1, obscurance.RAYS_AT_ONCE // SAMPLES)
 
     def prepared(order: np.ndarray, at_once: int) -> list[tuple[np.ndarray, np.ndarray]]:
         calls = []
         for first in range(0, len(order), at_once):
-            part = bake.points.take(order[first : first + at_once])
-            draws = np.stack([unit_interval(hashed(key, part.number)) for key in keys])
-            d = np.ascontiguousarray(directions(about(part.n, draws, bake.method), draws, bake.method))
-            calls.append((np.repeat(np.ascontiguousarray(part.origins), SAMPLES, axis=0), d))
+            part = order[first : first + at_once]
+            draws = np.stack([unit_interval(hashed(key, bake.points.number[part])) for key in keys])
+            over = bake.points.hemispheres(part, draws[2])
+            d = directions(about(over.n, draws, bake.method), draws, bake.method)
+            mirror_below(d, over, bake.method)
+            origins = rows(over.origins, over.of_rays(SAMPLES))
+            calls.append((np.ascontiguousarray(origins), np.ascontiguousarray(d)))
         return calls
 
     def replay(calls: list[tuple[np.ndarray, np.ndarray]]) -> float:

@@ -57,12 +57,25 @@ def test_mitsuba_draws_the_same_picture(root, tmp_path):
     assert float(text.partition("difference of the references: RMSE ")[2].split()[0]) < 0.06
 
 
-def test_w_jumps_less_about_interpolated_normals(root, tmp_path):
+@pytest.fixture
+def torus(tmp_path):
     shape = Torus(segments=24, sides=12).mesh()
     lines = [f"v {x} {y} {z}" for x, y, z in shape.vertices]
     polygons = np.split(shape.corners + 1, shape.starts[1:-1])
-    (tmp_path / "torus.obj").write_text("\n".join(lines + [f"f {' '.join(map(str, p))}" for p in polygons]))
-    row = printed(root, tmp_path, "ao_facets", str(tmp_path / "torus.obj")).splitlines()[-1].split()
+    path = tmp_path / "torus.obj"
+    path.write_text("\n".join(lines + [f"f {' '.join(map(str, p))}" for p in polygons]))
+    return path
+
+
+def test_w_jumps_less_about_interpolated_normals(root, tmp_path, torus):
+    row = printed(root, tmp_path, "ao_facets", str(torus)).splitlines()[-1].split()
     edges, geometric, shading = int(row[1]), float(row[2]), float(row[3])
     assert edges == 20
     assert shading < geometric / 2
+
+
+def test_pictures_with_baked_values_agree_with_those_without(root, tmp_path, torus):
+    row = printed(root, tmp_path, "ao_agree", str(torus)).splitlines()[-1].split()
+    assert float(row[1]) >= 0.7  # of 20
+    assert float(row[2]) < 1.8
+    assert float(row[4]) < 0.05

@@ -97,6 +97,11 @@ class _Distance(click.ParamType):
     type=click.Choice(["r", "g", "b", "a", "rgb"]),
     help="Also as 8-bit vertex colour in this channel of .ply and .glb.",
 )
+@click.option(
+    "--split",
+    is_flag=True,
+    help="Split vertices of .ply with several normals, uv or values, as .glb has them; copies come last.",
+)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, help="Of every random number.")
 @click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
 @overrides_option
@@ -129,8 +134,9 @@ def ao_bake(
 ) -> None:
     """Bake obscurance at every vertex of INPUT, a mesh file or a scene; print the path of every file.
 
-    1 is open. The values keep the order and the number of the file's own vertices, and each says its standard
-    error. An interrupted bake goes on where it stopped when the same command is given again.
+    1 is open. The values keep the order of the file's own vertices, and each says its standard error. A
+    vertex with several normals has their mean, and one value for each where the file can hold it. An
+    interrupted bake goes on where it stopped when the same command is given again.
     """
     from illumcli.cli._progress import reporter
     from illumcli.jobs.ao_bake import Settings, run, write_report

@@ -6,7 +6,7 @@ import hashlib
 import json
 import struct
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any
 
@@ -28,24 +28,39 @@ _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
 
 class Baked(Record):
-    """Obscurance of V vertices, in their file's own order."""
+    """Obscurance of V vertices, in their file's own order, and of C corners where a vertex has several."""
 
     obscurance: NDArray[np.float32]  # (V,) 1 where open
     standard_error: NDArray[np.float32]  # (V,)
     bent_normal: NDArray[np.float32] | None = None  # (V, 3) unit; 0 where nothing is open
     about: Mapping[str, Any] = field(default_factory=dict)
     """Parameters, seed, error, hash of the mesh, version."""
+    corner_obscurance: NDArray[np.float32] | None = None  # (C,) polygon by polygon
+    corner_standard_error: NDArray[np.float32] | None = None  # (C,)
+    corner_bent_normal: NDArray[np.float32] | None = None  # (C, 3)
 
     def of(self, name: str, count: int) -> NDArray[np.float32] | None:
         """(V,) values of the mesh of `count` vertices, in a bake of several that of the object `name`; None
         where there is none that long."""
-        if len(self.obscurance) == count:
-            return self.obscurance
+        return self._part(self.obscurance, "vertices", name, count)
+
+    def of_corners(self, name: str, corners: NDArray[np.int32], count: int) -> NDArray[np.float32] | None:
+        """(C,) the same at the mesh's corners, (C,) vertex numbers: their own values, else the vertices'."""
+        values, own = self.of(name, count), None
+        if self.corner_obscurance is not None:
+            own = self._part(self.corner_obscurance, "corners", name, len(corners))
+        return values[corners] if own is None and values is not None else own
+
+    def _part(
+        self, values: NDArray[np.float32], what: str, name: str, count: int
+    ) -> NDArray[np.float32] | None:
+        if len(values) == count:
+            return values
         first = 0
-        for own, vertices in dict(self.about.get("vertices", {})).items():
-            if own == name and vertices == count:
-                return self.obscurance[first : first + count]
-            first += vertices
+        for own, size in dict(self.about.get(what, {})).items():
+            if own == name and size == count:
+                return values[first : first + count]
+            first += size
         return None
 
     def hashes(self) -> list[str]:
@@ -53,9 +68,14 @@ class Baked(Record):
         return list(dict(self.about.get("meshes", {})).values())
 
     def columns(self) -> dict[str, NDArray[np.float32]]:
-        """What is written, by name."""
+        """What is written of every vertex, by name."""
         found = {"obscurance": self.obscurance, "standard_error": self.standard_error}
         return found if self.bent_normal is None else {**found, "bent_normal": self.bent_normal}
+
+    def corner_columns(self) -> dict[str, NDArray[np.float32]]:
+        """What is written of every corner, by name; nothing where no vertex has several values."""
+        names = ("corner_obscurance", "corner_standard_error", "corner_bent_normal")
+        return {name: values for name in names if (values := getattr(self, name)) is not None}
 
 
 class Shape(Record):
@@ -79,9 +99,10 @@ def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts:
 
 
 def write_npz(path: Path, baked: Baked) -> None:
-    """The arrays of `Baked.columns` and `about`, JSON as text."""
+    """The arrays of `Baked.columns` and `Baked.corner_columns`, and `about`, JSON as text."""
+    arrays: dict[str, Any] = {**baked.columns(), **baked.corner_columns()}
     with Part(path) as part, part.path.open("wb") as file:
-        np.savez(file, **baked.columns(), about=np.array(json.dumps(baked.about)))  # type: ignore[arg-type]
+        np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
 
 
 def read_npz(path: Path) -> Baked:
@@ -94,14 +115,17 @@ def read_npz(path: Path) -> Baked:
     """
     try:
         with np.load(path, allow_pickle=False) as data:
-            w, error = (np.asarray(data[name], np.float32) for name in ("obscurance", "standard_error"))
-            bent = np.asarray(data["bent_normal"], np.float32) if "bent_normal" in data else None
+            names = [part.name for part in fields(Baked) if part.name != "about" and part.name in data]
+            arrays = {name: np.asarray(data[name], np.float32) for name in names}
             about = json.loads(str(data["about"])) if "about" in data else {}
+            made = Baked(**arrays, about=about)
     except Exception as why:  # zipfile, numpy and json each have their own
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
-    if w.ndim != 1 or error.shape != w.shape or not np.isfinite(w).all() or (w < 0).any() or (w > 1).any():
+    values = [made.obscurance, *(() if made.corner_obscurance is None else (made.corner_obscurance,))]
+    sound = all(w.ndim == 1 and np.isfinite(w).all() and (w >= 0).all() and (w <= 1).all() for w in values)
+    if not sound or made.standard_error.shape != made.obscurance.shape:
         raise InputError(f"{path}: obscurance must be one number from 0 to 1 per vertex; bake it again")
-    return Baked(w, error, bent, about)
+    return made
 
 
 def read_content(path: Path) -> str | None:

@@ -19,38 +19,40 @@ from illumcli.arrays import F, columns, cross, rows, unit
 from illumcli.demand import order
 from illumcli.errors import InputError, OutputError
 from illumcli.files.vertex_data import (
-    STANDARD,
     SUFFIXES,
     Baked,
     Shape,
     add_to_glb,
-    free_name,
     mesh_hash,
     read_content,
     write_glb,
     write_npz,
     write_ply,
 )
-from illumcli.geometry.assemble import World, cofactors
-from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.repairs import Repairs
 from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders, PartFile
-from illumcli.jobs.ao_bake_points import Vertices, vertex_points
+from illumcli.jobs.ao_bake_points import Surfaces, Vertices, vertex_points
+from illumcli.jobs.ao_bake_shapes import shapes_of
+from illumcli.jobs.ao_bake_values import baked_values
 from illumcli.jobs.render import peak_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs_data
+from illumcli.plan import stages
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Value
 from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.visibility.horizon import Horizon
-from illumcli.visibility.obscurance import Errors, Method
+from illumcli.visibility.obscurance import Method
 
 Progress = Callable[[str, int, int], None]
 
 GROUND_GAP = 1e-4
 """How far the added ground lies below the lowest point, in radii: what stands on it is closed below."""
 GROUND_SIZE = 1e3
+DARK, MOSTLY = 0.01, 0.9
+"""Where a larger share of the values is lower, the mesh is taken to be turned inside out."""
 
 
 class Settings(Value):
@@ -66,6 +68,7 @@ class Settings(Value):
     ground: str | None = None  # up axis
     bent_normal: bool = False
     channel: str | None = None
+    split: bool = False  # vertices of a PLY
     seed: int = 0
 
     def obscurance(self) -> Obscurance:
@@ -138,13 +141,16 @@ def run(
         Before anything is baked, where it can be known then.
     """
     check_outputs(outputs)
+    if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
+        raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
     clock = _Clock()
     loaded = bare(path, overrides) if path.suffix.lower() in MESH_SUFFIXES else load(path, overrides)
     scene = loaded.scene
-    world, repairs = world_of(scene, loaded)
+    surfaces, repairs = surfaces_of(scene, loaded)
+    world = surfaces.world
     meshes = [placed.mesh for placed in world.placed]
     hashes = [mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes]
-    content = content_hash(scene, hashes, settings)
+    content = content_hash(scene, hashes, surfaces.normals, settings)
     threads = threads or len(os.sched_getaffinity(0))
     report = Report(str(path), content, settings.seed, threads, target_error=settings.target_error)
     report.vertices, report.triangles = len(world.vertices), len(world.triangles)
@@ -156,7 +162,7 @@ def run(
     clock.lap(report, "read")
     if due:
         part = due[0].with_name(f".{due[0].name}.unfinished")
-        baked = bake(scene, world, settings, threads, progress, report, part, clock)
+        baked = bake(scene, surfaces, settings, threads, progress, report, part, clock)
         about = {
             "content": content,
             "version": __version__,
@@ -164,6 +170,9 @@ def run(
             "meshes": dict(zip(scene.object_names(), hashes, strict=True)),
             "vertices": {
                 name: len(mesh.vertices) for name, mesh in zip(scene.object_names(), meshes, strict=True)
+            },
+            "corners": {
+                name: len(mesh.corners) for name, mesh in zip(scene.object_names(), meshes, strict=True)
             },
             "parameters": parameters(settings),
             "seed": settings.seed,
@@ -178,12 +187,16 @@ def run(
     return list(outputs), report
 
 
-def world_of(scene: Scene, loaded: Loaded) -> tuple[World, Repairs]:
-    """The scene's meshes in their places, made as a render makes them, and what was put right in them."""
+def surfaces_of(scene: Scene, loaded: Loaded) -> tuple[Surfaces, Repairs]:
+    """The scene's meshes in their places, made as a render makes them, and the normals that w is taken about;
+    what was put right."""
     buffers: dict[str, Any] = {}
-    for step in order(recipes(scene, loaded), ["world", "repairs"]):
+    for step in order(recipes(scene, loaded), ["world", "corner_normals", "repairs"]):
         buffers[step.makes] = step.make(buffers)
-    return buffers["world"], buffers["repairs"].repairs
+    world, normals = buffers["world"], buffers["corner_normals"]
+    if scene.obscurance is not None and scene.obscurance.about == "geometric":
+        normals = stages.corner_normals(("flat",) * len(world.placed), buffers["meshes"], world)
+    return Surfaces(world, normals), buffers["repairs"].repairs
 
 
 def check_outputs(outputs: Sequence[Path]) -> None:
@@ -211,13 +224,16 @@ def parameters(settings: Settings) -> dict[str, Any]:
     return {**vars(settings), "falloff": dict(settings.falloff), "occluders": list(settings.occluders)}
 
 
-def content_hash(scene: Scene, hashes: Sequence[str], settings: Settings) -> str:
+def content_hash(scene: Scene, hashes: Sequence[str], normals: CornerVectors, settings: Settings) -> str:
     """Of all that the values and the files depend on."""
     placed = [dict(thing.transform) for thing in scene.objects]
     text = json.dumps(
         [__version__, parameters(settings), list(hashes), placed, scene.object_names()], default=str
     )
-    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+    digest = hashlib.blake2b(text.encode(), digest_size=16)
+    for array in (normals.values, normals.index):
+        digest.update(np.ascontiguousarray(array.T).data)
+    return digest.hexdigest()
 
 
 def is_kept(path: Path, content: str, force: bool) -> bool:
@@ -237,7 +253,7 @@ def is_kept(path: Path, content: str, force: bool) -> bool:
 
 def bake(
     scene: Scene,
-    world: World,
+    surfaces: Surfaces,
     settings: Settings,
     threads: int,
     progress: Progress,
@@ -246,6 +262,7 @@ def bake(
     clock: _Clock,
 ) -> Baked:
     """Obscurance of every vertex of the world."""
+    world = surfaces.world
     occluders = occluders_of(scene, world, settings)
     wanted = settings.obscurance()
     method = Method(settings.samples, wanted.falloff, world.frame.radius, wanted.sampler, wanted.faces)
@@ -253,15 +270,16 @@ def bake(
     if settings.method == "fit":
         from illumcli.jobs.ao_bake_fit import fitted
 
-        made = fitted(world, occluders, method, settings.seed, threads, progress, report.rays)
+        made = fitted(surfaces, occluders, method, settings.seed, threads, progress, report.rays)
         say_vertices(report, made.vertices)
         report.open, report.cast, report.samples = made.open, made.points, {settings.samples: made.points}
         report.rmse = (
             float(np.sqrt(np.mean(np.square(made.error, dtype=np.float64)))) if len(made.error) else 0.0
         )
+        say_dark(report, made.w)
         clock.lap(report, "cast")
-        return Baked(made.w, made.error)
-    vertices = vertex_points(world)
+        return baked_values(made.vertices, made.w, made.error, None)
+    vertices = vertex_points(surfaces)
     caster = Caster(vertices.points, occluders, method, settings.seed, threads, progress)
     say_vertices(report, vertices)
     clock.lap(report, "points")
@@ -289,7 +307,14 @@ def bake(
     report.rays = dict(caster.rays)
     count, points = np.unique(samples, return_counts=True)
     report.samples = dict(zip(count.tolist(), points.tolist(), strict=True))
-    return spread(vertices.source, vertices.points.n, lanes, samples, found, errors)
+    w, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
+    w[lanes], error[lanes] = found.w, errors.at(found.unevenness, samples)
+    bent = None
+    if found.bent is not None:
+        bent = vertices.points.n.copy()
+        bent[lanes] = found.bent
+    say_dark(report, w)
+    return baked_values(vertices, w, error, bent)
 
 
 def say_vertices(report: Report, vertices: Vertices) -> None:
@@ -298,17 +323,14 @@ def say_vertices(report: Report, vertices: Vertices) -> None:
     report.copies = vertices.copies
 
 
-def spread(
-    source: NDArray[np.int64], n: Any, lanes: NDArray[np.int64], samples: Any, found: Any, errors: Errors
-) -> Baked:
-    """From the points that were asked to all vertices: a vertex without a point is open, its error 0."""
-    w, error = np.ones(len(n) + 1, F), np.zeros(len(n) + 1, F)  # the last row is for source -1
-    w[lanes], error[lanes] = found.w, errors.at(found.unevenness, samples)
-    if found.bent is None:
-        return Baked(w[source], error[source])
-    bent = np.concatenate([n, np.zeros((1, 3), F)])
-    bent[lanes] = found.bent
-    return Baked(w[source], error[source], bent[source])
+def say_dark(report: Report, w: NDArray[np.float32]) -> None:
+    """Warn where next to nothing is open, as in a mesh that is turned inside out."""
+    dark = float(np.mean(w < DARK)) if len(w) else 0.0
+    if dark > MOSTLY:
+        report.warnings.append(
+            f"{dark:.0%} of the values are 0: the polygons seem to face inwards; turn their winding around, "
+            "or give the file outward normals"
+        )
 
 
 def occluders_of(scene: Scene, world: World, settings: Settings) -> list[Occluders]:
@@ -375,62 +397,25 @@ def write(
 ) -> None:
     """All files of a bake."""
     alone = path.suffix.lower() if path.suffix.lower() in MESH_SUFFIXES else ""
-    shapes: list[Shape] | None = None
+    made: dict[bool, tuple[list[Shape], Baked]] = {}
+
+    def shapes(divided: bool) -> tuple[list[Shape], Baked]:
+        if divided not in made:
+            made[divided] = shapes_of(scene.object_names(), world, baked, divided, report.left_out)
+        return made[divided]
+
     for each in outputs:
         kind = each.suffix.lower()
         if kind == ".npz":
             write_npz(each, baked)
-            continue
-        if shapes is None:
-            shapes = [shape_of(scene, world, i, report) for i in range(len(world.placed))]
-        if kind == ".ply":
-            write_ply(each, shapes, baked, path if alone == ".ply" else None, settings.channel)
+        elif kind == ".ply" and alone == ".ply" and not settings.split:
+            write_ply(each, [], baked, path, settings.channel)
+        elif kind == ".ply":
+            write_ply(each, *shapes(settings.split), None, settings.channel)
         elif alone == ".glb" and settings.channel is None and (counts := primitives(path)):
             add_to_glb(each, path, counts, baked)
         else:
-            write_glb(each, shapes, baked, settings.channel)
-
-
-def shape_of(scene: Scene, world: World, number: int, report: Report) -> Shape:
-    """An object in its place, with what belongs to its vertices alone."""
-    placed = world.placed[number]
-    mesh, linear = placed.mesh, placed.matrix[:3, :3]
-    name = scene.object_names()[number]
-    attributes: dict[str, NDArray[Any]] = {}
-    for own_name, values in mesh.attributes.items():
-        is_color = own_name == "color" and values.ndim == 2
-        taken = () if is_color else (*STANDARD, *attributes)
-        attributes[free_name(own_name, taken)] = values
-    for kind, table, index in (
-        ("normal", mesh.normals, mesh.corner_normals),
-        ("uv", mesh.uvs, mesh.corner_uvs),
-    ):
-        if table is None or index is None:
-            continue
-        own = per_vertex(mesh, table, index)
-        if own is None:
-            report.left_out.append(f"{name}: {kind}s that differ between the polygons of a vertex")
-            continue
-        turned = own @ cofactors(linear).T * (-1 if placed.mirrored else 1) if kind == "normal" else own
-        attributes[kind] = turned
-    mine = world.objects == number
-    triangles = world.triangles[mine] - np.int32(placed.first_vertex)
-    if placed.reversed is not None:  # files keep the order of their corners
-        other_way = placed.reversed[world.polygons[mine] - placed.first_polygon]
-        triangles[other_way] = triangles[other_way, ::-1]
-    vertices = mesh.vertices @ linear.T + placed.matrix[:3, 3]
-    return Shape(name, vertices, mesh.corners, mesh.starts, triangles, attributes)
-
-
-def per_vertex(
-    mesh: Mesh, table: NDArray[np.float64], index: NDArray[np.int32]
-) -> NDArray[np.float64] | None:
-    """(V, k) rows of a table that corners refer to, by vertex; None where corners of a vertex disagree."""
-    row = np.full(len(mesh.vertices), -1, np.int64)
-    row[mesh.corners] = index
-    if (index < 0).any() or not np.array_equal(table[row[mesh.corners]], table[index]):
-        return None
-    return np.where((row >= 0)[:, None], table[row], 0.0)
+            write_glb(each, *shapes(True), settings.channel)
 
 
 def primitives(path: Path) -> list[tuple[int, int, int]]:

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, columns, cross, dot, rows
 from illumcli.files.atomic import refused
 from illumcli.geometry.order import compact
 from illumcli.jobs.ao_bake_points import Points
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
-from illumcli.visibility.horizon import Horizon
-from illumcli.visibility.obscurance import Errors, Estimates, Hemispheres, Method, estimates
+from illumcli.visibility.horizon import Horizon, facet_planes
+from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
 
 RAYS = 1 << 18
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
@@ -77,20 +77,31 @@ class Caster:
     order: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.order = compact(self.points.origins)
+        self.order = compact(self.points.position)
 
     def open(self) -> NDArray[np.bool_]:
-        """(M,) True where nothing is above a point's tangent plane."""
-        out = np.zeros(len(self.points.number), bool)
-        pieces = list(self._pieces(np.arange(len(out)), np.full(len(out), RAYS // LANES)))
+        """(M,) True where nothing is above the triangles that a point's rays leave."""
+        world = self.points.world
+        corner = [columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+        area = cross(corner[1] - corner[0], corner[2] - corner[0])
+        along = compact(corner[0] + corner[1] + corner[2])
+        along = along[dot(area, area)[along] > 0]
+        clear = np.zeros(len(area), bool)
+        pieces = [
+            Piece(own[first : first + LANES], RAYS // LANES, number)
+            for number in range(len(world.placed))
+            if (own := along[world.objects[along] == number]).size
+            for first in range(0, len(own), LANES)
+        ]
 
         def ask(piece: Piece, stop: threading.Event) -> NDArray[np.bool_]:
-            part = self.points.take(piece.lanes)
-            return self.occluders[piece.thing].horizon.clears(part.origins, part.n)
+            triangle = piece.lanes.astype(np.int32)
+            planes = facet_planes(world, triangle, np.zeros(len(triangle), bool))
+            return self.occluders[piece.thing].horizon.clears(*planes)
 
         for number, found in self._run("horizon", pieces, ask):
-            out[pieces[number].lanes] = found
-        return out
+            clear[pieces[number].lanes] = found
+        return self.points.above(clear)
 
     def cast(
         self,
@@ -112,17 +123,17 @@ class Caster:
         """
         count = len(self.points.number)
         out = Cast(np.ones(count, F), np.zeros(count, F), np.zeros((count, 3), F) if bent else None)
-        keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase")]
+        keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase", "share")]
         pieces = list(self._pieces(lanes, samples))
 
         def ask(piece: Piece, stop: threading.Event) -> tuple[Estimates, int]:
-            part = self.points.take(piece.lanes)
-            draws = np.stack([unit_interval(hashed(key, part.number)) for key in keys])
+            number = self.points.number[piece.lanes]
+            draws = np.stack([unit_interval(hashed(key, number)) for key in keys])
+            over = self.points.hemispheres(piece.lanes, draws[2])
             around = self.occluders[piece.thing]
             tracer = around.tracer.counting(stop)
             method = replace(self.method, samples=piece.samples, facets=around.facets)
-            over = Hemispheres(part.n, part.origins)
-            return estimates(tracer, over, draws, method, bent=bent), tracer.rays
+            return estimates(tracer, over, draws[:2], method, bent=bent), tracer.rays
 
         done = kept.read(pieces, out) if kept is not None else set()
         waiting = [piece for number, piece in enumerate(pieces) if number not in done]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F
 from illumcli.geometry.assemble import World
 from illumcli.jobs.ao_bake_cast import Caster, Occluders
-from illumcli.jobs.ao_bake_points import AreaPoints, Vertices, area_points, vertex_points
+from illumcli.jobs.ao_bake_points import AreaPoints, Surfaces, Vertices, area_points, vertex_points
 from illumcli.records import Record
 from illumcli.visibility.obscurance import Method
 
@@ -33,17 +33,17 @@ STEPS, ENOUGH = 500, 1e-6
 
 
 class Fit(Record):
-    """Vertex values by least squares and what it took."""
+    """Values of the points at vertices by least squares, and what it took."""
 
-    w: NDArray[np.float32]
-    error: NDArray[np.float32]
+    w: NDArray[np.float32]  # (M,)
+    error: NDArray[np.float32]  # (M,)
     points: int
     open: int
     vertices: Vertices
 
 
 def fitted(
-    world: World,
+    surfaces: Surfaces,
     occluders: Sequence[Occluders],
     method: Method,
     seed: int,
@@ -53,33 +53,30 @@ def fitted(
 ) -> Fit:
     """As many rays as `method.samples` per vertex, spread over the area.
 
-    The error of a vertex is how far what is left over in eight parts of the points would move it: it holds
+    The error of a value is how far what is left over in eight parts of the points would move it: it holds
     the error of the rays and that of where the points lie.
     """
-    vertices = vertex_points(world)
+    vertices = vertex_points(surfaces)
     per_point = min(RAYS_PER_POINT, method.samples)
     count = len(vertices.points.number) * method.samples // per_point
-    area = area_points(world, max(count, PARTS), seed)
+    area = area_points(surfaces, max(count, PARTS), seed)
     own = Method(per_point, method.falloff, method.radius, method.sampler, method.faces)
-    caster = Caster(area.points, occluders, own, seed, threads, progress)
+    caster = Caster(area, occluders, own, seed, threads, progress)
     is_open = caster.open()
     lanes = np.flatnonzero(~is_open)
     found = caster.cast("values", lanes, np.full(len(lanes), per_point), 0)
     w = np.ones(len(is_open))
     w[lanes] = found.w
     rays.update(caster.rays)
-    system = System.of(world, area, vertices)
+    system = System.of(surfaces.world, area, vertices)
     mean = system.solve(system.side(area, w)[:, None])[:, 0]
     rest = w - system.at(area, mean)
     part = np.arange(len(w)) % PARTS
     sides = np.stack([system.side(area, np.where(part == k, rest, 0.0)) for k in range(PARTS)], axis=1)
     spread = np.sqrt(np.square(system.solve(sides)).sum(axis=1) * PARTS / (PARTS - 1))
-    has = vertices.source >= 0
-    row = np.maximum(vertices.source, 0)
-    value = np.where(has, np.clip(mean[row], 0, 1), 1.0).astype(F)
-    error = np.where(has & (not is_open.all()), spread[row], 0.0).astype(F)
+    value, error = np.clip(mean, 0, 1).astype(F), spread.astype(F)
     if is_open.all():
-        value = np.ones_like(value)
+        value, error = np.ones_like(value), np.zeros_like(error)
     return Fit(value, error, len(lanes), int(is_open.sum()), vertices)
 
 
@@ -93,7 +90,7 @@ class System(Record):
     @classmethod
     def of(cls, world: World, area: AreaPoints, vertices: Vertices) -> System:
         """The blocks: area times products of barycentric weights, and a little smoothing along edges."""
-        corner = np.maximum(vertices.source[world.triangles], 0)
+        corner = np.maximum(vertices.row[world.corners], 0)
         weights = barycentric(area)
         block = np.empty((len(corner), 3, 3))
         for i in range(3):
@@ -106,7 +103,7 @@ class System(Record):
         return cls(corner, block, len(vertices.points.number))
 
     def side(self, area: AreaPoints, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(V,) right side for values at the points."""
+        """(M,) right side for values at the points."""
         out = np.zeros(self.count)
         for k, weight in enumerate(barycentric(area)):
             out += np.bincount(self.corner[area.triangle, k], area.area * weight * values, self.count)
@@ -119,7 +116,7 @@ class System(Record):
         return a + b + c
 
     def times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(V, k) the matrix times k vectors."""
+        """(M, k) the matrix times k vectors."""
         made = np.einsum("tij,tjk->tik", self.block, x[self.corner])
         out = np.empty_like(x)
         index = self.corner.ravel()
@@ -128,7 +125,7 @@ class System(Record):
         return out
 
     def solve(self, sides: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(V, k) by conjugate gradients, each column its own, preconditioned by the diagonal."""
+        """(M, k) by conjugate gradients, each column its own, preconditioned by the diagonal."""
         diagonal = np.bincount(self.corner.ravel(), np.einsum("tii->ti", self.block).ravel(), self.count)[
             :, None
         ]

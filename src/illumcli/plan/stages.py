@@ -158,14 +158,14 @@ def facet_normals(world: World) -> Vectors:
 
 
 class BakedValues(Record):
-    """Obscurance that was baked at the world's vertices."""
+    """Obscurance that was baked at the world's corners."""
 
-    values: NDArray[np.float32]  # (V,) NaN on meshes that have none
+    values: CornerVectors  # (C, 1) NaN on meshes that have none
     repairs: Repairs
 
 
 def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedValues:
-    """The values in each object's file.
+    """The values in each object's file: of its corners where it has them, else of its vertices.
 
     Raises
     ------
@@ -174,13 +174,13 @@ def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedV
     """
     from illumcli.files.vertex_data import mesh_hash, read_npz
 
-    values = np.full(len(world.vertices), np.nan, F)
+    values = np.full((sum(len(placed.mesh.corners) for placed in world.placed), 1), np.nan, F)
     repairs: dict[str, Repair] = {}
     for (name, file), placed in zip(files, world.placed, strict=True):
         if file is None:
             continue
         mesh, found = placed.mesh, read_npz(file.path)
-        own = found.of(name, len(mesh.vertices))
+        own = found.of_corners(name, mesh.corners, len(mesh.vertices))
         if own is None:
             raise InputError(
                 f"{file.path}: holds {len(found.obscurance)} values, the mesh of {name} has "
@@ -188,8 +188,8 @@ def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedV
             )
         if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in found.hashes():
             note(repairs, "values that were baked for another mesh of as many vertices", str(file.path))
-        values[placed.first_vertex : placed.first_vertex + len(own)] = own
-    return BakedValues(values, repairs)
+        values[placed.first_corner : placed.first_corner + len(own), 0] = own
+    return BakedValues(CornerVectors(values, np.arange(len(values), dtype=np.int32)), repairs)
 
 
 def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> CornerVectors:
@@ -681,7 +681,7 @@ def obscurance(
 
 def baked_obscurance(world: World, baked: BakedValues, corner_weights: CornerWeights) -> Lanes:
     """(M,) baked values interpolated over polygons; NaN on meshes that have none."""
-    w: Lanes = corner_weights.interpolate_vertices(world, baked.values[:, None])[:, 0]
+    w: Lanes = corner_weights.interpolate(world, baked.values)[:, 0]
     return w
 
 

@@ -231,16 +231,24 @@ class OpenFacets:
         """Origins and unit normals of the planes of these rows, (64 K, 3) each, lifted as rays are."""
         side, triangle = np.divmod(_numbers(blocks), self._blocks * GROUP)
         triangle = np.minimum(triangle, len(self._world.triangles) - 1).astype(np.int32)
-        zero = np.zeros(len(triangle), F)
-        facet = facets(self._world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
-        n = facing(facet.ng, side > 0).astype(np.float64)
-        v0 = facet.position
-        others = (rows(self._world.vertices, self._world.triangles[:, k].take(triangle)) for k in (1, 2))
-        lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
-        # no ray starts lower: |ng|.|p| of `lifted` is at least the distance of the plane from the centre
-        step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
-        o = v0 + step[:, None] * n
-        return np.ascontiguousarray(o), np.ascontiguousarray(n)
+        return facet_planes(self._world, triangle, side > 0)
+
+
+def facet_planes(
+    world: World, triangle: Ids, behind: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origins and unit normals of the planes of N triangles, (N, 3) each, on the side that is seen, lifted as
+    rays are."""
+    zero = np.zeros(len(triangle), F)
+    facet = facets(world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
+    n = facing(facet.ng, behind).astype(np.float64)
+    v0 = facet.position
+    others = (rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
+    lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
+    # no ray starts lower: |ng|.|p| of `lifted` is at least the distance of the plane from the centre
+    step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
+    o = v0 + step[:, None] * n
+    return np.ascontiguousarray(o), np.ascontiguousarray(n)
 
 
 def _numbers(blocks: NDArray[np.int64]) -> NDArray[np.int64]:

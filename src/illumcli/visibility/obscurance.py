@@ -27,6 +27,9 @@ RAYS_AT_ONCE = 1 << 17
 origins and answers would stay in it; with two threads a fifth."""
 MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
+STRIDE = 13
+"""From the start of one ray to that of the next: neither neighbours on a spiral nor rays of one ring share
+theirs, for 32 starts."""
 GRAZING = 2.0**-20
 """Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
 
@@ -48,20 +51,39 @@ class Method(Record):
 
 
 class Hemispheres(Record):
-    """What the rays of M points leave, and about what."""
+    """What the rays of M points leave, and about what.
+
+    Ray i of a point starts at number i STRIDE of the E starts that it has, modulo E.
+    """
 
     n: Vectors  # (M, 3) float32 unit shading normals, the axes
-    origins: Vectors  # (M, 3) float32 off the surface, in radii from the scene's centre
+    origins: Vectors  # (M * E, 3) float32 off the surface, in radii; the starts of a point follow each other
     ng: Vectors | None = None
-    """(M, 3) float32 unit normals of the triangles that the rays leave; None where they are `n`."""
+    """(M * E, 3) float32 unit normals of the triangles that the rays leave; None where they are `n`."""
+
+    @property
+    def starts(self) -> int:
+        """E, of each point."""
+        return len(self.origins) // max(len(self.n), 1)
 
     def take(self, lanes: slice | NDArray[np.int64]) -> Hemispheres:
         """Some of them, in this order."""
+        each = self.starts
+        if isinstance(lanes, slice):
+            own: Any = slice(lanes.start * each, lanes.stop * each)
+        else:
+            own = lanes if each == 1 else (lanes[:, None] * each + np.arange(each)).ravel()
 
-        def part(of: Vectors) -> Vectors:
-            return of[lanes] if isinstance(lanes, slice) else rows(of, lanes)
+        def part(of: Vectors, which: Any) -> Vectors:
+            return of[which] if isinstance(which, slice) else rows(of, which)
 
-        return Hemispheres(part(self.n), part(self.origins), None if self.ng is None else part(self.ng))
+        ng = None if self.ng is None else part(self.ng, own)
+        return Hemispheres(part(self.n, lanes), part(self.origins, own), ng)
+
+    def of_rays(self, samples: int) -> NDArray[np.int64]:
+        """(M * samples,) the start of every ray, one point after the other."""
+        dealt = np.arange(samples) * STRIDE % self.starts
+        return (np.arange(len(self.n))[:, None] * self.starts + dealt).ravel()
 
 
 class Estimates(Record):
@@ -129,8 +151,9 @@ def estimates(
         own = over.take(part)
         d = directions(frames[part], draws[:, part], method)
         if own.ng is not None:
-            mirror_below(d, own.n, own.ng, method)
-        mu = seen(tracer, own.origins, d, method).reshape(-1, method.samples)
+            mirror_below(d, own, method)
+        origins = own.origins if own.starts == 1 else rows(own.origins, own.of_rays(method.samples))
+        mu = seen(tracer, origins, d, method).reshape(-1, method.samples)
         w[part] = shares(mu)
         if errors:
             uneven[part] = unevenness(mu, method.sampler)
@@ -179,14 +202,18 @@ def neighbours(samples: int) -> list[int]:
 
 
 def seen(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArray[Any]:
-    """(M * samples,) mu along each direction: bool where it is a step, float32 elsewhere."""
+    """(M * samples,) mu along each direction: bool where it is a step, float32 elsewhere.
+
+    There is an origin for every ray, or one for those of each point.
+    """
     reach = method.falloff.reach(method.radius)
     if method.any_hit:
         return ~tracer.occluded(origins, d, np.inf if reach == np.inf else reach / method.radius)
     if method.faces == "count":
         far = tracer.distance(origins, d)
     else:
-        far = facing_distance(tracer, repeated(origins, method.samples), d, method)
+        each = len(d) // max(len(origins), 1)
+        far = facing_distance(tracer, origins if each == 1 else repeated(origins, each), d, method)
     weight = method.falloff.weight(far.astype(np.float64) * method.radius, reach, method.radius)
     return weight > 0.5 if method.falloff.step else weight.astype(F)
 
@@ -222,26 +249,28 @@ def directions(frames: NDArray[np.float32], draws: NDArray[np.float64], method: 
     return out.reshape(3, -1).T
 
 
-def mirror_below(d: Vectors, n: Vectors, ng: Vectors, method: Method) -> None:
+def mirror_below(d: Vectors, over: Hemispheres, method: Method) -> None:
     """Mirror those of the rays `d` that point below the plane of the triangle they leave, in place.
 
     Parameters
     ----------
     d : (M * samples, 3) float32
         The rays of each point, one point after the other.
-    n : (M, 3) float32
-        Unit axes of the points' patterns.
-    ng : (M, 3) float32
-        Unit normals of the triangles.
+    over : Hemispheres
+        With the triangles' normals.
     """
     # the candidates of each point: of a pattern in the order of growing angles only the last
-    number = below_at_most(dot(n, ng), method)
-    point = np.repeat(np.arange(len(n)), number)
-    ray = (point + 1) * method.samples - 1 - np.arange(len(point))
-    ray += np.repeat(np.cumsum(number) - number, number)
+    assert over.ng is not None
+    each = over.starts
+    axes = over.n if each == 1 else repeated(over.n, each)
+    number = below_at_most(dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1), method)
+    point = np.repeat(np.arange(len(over.n)), number)
+    last = np.arange(len(point)) - np.repeat(np.cumsum(number) - number, number)
+    ray = point * method.samples + method.samples - 1 - last
+    start = point if each == 1 else point * each + (method.samples - 1 - last) * STRIDE % each
 
     # those that are below go as far above
-    normal = rows(ng, point)
+    normal = rows(over.ng, start)
     height = dot(rows(d, ray), normal)
     below = np.flatnonzero(height < GRAZING)
     height, ray = height[below], ray[below]

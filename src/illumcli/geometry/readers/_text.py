@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import field
 from functools import cached_property
 from itertools import chain, pairwise
 from pathlib import Path
@@ -13,13 +14,20 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.readers._polygons import Ints
+from illumcli.geometry.repairs import Repair, note
 from illumcli.records import Value
 
 PIECE = 1 << 22  # bytes cut into words at a time: Python's words need ten times the memory of their text
 PADDING = 8  # bytes that may be read behind the start of the last line
 NEWLINE = b"\n"
 
-_COMMENT = re.compile(rb"#[^\n]*")
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+_LONE_RETURN = re.compile(rb"\r(?!\n)")
+_CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
+_NOT_FINITE = re.compile(rb"[-+]?(?:\d+\.#[A-Z]+\d*|nan\(\w*\))", re.IGNORECASE)  # as Microsoft's C writes it
+_COMMENT = re.compile(rb"(?<!\S)#[^\n]*")
+_COMMENT_BEHIND_NUMBER = re.compile(rb"^([ \t]*(?:v[tn]?|f)[ \t][^#\n]*)#[^\n]*", re.M | re.I)
 _BLANKS = re.compile(rb"[ \t\r\v\f]*")
 
 
@@ -32,18 +40,30 @@ class Text(Value):
     path: Path
     raw: bytes  # as in the file, lines ended by \n
     data: bytes
+    repairs: dict[str, Repair] = field(default_factory=dict)
 
     @classmethod
     def of(cls, path: Path, raw: bytes, *, comments: bool = False, continued: bool = False) -> Text:
         """The text `raw`; comments begin with #, a backslash at its end continues a line."""
-        if b"\r" in raw and b"\n" not in raw:
-            raw = raw.replace(b"\r", b"\n")
-        data = raw + b"\n" * PADDING
+        repairs: dict[str, Repair] = {}
+        if raw.startswith(BYTE_ORDER_MARK):
+            note(repairs, "byte order marks left out", ":1")
+            raw = b"   " + raw[3:]
+        if b"\r" in raw and _LONE_RETURN.search(raw):
+            raw = _LONE_RETURN.sub(b"\n", raw)
+        text = raw.rstrip(b"\0\x1a")
+        if len(text) < len(raw):
+            first = f":{1 + text.count(NEWLINE)}"
+            note(repairs, "NUL and Ctrl-Z behind the text left out", first, len(raw) - len(text))
+        data = text + b"\n" * PADDING
+        if b".#" in data or b"nan(" in data:
+            data = _NOT_FINITE.sub(lambda found: b"nan".ljust(len(found[0])), data)
         if comments and b"#" in data:
-            data = _COMMENT.sub(_blank_comment, data)
+            data = _COMMENT.sub(lambda found: NEWLINE * len(found[0]), data)
+            data = _without_comments_behind_numbers(data, raw, repairs)
         if continued and b"\\" in data:
-            data = data.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
-        return cls(path, raw, data)
+            data = _CONTINUED.sub(lambda found: b" " * len(found[0]), data)
+        return cls(path, raw, data, repairs)
 
     @cached_property
     def bytes(self) -> NDArray[np.uint8]:
@@ -61,11 +81,12 @@ class Text(Value):
         return starts[self.bytes[starts] != 10]
 
     def keywords(self, width: int) -> NDArray[np.uint64]:
-        """(L,) the first word of each line, or its first `width` letters, as `keyword` codes it."""
+        """(L,) the first word of each line, or its first `width` letters, small, as `keyword` codes it."""
         code = np.zeros(len(self.starts), np.uint64)
         inside = np.ones(len(self.starts), bool)
         for i in range(width):
             letter = self.bytes[self.starts + i]
+            letter[(letter >= 65) & (letter <= 90)] += 32
             inside &= letter > 32
             code |= np.where(inside, letter, 0).astype(np.uint64) << np.uint64(8 * i)
         return code
@@ -139,15 +160,32 @@ class Block(Value):
             return np.empty(0, np.int64)
         return np.add.reduceat(self.heads, self.starts, dtype=np.int32).astype(np.int64)
 
-    def floats(self) -> NDArray[np.float64]:
-        """Every word as a number in full precision, line after line."""
+    def floats(self, needed: int | None = None) -> NDArray[np.float64]:
+        """Every word as a number in full precision, line after line.
+
+        NaN stands for what is no number, refused among the first `needed` words of a line, or among all.
+        """
         words = chain.from_iterable(map(bytes.split, self._pieces()))
         try:
             if np.any(self.data == ord("_")):  # `float` would skip it
                 raise ValueError
             return np.fromiter(map(float, words), np.float64)
         except ValueError:
-            raise self._bad_number(float) from None
+            return self._floats_among_words(needed)
+
+    def _floats_among_words(self, needed: int | None) -> NDArray[np.float64]:
+        """`floats` of lines that hold other words, too."""
+        edges = pairwise([*self.starts.tolist(), len(self.data)])
+        values = []
+        for line, (start, end) in enumerate(edges):
+            words = self.data[start:end].tobytes().split()
+            for column, word in enumerate(words):
+                number = _is_number(word, float)
+                # control characters part words here, and elsewhere they do not
+                if not number and (needed is None or column < needed or len(words) != self.counts[line]):
+                    raise self._bad_word(line, word, "number")
+                values.append(float(word) if number else np.nan)
+        return np.array(values, np.float64)
 
     def integers(self) -> Ints:
         """Every word as an integer, line after line; one too large for int64 becomes its largest."""
@@ -155,7 +193,7 @@ class Block(Value):
         try:  # older numpy stops at a bad word with a warning alone: the 0 behind all is missing then
             return np.fromstring(self.data.tobytes() + b" 0", np.int64, sep=" ")[:-1].reshape(total)
         except (ValueError, DeprecationWarning):
-            raise self._bad_number(int) from None
+            raise self._bad_integer() from None
 
     def place(self, index: int) -> str:
         """``path:line`` of one of the lines."""
@@ -168,22 +206,32 @@ class Block(Value):
         for start, end in pairwise(edges):
             yield self.data[start:end].tobytes()
 
-    def _bad_number(self, kind: type[int] | type[float]) -> InputError:
-        """The error that names the first word that is no number."""
+    def _bad_integer(self) -> InputError:
+        """The error that names the first word that is no whole number."""
         edges = pairwise([*self.starts.tolist(), len(self.data)])
         lines = (self.data[start:end].tobytes().split() for start, end in edges)
         i, bad = next(
-            (i, word) for i, words in enumerate(lines) for word in words if not _is_number(word, kind)
+            (i, word) for i, words in enumerate(lines) for word in words if not _is_number(word, int)
         )
-        text = bad.decode("utf-8", "replace")
-        return InputError(f"{self.place(i)}: '{text:.40}' is no {_name(kind)}; {_way(bad)}")
+        return self._bad_word(i, bad, "whole number")
+
+    def _bad_word(self, line: int, word: bytes, kind: str) -> InputError:
+        way = "write a decimal point, not a comma" if b"," in word else "export the mesh again"
+        return InputError(f"{self.place(line)}: '{decoded(word):.40}' is no {kind}; {way}")
 
 
-def _blank_comment(found: re.Match[bytes]) -> bytes:
-    """Line ends in place of a comment; a # inside a word begins none."""
-    before = found.string[found.start() - 1 : found.start()]
-    comment = not before or before.isspace()
-    return b"\n" * len(found[0]) if comment else found[0]
+def _without_comments_behind_numbers(data: bytes, raw: bytes, repairs: dict[str, Repair]) -> bytes:
+    """`data` without comments that begin within a word, in lines of numbers; a name may hold a #."""
+    if b"#" not in data:
+        return data
+
+    def blank(found: re.Match[bytes]) -> bytes:
+        lines = "" if what in repairs else f":{1 + raw.count(NEWLINE, 0, found.start())}"
+        note(repairs, what, lines)
+        return found[1] + NEWLINE * (found.end() - found.end(1))
+
+    what = "comments that follow a number without a blank"
+    return _COMMENT_BEHIND_NUMBER.sub(blank, data)
 
 
 def _is_number(word: bytes, kind: type[int] | type[float]) -> bool:
@@ -192,13 +240,3 @@ def _is_number(word: bytes, kind: type[int] | type[float]) -> bool:
     except ValueError:
         return False
     return b"_" not in word
-
-
-def _name(kind: type[int] | type[float]) -> str:
-    return "whole number" if kind is int else "number"
-
-
-def _way(word: bytes) -> str:
-    if b"," in word:
-        return "write a decimal point, not a comma"
-    return "export the mesh again"

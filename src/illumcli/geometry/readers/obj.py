@@ -18,7 +18,6 @@ from __future__ import annotations
 import re
 from dataclasses import field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,39 +32,52 @@ from illumcli.geometry.readers._text import Block, Text, keyword
 from illumcli.geometry.repairs import Repair, joined, note
 from illumcli.records import Value
 
-# statements that hold no polygons and change none; free-form geometry is counted in `repairs`
+# statements that hold no polygons and change none
 _STATE = (
     "mg lod bevel c_interp d_interp shadow_obj trace_obj ctech stech maplib usemap vp cstype deg step bmat "
-    "parm trim hole scrv sp end con call csh"
+    "parm trim hole scrv sp end con"
 )
-_OTHER_SHAPES = {"p": "points", "l": "lines", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
+_LEFT_OUT = {
+    "p": "points left out",
+    "l": "lines left out",
+    "curv": "curves left out",
+    "curv2": "curves left out",
+    "surf": "surfaces left out",
+    "call": "other files and commands left out",
+    "csh": "other files and commands left out",
+}
+NOWHERE = 2**62  # a row that no file has
+_UNKNOWN = "unknown statements left out"
 
 
 def read(path: Path) -> Mesh:
     """The polygons of an OBJ file, and the materials of its libraries.
 
-    Vertex colours (three more numbers behind a position) are taken for sRGB, in 0..1 or 0..255. `o` and `g`
-    both begin a group. Display attributes are left out; lines, points and free-form geometry are counted in
-    `repairs`.
+    Vertex colours (three or four more numbers behind a position) are taken for sRGB, in 0..1 or 0..255. `o`
+    and `g` both begin a group. Display attributes are left out; lines, points, free-form geometry and
+    unknown statements are counted in `repairs`, and so is whatever is mended: only what no face could be
+    known from is refused.
     """
     text = Text.of(path, content(path), comments=True, continued=True)
     words = text.keywords(3)
     lines = {word: np.flatnonzero(words == keyword(word)) for word in (b"v", b"vn", b"vt", b"f")}
     known = sum((words == keyword(word) for word in lines), np.zeros(len(words), bool))
     rest = _Statements.of(text, np.flatnonzero(~known))
-    repairs = dict(rest.repairs)
-    vertices, color = _vertices(text.block(lines[b"v"], keyword=1), repairs)
+    repairs = {**text.repairs, **rest.repairs}
+    vertices, attributes = _vertices(text.block(lines[b"v"], keyword=1), repairs)
     uvs = _uvs(text.block(lines[b"vt"], keyword=2))
     normals = _normals(text.block(lines[b"vn"], keyword=2))
     faces = text.block(lines[b"f"], keyword=1)
     references, counts = _references(faces)
 
-    def rows(slot: int, of: bytes, size: int) -> Ints:
-        return _resolved(faces, references[slot], counts, _Rows(lines[of], size, _NAMES[of]))
+    def rows(slot: int, of: bytes, size: int, name: str) -> Ints:
+        return _resolved(faces, references[slot], counts, _Rows(lines[of], size, name), repairs)
 
-    corners = rows(0, b"v", len(vertices))
+    corners = rows(0, b"v", len(vertices), "vertices")
+    corner_uvs = rows(1, b"vt", len(uvs), "texture coordinates") if 1 in references else None
+    corner_normals = rows(2, b"vn", len(normals), "normals") if 2 in references else None
     library = _libraries(path, text, rest.libraries)
-    repairs = dict(joined([repairs, library.repairs]))
+    repairs |= joined([repairs, library.repairs, _undefined(text, rest.materials, library)])
     material_names, polygon_materials = _selected(rest.materials, lines[b"f"])
     group_names, polygon_groups = _selected(rest.groups, lines[b"f"])
     return polygons(
@@ -73,24 +85,21 @@ def read(path: Path) -> Mesh:
         vertices,
         corners,
         counts,
-        normals=normals if 2 in references else None,
-        corner_normals=rows(2, b"vn", len(normals)) if 2 in references else None,
-        uvs=uvs if 1 in references else None,
-        corner_uvs=rows(1, b"vt", len(uvs)) if 1 in references else None,
+        normals=normals if 2 in references and len(normals) else None,
+        corner_normals=corner_normals if len(normals) else None,
+        uvs=uvs if 1 in references and len(uvs) else None,
+        corner_uvs=corner_uvs if len(uvs) else None,
         material_names=material_names,
         polygon_materials=polygon_materials,
         group_names=group_names,
         polygon_groups=polygon_groups,
         polygon_smoothing=_smoothing(rest.smoothing, lines[b"f"]),
-        attributes={} if color is None else {"color": color},
+        attributes=attributes,
         materials=library.materials,
         substitutes=library.substitutes,
         repairs=repairs,
         place=lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}",
     )
-
-
-_NAMES = {b"v": "vertices", b"vt": "texture coordinates", b"vn": "normals"}
 
 
 _PARTS = {"vertex": b"v", "uv": b"vt", "normal": b"vn", "face": b"f"}
@@ -115,74 +124,93 @@ class _Statements(Value):
             "s": rest.smoothing,
             "mtllib": rest.libraries,
         }
+        left_out: dict[str, list[int]] = {}
         for line in lines.tolist():
-            word, _, name = text.line(line).replace("\t", " ").partition(" ")
+            word, *name = text.line(line).split(None, 1)
+            word = word.lower()
             if word in names:
-                names[word].append((line, name.strip()))
-            elif word in _OTHER_SHAPES:
-                note(rest.repairs, f"{_OTHER_SHAPES[word]} left out", f":{text.number(line)}")
+                names[word].append((line, name[0] if name else ""))
             elif word not in _STATE.split():
-                raise InputError(
-                    f"{text.place(line)}: '{word:.40}' is no statement of an OBJ file; remove the line or "
-                    "give the file the suffix of its format"
-                )
+                left_out.setdefault(_LEFT_OUT.get(word, _UNKNOWN), []).append(line)
+        for what, found in left_out.items():
+            note(rest.repairs, what, f":{text.number(found[0])}", len(found))
         return rest
 
 
-def _vertices(block: Block, repairs: dict[str, Repair]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
-    """(V, 3) positions, and (V, 3) linear colours where any vertex has one; the others are white then."""
-    values = _table(block, (3, 4, 6), 6, fill=np.nan, what="v x y z, or v x y z r g b")
-    vertices = np.ascontiguousarray(values[:, :3])
-    colored = block.counts == 6
+def _vertices(
+    block: Block, repairs: dict[str, Repair]
+) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float32]]]:
+    """(V, 3) positions, and `color` (V, 3), linear, where any vertex has one; `alpha` (V,) where any has."""
+    counts = block.counts
+    if (short := counts < 3).any():
+        bad = int(np.argmax(short))
+        raise InputError(f"{block.place(bad)}: has {counts[bad]} numbers; write v x y z, or v x y z r g b")
+    values = _table(block, 7, needed=3)
+    _note_lines(repairs, "numbers behind a vertex left out", (counts == 5) | (counts > 7), block)
+    _note_lines(repairs, "weights of vertices left out", (counts == 4) & (values[:, 3] != 1), block)
+    colored = (counts == 6) | (counts == 7)
     if not colored.any():
-        return vertices, None
-    code = values[colored, 3:]
-    if not ((code >= 0) & (code <= 255)).all():
-        bad = np.flatnonzero(colored)[np.argmin(((code >= 0) & (code <= 255)).all(axis=1))]
-        raise InputError(
-            f"{block.place(int(bad))}: a vertex colour must be in 0..1, or in 0..255; correct it"
-        )
-    if code.max() > 1:
-        code = code / 255
-    if not colored.all():
-        first = f":{block.text.number(int(block.lines[np.argmin(colored)]))}"
-        count = int(np.count_nonzero(~colored))
-        note(repairs, "vertices without a colour, made white", first, count)
-    color = np.ones((len(vertices), 3), np.float32)
-    color[colored] = linear(code)
-    return vertices, color
+        return np.ascontiguousarray(values[:, :3]), {}
+    colors = _unit_range(np.where(colored[:, None], values[:, 3:], np.nan))
+    bare: NDArray[np.bool_] = np.any(np.isnan(colors[:, :3]), axis=1)
+    _note_lines(repairs, "vertices without a colour, made white", bare, block)
+    colors = np.where(np.isnan(colors), 1.0, colors)
+    inside = np.clip(colors, 0, 1)
+    beyond: NDArray[np.bool_] = np.any(colors != inside, axis=1)
+    _note_lines(repairs, "vertex colours beyond their range, clipped", beyond, block)
+    attributes = {"color": linear(inside[:, :3])}
+    if (counts == 7).any():
+        attributes["alpha"] = inside[:, 3].astype(np.float32)
+    return np.ascontiguousarray(values[:, :3]), attributes
+
+
+def _unit_range(colors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(V, 4) colours of full 1, NaN where there is none.
+
+    Of full 255 are those that are whole numbers, or most of which lie far beyond 1. A few that lie beyond 1,
+    by rounding or being very bright, do not make bytes of the others.
+    """
+    bright = colors[colors > 0]
+    if not (bright > 1).any():
+        return colors
+    whole = bool((bright == np.floor(bright)).all())
+    return colors / 255 if whole or np.median(bright) > 2 else colors
+
+
+def _note_lines(repairs: dict[str, Repair], what: str, wrong: NDArray[np.bool_], block: Block) -> None:
+    """Count the lines of a block that are `wrong`."""
+    if wrong.any():
+        line = block.text.number(int(block.lines[np.argmax(wrong)]))
+        note(repairs, what, f":{line}", int(np.count_nonzero(wrong)))
 
 
 def _uvs(block: Block) -> NDArray[np.float64]:
-    """(U, 2); a missing v is 0, a third coordinate is left out."""
-    values = _table(block, (1, 2, 3), 2, fill=0.0, what="vt u v")
-    return np.ascontiguousarray(values)
+    """(U, 2); a missing v is 0, a third coordinate is left out; NaN where there is no number."""
+    values = _table(block, 2, needed=0)
+    values[block.counts == 1, 1] = 0
+    return values
 
 
 def _normals(block: Block) -> NDArray[np.float64]:
-    return _table(block, (3,), 3, fill=0.0, what="vn x y z")
+    """(K, 3), NaN where a number is missing."""
+    return _table(block, 3, needed=0)
 
 
-def _table(
-    block: Block, widths: tuple[int, ...], size: int, *, fill: float, what: str
-) -> NDArray[np.float64]:
-    """(B, `size`) the first numbers of each line of one of the `widths`, `fill` where it has fewer."""
-    values, counts = block.floats(), block.counts
-    right = np.isin(counts, widths)
-    if not right.all():
-        bad = int(np.argmin(right))
-        raise InputError(f"{block.place(bad)}: has {counts[bad]} numbers; write {what}")
-    if not len(counts) or (counts == counts[0]).all():
-        width = int(counts[0]) if len(counts) else size
-        table = values.reshape(-1, width)[:, :size]
-        if table.shape[1] == size:
-            return table
-        return np.pad(table, ((0, 0), (0, size - table.shape[1])), constant_values=fill)
+def _table(block: Block, size: int, needed: int) -> NDArray[np.float64]:
+    """(B, `size`) the first numbers of each line; NaN where it has fewer, or a word that is no number behind
+    the first `needed`."""
+    values, counts = block.floats(needed), block.counts
+    width = int(counts[0]) if len(counts) else size
+    if (counts == width).all() and width >= size:
+        return np.ascontiguousarray(values.reshape(-1, width)[:, :size])
+    table = np.full((len(counts), size), np.nan)
+    if (counts == width).all():
+        table[:, :width] = values.reshape(-1, width)
+        return table
     column = np.arange(size)
-    first = np.cumsum(counts) - counts
     present = column < counts[:, None]
-    index = np.where(present, first[:, None] + column, 0)
-    return np.where(present, values[index], fill)
+    table[present] = values[((np.cumsum(counts) - counts)[:, None] + column)[present]]
+    return table
 
 
 def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
@@ -193,7 +221,7 @@ def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
     counts = faces.counts
     slash = faces.data == ord("/")
     if not slash.any():
-        return {0: _nonzero(faces, faces.integers(), np.arange(counts.sum()))}, counts
+        return {0: faces.integers()}, counts
     numbers = Block(faces.text, faces.lines, np.where(slash, np.uint8(32), faces.data), faces.starts)
     values, starts = numbers.integers(), np.flatnonzero(numbers.heads)
     first = faces.heads[starts]  # of its corner
@@ -206,7 +234,7 @@ def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
     explained = passed + _trailing(faces.data, slash) == np.count_nonzero(slash)
     if four.any() or slots.max(initial=0) > 2 or np.count_nonzero(first) != corner_count or not explained:
         raise _bad_corner(faces)
-    _nonzero(faces, values, corner)
+    values[(values == 0) & (slots > 0)] = NOWHERE
     references = {}
     for slot in range(3):
         used = slots == slot
@@ -234,13 +262,6 @@ def _bad_corner(faces: Block) -> InputError:
     )
 
 
-def _nonzero(faces: Block, values: Ints, corner: NDArray[np.intp]) -> Ints:
-    if not values.all():
-        bad = int(corner[np.argmin(values != 0)])
-        raise InputError(f"{_place(faces, bad)}: index 0; count from 1, or from -1 backwards")
-    return values
-
-
 def _place(faces: Block, corner: int) -> str:
     """``path:line`` of a corner."""
     return faces.place(int(np.searchsorted(np.cumsum(faces.counts), corner, side="right")))
@@ -254,21 +275,33 @@ class _Rows(Value):
     name: str
 
 
-def _resolved(faces: Block, references: Ints, counts: Ints, rows: _Rows) -> Ints:
-    """(C,) rows counted from 0; references below 0 count back from the face, 0 gives -1."""
+def _resolved(faces: Block, references: Ints, counts: Ints, rows: _Rows, repairs: dict[str, Repair]) -> Ints:
+    """(C,) rows counted from 0; references below 0 count back from the face, 0 gives -1.
+
+    One to a vertex that is not there is refused; to another row it is dropped, and counted.
+    """
     below = references < 0
     index = references - 1
     if below.any():
         before = np.repeat(np.searchsorted(rows.lines, faces.lines), counts)
         index = np.where(below, before + references, index)
-    wrong = ((index < 0) | (index >= rows.size)) & (references != 0)
-    if wrong.any():
-        bad = int(np.argmax(wrong))
-        raise InputError(
-            f"{_place(faces, bad)}: index {references[bad]} is out of range, there are {rows.size} "
-            f"{rows.name}; correct the index"
-        )
-    return index
+    wrong = (index < 0) | (index >= rows.size)
+    if rows.name != "vertices":
+        wrong &= references != 0
+    if not wrong.any():
+        return index
+    bad = int(np.argmax(wrong))
+    if rows.name != "vertices":
+        line = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
+        first = f":{faces.text.number(int(faces.lines[line]))}"
+        note(repairs, f"references to {rows.name} that are not there dropped", first, int(wrong.sum()))
+        return np.where(wrong, -1, index)
+    if references[bad] == 0:
+        raise InputError(f"{_place(faces, bad)}: index 0; count from 1, or from -1 backwards")
+    raise InputError(
+        f"{_place(faces, bad)}: index {references[bad]} is out of range, there are {rows.size} "
+        f"{rows.name}; correct the index"
+    )
 
 
 def _selected(
@@ -281,6 +314,15 @@ def _selected(
     lines = np.array([line for line, _ in statements])
     ids = np.array([-1, *(names[name] for _, name in statements)])
     return tuple(names), ids[np.searchsorted(lines, faces)]
+
+
+def _undefined(text: Text, statements: list[tuple[int, str]], library: _mtl.Library) -> dict[str, Repair]:
+    """The materials that faces select and the libraries do not have, where the file has libraries."""
+    missing = {name: line for line, name in reversed(statements) if name not in library.materials}
+    if not library.materials or not missing:
+        return {}
+    first = f":{text.number(min(missing.values()))}"
+    return {"materials that no library has": Repair(len(missing), first)}
 
 
 def _smoothing(statements: list[tuple[int, str]], faces: NDArray[np.intp]) -> NDArray[np.int64] | None:

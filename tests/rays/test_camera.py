@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from illumcli.frame import Frame
-from illumcli.rays.camera import axes, camera_rays, film_points
+from illumcli.rays.camera import MARGIN, axes, camera_rays, film_points, framing
 from illumcli.scene.spec import Filter, Orthographic, Perspective
 
 UNIT = Frame((0.0, 0.0, 0.0), 1.0)
@@ -61,3 +63,55 @@ def test_filters_are_centred_bounded_and_have_their_deviation(name, width):
     np.testing.assert_allclose(offset.mean(axis=0), 0, atol=1e-3)
     np.testing.assert_allclose(offset.std(axis=0), deviation, rtol=5e-3)
     assert np.abs(offset).max() <= (width if name == "gaussian" else width / 2)
+
+
+# framing
+
+SHAPES = {
+    "ball": (1, 1, 1), "flat": (1, 1e-9, 1), "needle": (1e-4, 1, 1e-4), "wide": (5, 1, 1), "deep": (1, 1, 9),
+}  # fmt: skip
+
+
+def in_picture(camera, aspect, points):
+    """(2, N) where points are in the picture, -1..1 across and up, and their depths."""
+    x, y, z = ((points - camera.position) @ axis for axis in axes(camera))
+    is_pinhole = camera.projection == "perspective"
+    half = z * np.tan(np.radians(camera.fov) / 2) if is_pinhole else camera.extent / 2
+    return np.array([x / half / aspect, y / half]), z
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    shape=st.sampled_from(sorted(SHAPES)),
+    projection=st.sampled_from([Perspective, Orthographic]),
+    direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1),
+    aspect=st.floats(0.3, 3),
+    size=st.sampled_from([1e-6, 1.0, 1e6]),
+    away=st.sampled_from([0.0, 100.0]),
+    seed=st.integers(0, 99),
+)
+def test_framed_points_are_inside_and_fill_the_picture(
+    shape, projection, direction, aspect, size, away, seed
+):
+    random = np.random.default_rng(seed)
+    points = size * (random.normal(size=(50, 3)) * SHAPES[shape] + away * random.normal(size=3))
+    words = {"projection": "orthographic"} if projection is Orthographic else {"fov": 40.0}
+    camera = projection(position=direction, target=(0.0, 0.0, 0.0), fit="thing", **words)
+    made = framing(camera, aspect, points)
+    places, depth = in_picture(made, aspect, points)
+    assert (depth > 0).all()
+    assert np.abs(places).max() == pytest.approx(1 - MARGIN, rel=1e-6)
+    assert np.abs(places.min(axis=1) + places.max(axis=1)).max() < 1e-6  # as far to either side
+    np.testing.assert_allclose(axes(made)[2], axes(camera)[2], atol=1e-9)
+    assert made.fit is None
+
+
+@pytest.mark.parametrize("words", [{}, {"projection": "orthographic"}])
+def test_a_point_and_a_line_along_the_view_can_be_framed(words):
+    kind = Orthographic if words else Perspective
+    camera = kind(position=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0), **words)
+    for points in ([[1.0, 2, 3]], [[1.0, 2, 3], [1, 2, 4]]):
+        made = framing(camera, 1.5, np.array(points))
+        places, depth = in_picture(made, 1.5, np.array(points))
+        assert (depth > 0).all()
+        assert np.abs(places).max() < 1e-9

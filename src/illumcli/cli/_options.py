@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import click
 
@@ -44,6 +45,42 @@ allow_option = click.option(
     metavar="DIR",
     help="Let scenes read files below DIR too (also: ILLUM_ALLOW).",
 )
+
+
+def _view(ctx: click.Context, option: click.Parameter, text: str | None) -> str | None:
+    """`AZIMUTH,ELEVATION` as a list; both must be numbers, what they may be `load` knows."""
+    if text is None:
+        return None
+    try:
+        azimuth, elevation = map(float, text.split(","))
+    except ValueError:
+        raise click.BadParameter(f"'{text}' is not AZIMUTH,ELEVATION; write it as 24,13") from None
+    return f"[{azimuth}, {elevation}]"
+
+
+def studio_options(command: C) -> C:
+    """Adds `--view` and `--up` for meshes without a scene, in front of the parameter `overrides`."""
+
+    @wraps(command)
+    def arranged(*args: Any, view: str | None, up: str | None, **named: Any) -> Any:
+        said = {"view": view, "up": up}
+        studio = tuple(f"studio.{key}={value}" for key, value in said.items() if value is not None)
+        return command(*args, **{**named, "overrides": (*studio, *named["overrides"])})
+
+    look = click.option(
+        "--view",
+        metavar="AZIMUTH,ELEVATION",
+        callback=_view,
+        help="Where a mesh without a scene is seen from [degrees]: 0,0 the front, 90,0 the side of +x, 0,90 "
+        "above. By default 24,13.",
+    )
+    turn = click.option(
+        "--up",
+        type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
+        help="The axis of a mesh without a scene that points up; by default y.",
+    )
+    return cast(C, look(turn(arranged)))
+
 
 strict_option = click.option(
     "--strict", is_flag=True, help="Refuse meshes and textures that need repairs, instead of counting them."

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import overrides_option, scenes_argument
+from illumcli.cli._options import overrides_option, scenes_argument, studio_options
 
 
 @click.command()
 @scenes_argument
 @overrides_option
+@studio_options
 def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
     """Validate each SCENE and say every problem at once; nothing is rendered and no mesh is read."""
     from illumcli.errors import InputError

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import no_cache_option, overrides_option, scene_argument
+from illumcli.cli._options import no_cache_option, overrides_option, scene_argument, studio_options
 
 if TYPE_CHECKING:
     from illumcli.jobs.converge import Vary
@@ -25,6 +25,7 @@ Examples:
 @click.command(epilog=_EPILOG)
 @scene_argument
 @overrides_option
+@studio_options
 @click.option(
     "--vary",
     type=click.Choice(["obscurance", "pixels", "both"]),

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import no_cache_option, overrides_option, scene_argument
+from illumcli.cli._options import no_cache_option, overrides_option, scene_argument, studio_options
 
 
 @click.command()
 @scene_argument
 @overrides_option
+@studio_options
 @click.option("--only", "only", multiple=True, metavar="LAYER", help="Plan these layers alone.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, a list with each camera's plan.")
 @no_cache_option

@@ -6,7 +6,13 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import no_cache_option, overrides_option, scenes_argument, strict_option
+from illumcli.cli._options import (
+    no_cache_option,
+    overrides_option,
+    scenes_argument,
+    strict_option,
+    studio_options,
+)
 
 
 @click.command()
@@ -15,6 +21,7 @@ from illumcli.cli._options import no_cache_option, overrides_option, scenes_argu
     "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."
 )
 @overrides_option
+@studio_options
 @click.option("--only", "only", multiple=True, metavar="LAYER", help="Render these layers alone.")
 @click.option(
     "--target-error",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import allow_option, no_cache_option, scene_argument, strict_option
+from illumcli.cli._options import allow_option, no_cache_option, scene_argument, strict_option, studio_options
 
 if TYPE_CHECKING:
     from illumcli.jobs.sweep import Outcome
@@ -19,11 +19,12 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @scene_argument
 @click.option(
     "-D",
-    "axes",
+    "overrides",
     multiple=True,
     metavar="PATH=VALUES",
     help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog.",
 )
+@studio_options
 @click.option("--zip", "together", is_flag=True, help="First values together, then second ones, ...")
 @click.option("--rows", type=_FILE, metavar="FILE.csv", help="A variant per row: paths in the first line.")
 @click.option(
@@ -51,7 +52,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too.")
 def sweep(
     scene: Path,
-    axes: tuple[str, ...],
+    overrides: tuple[str, ...],
     together: bool,
     rows: Path | None,
     frames: str | None,
@@ -98,7 +99,7 @@ def sweep(
 
     if reference is not None and table is None:
         raise click.UsageError("--reference is what the errors of --table are against; give --table")
-    variants = job.variants_of(axes, together, rows, frames)
+    variants = job.variants_of(overrides, together, rows, frames)
     progress = reporter(quiet)
     done = job.run(scene, variants, pattern, only, seed, threads, force, cache, progress, written, strict)
     for warning in done.warnings:

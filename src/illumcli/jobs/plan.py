@@ -12,6 +12,7 @@ from pathlib import Path
 from illumcli.jobs.render import opened_store
 from illumcli.plan.artifacts import Artifacts
 from illumcli.plan.execute import Tally
+from illumcli.plan.framing import framed
 from illumcli.plan.plan import Plan, plan, reusing
 from illumcli.plan.unseen import unseen_objects, why_all, without
 from illumcli.scene.load import load
@@ -28,6 +29,7 @@ def run(
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
     store = opened_store() if cache else None
+    made = framed(made, Artifacts(store), Tally(), at_hand=True)
     numbers = unseen_objects(made, Artifacts(store), Tally(), at_hand=True)
     made = replace(without(made, loaded, numbers), objects=objects(made, numbers))
     parts = [reusing(made, view, Artifacts(store, look=True)) for view in made.views]

@@ -9,7 +9,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from illumcli.jobs.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.layers import Layer
 from illumcli.plan.artifacts import Artifacts, Memory
 from illumcli.plan.execute import Planes, Tally, bands, run_once
+from illumcli.plan.framing import framed
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
 from illumcli.plan.recipes import View
@@ -213,13 +214,17 @@ def rendered(
     refuse_too_large(work, due)
     tally = Tally()
     first = Artifacts(store, memory)
-    numbers = unseen_objects(work.plan, first, tally, threads) if due and not strict else ()
-    steps = without(work.plan, work.loaded, numbers)
+    steps = framed(work.plan, first, tally, threads) if due else work.plan
+    numbers = unseen_objects(steps, first, tally, threads) if due and not strict else ()
+    steps = without(steps, work.loaded, numbers)
     if memory is not None and due:
-        after = without(following.plan, following.loaded, numbers) if following is not None else None
+        after = None
+        if following is not None:
+            after = framed(following.plan, first, tally, threads)
+            after = without(after, following.loaded, numbers)
         memory.wanted = read_by_others(steps, after)
     for view in steps.views:
-        mine = [target for target in due if target.view is view]
+        mine = [replace(target, view=view) for target in due if target.view.name == view.name]
         if mine:
             artifacts = Artifacts(store, memory, reused=dict(first.reused), made=first.made)
             began = time.perf_counter()

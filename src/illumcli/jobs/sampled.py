@@ -11,11 +11,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.demand import order
 from illumcli.errors import InputError
 from illumcli.layers import Layer
 from illumcli.plan.execute import Tally, at_pixels, bands
+from illumcli.plan.framing import placed
 from illumcli.plan.plan import Plan, plan
-from illumcli.plan.recipes import View
+from illumcli.plan.recipes import View, recipes
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
 from illumcli.scene.load import Loaded
@@ -50,6 +52,16 @@ class Subject(Record):
     @property
     def scene(self) -> Scene:
         return self.loaded.scene
+
+    def seen_by(self, view: View) -> Subject:
+        """The same from another view, all of whose pixels get all samples."""
+        if view.camera.fit is not None:
+            name = f"camera:{view.name}"
+            for step in order(recipes(self.scene, self.loaded), [name]):
+                if step.makes not in self.shared:
+                    self.shared[step.makes] = step.make(self.shared)
+            view = placed(view, self.shared[name])
+        return replace(self, view=replace(view, adaptive=None))
 
     def planned(self, sampling: Sampling) -> tuple[Plan, View]:
         """The plan and the view at a sampling, all that no tile changes being made."""
@@ -115,8 +127,8 @@ def subject(
         )
     if width is not None and view.width > width:
         view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
-    view = replace(view, adaptive=None)
-    return Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+    own = Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+    return own.seen_by(view)
 
 
 def chosen_view(views: Sequence[View], camera: str | None) -> View:

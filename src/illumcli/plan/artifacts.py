@@ -37,11 +37,13 @@ about half as fast as measured."""
 MEMORY = 1 << 30
 """Bytes that the variants of a sweep keep in memory for each other."""
 
-ONCE = ("mesh", "standing", "implied_widths", "world", "repairs", "corner_normals", "numbering")
+ONCE = ("mesh", "standing", "camera", "implied_widths", "world", "repairs", "corner_normals", "numbering")
 """Buffers of the whole scene that are kept, by name or by its part before the colon.
 
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.
 """
+ALWAYS = ("camera",)
+"""Those that are kept whatever they took: nothing of a view is found without the place of its camera."""
 CLASSES = {
     cls.__name__: cls
     for cls in (
@@ -294,7 +296,7 @@ class Artifacts:
             return
         arrays: list[NDArray[Any]] = []
         said = encode(value, arrays, {})
-        if worth(seconds, sum(array.nbytes for array in arrays)):
+        if name.partition(":")[0] in ALWAYS or worth(seconds, sum(array.nbytes for array in arrays)):
             self.store.save(key, {"buffer": name, "value": said}, arrays)
 
 

@@ -262,6 +262,8 @@ def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[s
         if name in made or name.startswith(AGAIN):
             continue
         kind, _, light = name.partition(":")
+        if kind == "camera":  # made before the plan
+            continue
         if light and light not in active:
             reasons[name] = "the light's intensity is 0"
         elif kind in ("shadow", "reach") and light and not active[light].shadows:

@@ -20,7 +20,7 @@ from illumcli.plan.doubled import error_recipes
 from illumcli.records import Value
 from illumcli.scene.load import resolve
 from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
-from illumcli.shading.materials import DEFAULT, Token
+from illumcli.shading.materials import DEFAULT, Choice, Token
 from illumcli.shading.rates import AT_SAMPLES
 from illumcli.shading.terms import words
 from illumcli.shading.textures import paths
@@ -102,11 +102,16 @@ def candidates(scene: Scene) -> list[IlluminationModel] | None:
         if model is not None:
             found.append(model)
             continue
-        source = scene.meshes.get(thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
-        if getattr(source, "materials", False):
+        if imports(scene, thing):
             return None
         found += [default_material(), *scene.materials.values()]
     return found
+
+
+def imports(scene: Scene, thing: Any) -> bool:
+    """Does an object have the materials that its mesh file describes?"""
+    wants = thing.fallback is not None or getattr(_source(scene, thing.mesh), "materials", False)
+    return thing.material is None and bool(wants)
 
 
 def reached_words(scene: Scene) -> frozenset[str]:
@@ -227,7 +232,26 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         book += _light(name, light, eye, at_samples, implied)
     made = {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
     counts = [view.samples for view in views(scene)]
+    made |= {f"camera:{view.name}": recipe for view, recipe in _framings(scene, unseen)}
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
+
+
+def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Recipe]]:
+    """The views that an object is to fill, and what makes their cameras."""
+    numbers = {name: number for number, name in enumerate(scene.object_names())}
+    every = "every_mesh" if unseen else "meshes"
+    return [
+        (
+            view,
+            Recipe.of(
+                partial(stages.framed, view.camera, view.width / view.height, numbers[view.camera.fit]),
+                f"camera:{view.name}",
+                meshes=every,
+            ),
+        )
+        for view in views(scene)
+        if view.camera.fit is not None
+    ]
 
 
 def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Recipe]:
@@ -339,24 +363,26 @@ def _read(loaded: Any, source: Any) -> Any:
 
 def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
     """Numbers of materials, their models, and what these vary by."""
-    tokens: list[Token | None] = []
+    choices: list[Choice] = []
     models: dict[Token, Any] = {DEFAULT: default_material()}
     for thing, name in zip(scene.objects, scene.object_names(), strict=True):
         model = scene.material_of(thing)
         of_scene = isinstance(thing.material, str) and not thing.override
         token: Token = ("material", str(thing.material)) if of_scene else ("object", name)
-        tokens.append(None if model is None else token)
         if model is not None:
             models[token] = model
-    imported = tuple(
-        mesh_name(scene, thing.mesh) if getattr(_source(scene, thing.mesh), "materials", False) else None
-        for thing in scene.objects
-    )
-    if None in tokens:  # a mesh may select any material of the scene
+        fallback: Token | None = None
+        if (other := scene.fallback_of(thing)) is not None:
+            fallback = ("material", thing.fallback) if isinstance(thing.fallback, str) else ("fallback", name)
+            models[fallback] = other
+        library = mesh_name(scene, thing.mesh) if imports(scene, thing) else None
+        choices.append(Choice(None if model is None else token, library, fallback))
+    imported = tuple(choice.library for choice in choices)
+    if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
         models |= {("material", name): model for name, model in scene.materials.items()}
     files = {model.file for model in models.values() if hasattr(model, "file")}
     measured = {file: Content(partial(resolve, loaded, file)) for file in sorted(files)}
-    numbering = partial(stages.numbering, tuple(tokens), tuple(scene.materials), imported)
+    numbering = partial(stages.numbering, tuple(choices), tuple(scene.materials))
     own = {"meshes": "meshes"} if any(imported) else {}
     book = [
         Recipe.of(numbering, "numbering"),

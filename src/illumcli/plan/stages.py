@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
 from illumcli.rays.camera import axes as camera_axes
-from illumcli.rays.camera import camera_rays, film_points
+from illumcli.rays.camera import camera_rays, film_points, framing
 from illumcli.rays.corner_weights import CornerWeights
 from illumcli.rays.corner_weights import corner_weights as corner_weights_at
 from illumcli.rays.surface import Facets, Hits
@@ -36,7 +36,7 @@ from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
 from illumcli.shading.ambient import ambient_light
 from illumcli.shading.ambient import coupled as coupled_light
-from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
+from illumcli.shading.materials import Choice, Materials, Numbering, Token, materials, textures_at
 from illumcli.shading.materials import numbering as number_materials
 from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
@@ -92,6 +92,20 @@ def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> Standing:
         assemble.transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)
     ]
     return assemble.stand(meshes, matrices)
+
+
+Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], float | None]
+"""Position, target and, of orthographic cameras, extent."""
+
+
+def framed(
+    camera: Any, aspect: float, number: int, meshes: tuple[Mesh, ...], standing: Standing
+) -> Placement:
+    """Where a camera stands whose picture the object of this number fills."""
+    mesh = meshes[number]
+    points = assemble.among_used(mesh, assemble.moved(mesh, standing.matrices[number]))
+    made = framing(camera, aspect, points)
+    return made.position, made.target, getattr(made, "extent", None)
 
 
 def implied_widths(
@@ -251,11 +265,9 @@ def polygon_normals(methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: W
     return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 
 
-def numbering(
-    own: tuple[Token | None, ...], named: tuple[str, ...], imported: tuple[str | None, ...], world: World
-) -> Numbering:
+def numbering(choices: tuple[Choice, ...], named: tuple[str, ...], world: World) -> Numbering:
     """The material number of every triangle, whatever the materials' parameters are."""
-    return number_materials(world, own, frozenset(named), imported)
+    return number_materials(world, choices, frozenset(named))
 
 
 def materials_of(

@@ -48,12 +48,12 @@ def unseen_objects(
     """The numbers of the objects that can be left out of all views of a plan.
 
     What is made to know it is counted in `tally`, and at hand in `artifacts` from then on. With `at_hand`
-    nothing is made: where the store does not know the boxes, nothing is left out.
+    nothing is made: where the store does not know the boxes, or where a camera stands, nothing is left out.
     """
     scene = made.scene
-    if scene is None or why_all(made) is not None:
+    if scene is None or why_all(made) is not None or any(view.camera.fit for view in made.views):
         return ()
-    standing: Standing | None = _asked(made, "standing", artifacts, tally, threads, at_hand)
+    standing: Standing | None = asked(made, "standing", artifacts, tally, threads, at_hand)
     if standing is None:
         return ()
     frame, film = standing.frame, scene.film
@@ -69,7 +69,7 @@ def unseen_objects(
     reach = _reach(made, frame.radius) / frame.radius
     found = unseen(low, high, np.zeros(len(low)), views, lights, reach, frame)
     if found.any() and lights and scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH):
-        widths = _asked(made, "implied_widths", artifacts, tally, threads, at_hand)
+        widths = asked(made, "implied_widths", artifacts, tally, threads, at_hand)
         if widths is None:
             return ()
         found = unseen(low, high, widths / frame.radius, views, lights, reach, frame)
@@ -89,7 +89,7 @@ def without(made: Plan, loaded: Any, numbers: tuple[int, ...]) -> Plan:
     return replace(fewer, views=made.views, skipped=skipped)
 
 
-def _asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, threads: int, at_hand: bool) -> Any:
+def asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, threads: int, at_hand: bool) -> Any:
     """A buffer of the whole scene, before the plan runs; None where it would have to be made and must not."""
     book = Book(made.book, made.views[0], artifacts)
     steps = order(book, [name], GIVEN)

@@ -24,6 +24,72 @@ def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     return right, np.cross(right, forward), forward
 
 
+MARGIN = 0.1
+"""Share of the picture's width and height that a framed object leaves free, half of it on either side."""
+
+
+def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
+    """The camera with its direction, placed so that all points are inside the picture and fill it.
+
+    A pinhole at e sees p between two edges of the picture where |r.(p - e)| <= s f.(p - e), r pointing right,
+    f forward, s the slope of the edges: the two edges together bound f.e. The same holds for up. At the
+    nearer of the two bounds e moves across to where the points reach as far to either side.
+
+    Parameters
+    ----------
+    aspect : float
+        Width of the picture over its height.
+    points : (N, 3) float64
+        At least one [scene units].
+    """
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    x, y, z = ((points - centre) @ axis for axis in axes(camera))
+    size = float(np.linalg.norm(points - centre, axis=1).max()) or 1.0
+    nearest = float(z.min())
+    inside = 1 - MARGIN
+    if camera.projection == "perspective":
+        slope = inside * np.tan(np.radians(camera.fov) / 2)
+        bounds = _between_edges(x, z, slope * aspect), _between_edges(y, z, slope)
+        eye_z = min(*bounds, nearest - CLOSEST * size)
+        eye_x, eye_y = (_amid(part, z - eye_z) for part in (x, y))
+        changes = {}
+    else:
+        eye_x, eye_y = ((float(part.min()) + float(part.max())) / 2 for part in (x, y))
+        extent = max(float(np.ptp(y)), float(np.ptp(x)) / aspect) / inside
+        eye_z = nearest - size
+        changes = {"extent": extent or size}
+    right, up, forward = axes(camera)
+    position = centre + eye_x * right + eye_y * up + eye_z * forward
+    target = position - eye_z * forward
+    return camera.replaced(position=_tuple(position), target=_tuple(target), fit=None, **changes)
+
+
+CLOSEST = 1e-3
+"""A framed object that hides behind one of its own points is seen from this far off it, in its radii."""
+
+
+def _between_edges(x: Lanes, z: Lanes, slope: float) -> float:
+    """How far along the line of sight an eye can be that has all points between two edges of its view."""
+    return -float((x - slope * z).max() + (-x - slope * z).max()) / (2 * slope)
+
+
+def _amid(x: Lanes, depth: Lanes) -> float:
+    """The place across from which points of these depths reach as far to either side in the picture."""
+    eye = float(x.min() + x.max()) / 2
+    for _ in range(16):  # two points decide; where they stay the same the place is exact
+        slopes = (x - eye) / depth
+        ends = [int(slopes.argmin()), int(slopes.argmax())]
+        weights = 1 / depth[ends]
+        last, eye = eye, float(weights @ x[ends] / weights.sum())
+        if eye == last:
+            break
+    return eye
+
+
+def _tuple(vector: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(vector[0]), float(vector[1]), float(vector[2])
+
+
 def camera_rays(
     camera: Any, frame: Frame, width: int, height: int, points: NDArray[np.float64]
 ) -> tuple[Vectors, Vectors, Lanes]:

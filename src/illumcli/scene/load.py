@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic_core import ValidationError
 
@@ -21,15 +21,17 @@ from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
 from illumcli.scene.spec import Scene
+from illumcli.scene.studio import SETTINGS, STUDIO, Settings, arranged
 from illumcli.scene.unused import unused
 from illumcli.variants import suggestion
 
 MAX_EXTENDS = 8  # files, one extending the next
 MAX_FILES = 64
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
-STUDIO = Path(__file__).with_name("studio.yaml")
 CHOICES = ("model", "shape", "falloff", "law", "D", "F")  # keys that say what a mapping is
 PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides an object's `mesh`
+
+D = TypeVar("D", bound=Description)
 
 
 class Loaded(Value):
@@ -68,20 +70,34 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Loaded:
     """
     reading = _Reading(_roots(path.parent))
     changes = [change for text in overrides if (change := parse(text, reading.problems))]
+    settings = [change for change in changes if change.steps[0] == SETTINGS]
     if path.suffix.lower() in MESH_SUFFIXES:
-        tree = reading.file(STUDIO, ())
-        mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
-        changes = [mesh, *changes]
+        tree = _studio(path, settings, reading)
     else:
         tree = reading.file(path, ())
+        way = f"{path} is no mesh without a scene; change its camera and the transforms of its objects"
+        reading.problems += [Problem(change.value.place, (), way) for change in settings]
     if tree is not None:
         for change in changes:
-            tree = assign(tree, change, reading.problems) or tree
-    scene = None if tree is None else _validated(tree, reading.problems)
+            if change not in settings:
+                tree = assign(tree, change, reading.problems) or tree
+    scene = None if tree is None else _validated(Scene, tree, reading.problems)
     if scene is None or tree is None or reading.problems:
         raise InputError(_lines(reading.problems, overrides))
     values = {change.text: change.value.plain() for change in changes if change.text}
     return Loaded(scene, path, path.parent, path.stem, values, tree, reading.roots)
+
+
+def _studio(path: Path, settings: Sequence[Override], reading: _Reading) -> Node | None:
+    """The studio's scene around the mesh in the file `path`."""
+    tree, said = reading.file(STUDIO, ()), Node({}, Place(str(STUDIO)))
+    for change in settings:
+        said = assign(said, change, reading.problems) or said
+    made = _validated(Settings, said, reading.problems)
+    if tree is None or made is None:
+        return tree
+    mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
+    return assign(arranged(tree, made.studio), mesh, reading.problems)
 
 
 def resolve(loaded: Loaded, path: str) -> Path:
@@ -111,7 +127,8 @@ def file_problems(loaded: Loaded) -> list[str]:
 def unused_lines(loaded: Loaded, scene: Scene, layers: Collection[str], files: Collection[str]) -> list[str]:
     """What the scene as written says and what has no effect, a line each; arguments as those of `unused`."""
     found = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
-    return _lines([_problem(node.at, path, fact) for path, fact, node in found if node is not None])
+    said = ((node.at, path, fact) for path, fact, node in found if node is not None)
+    return _lines([_problem(at, path, fact) for at, path, fact in said if at.source != str(STUDIO)])
 
 
 @dataclass
@@ -206,22 +223,22 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
     }
 
 
-def _validated(tree: Node, problems: list[Problem]) -> Scene | None:
-    """The scene, or None after adding what is wrong with it to `problems`."""
+def _validated(kind: type[D], tree: Node, problems: list[Problem]) -> D | None:
+    """The description that a tree writes, or None after adding what is wrong with it to `problems`."""
     plain = tree.plain()
     classes: dict[int, type[Description]] = {}
     found: list[Fault] = []
-    scene = None
+    made = None
     try:
-        scene = Scene.validated(plain, classes)
+        made = kind.validated(plain, classes)
     except ValidationError as error:
-        found = [*faults(error, plain, classes), *reference_faults(plain)]
+        found = [*faults(error, plain, classes), *(reference_faults(plain) if kind is Scene else ())]
     known = {problem.place for problem in problems}
     for path, fact in dict.fromkeys(found):
         place = (tree.find(path) or tree).at
         if place not in known:
             problems.append(_problem(place, path, fact))
-    return scene
+    return made
 
 
 def _problem(place: Place, path: source.Path, fact: str) -> Problem:

@@ -10,6 +10,7 @@ from pydantic_core import ValidationError
 from illumcli.description import Description
 from illumcli.layers import owner_of
 from illumcli.scene.faults import Fault, faults
+from illumcli.scene.source import Path
 from illumcli.variants import member, suggestion
 
 
@@ -24,11 +25,20 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
     """
     if _get(scene, "camera") is not None and _get(scene, "cameras"):
         yield ("camera",), "give either camera or cameras, not both"
+    things = _parts(_get(scene, "objects"))
+    known = {str(_get(thing, "name") or f"object{i + 1}"): thing for i, thing in enumerate(things)}
+    for path, camera in _cameras(scene):
+        name = _get(camera, "fit")
+        if isinstance(name, str) and name not in known:
+            yield (*path, "fit"), _no("object", name, known)
     meshes, materials = (_names(_get(scene, kind)) for kind in ("meshes", "materials"))
-    for i, thing in enumerate(_parts(_get(scene, "objects"))):
+    for i, thing in enumerate(things):
         mesh, material = _get(thing, "mesh"), _get(thing, "material")
         if isinstance(mesh, str) and mesh not in meshes and "." not in mesh:
             yield ("objects", i, "mesh"), _no("mesh", mesh, meshes)
+        fallback = _get(thing, "fallback")
+        if isinstance(fallback, str) and fallback not in materials:
+            yield ("objects", i, "fallback"), _no("material", fallback, materials)
         if isinstance(material, str) and material not in materials:
             yield ("objects", i, "material"), _no("material", material, materials)
         elif isinstance(override := _get(thing, "override"), dict) and override:
@@ -49,6 +59,12 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
                 yield (kind, i, "name"), f"the name '{name}' is taken"
             elif isinstance(name, str):
                 taken.add(name)
+
+
+def _cameras(scene: Any) -> Iterator[tuple[Path, Any]]:
+    yield ("camera",), _get(scene, "camera")
+    for name, camera in _names(_get(scene, "cameras")).items():
+        yield ("cameras", name), camera
 
 
 def _default_name(kind: str, thing: Any, number: int) -> str:
@@ -77,7 +93,7 @@ def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _no(kind: str, name: str, known: Mapping[str, Any]) -> str:
-    plural = {"mesh": "meshes", "material": "materials"}[kind]
+    plural = {"mesh": "meshes"}.get(kind, f"{kind}s")
     way = suggestion(name, tuple(known)) if known else f"the scene has no {plural}"
     return f"no {kind} '{name}'; {way}"
 

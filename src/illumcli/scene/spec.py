@@ -144,6 +144,9 @@ class Object(Description):
     material: NameOrMaterial | None = None
     """The name of a material, or one described in place; by default the materials that the mesh file
     selects by name, and light grey Lambert for what selects none."""
+    fallback: NameOrMaterial | None = None
+    """Where no `material` is given: show the materials, textures and vertex colours that the mesh file itself
+    describes, whatever the scene calls its own, and this material, by name or in place, where it has none."""
     override: dict[str, Any] = NOTHING
     """Parameters of the material that this object has otherwise."""
     transform: Transform = NOTHING
@@ -164,6 +167,9 @@ class _Camera(Description):
     """What it looks at, the middle of the picture [scene units]."""
     up: Direction = (0.0, 1.0, 0.0)
     """Any vector not along the line of sight; where it is, another axis is taken."""
+    fit: Name | None = None
+    """Name of the object that is to fill the picture: the camera keeps its direction and moves to where all
+    of the object is inside; an orthographic one also takes its extent from it."""
     width: Count | None = None
     """Width of its picture [pixels]; by default the film's."""
     height: Count | None = None
@@ -402,8 +408,15 @@ class Scene(Description):
         model = self.materials[own] if isinstance(own, str) else own
         if not thing.override:
             return model
-        base = model if model is not None else default_material()
+        base = model or self.fallback_of(thing) or default_material()
         return type(base).validated({**dict(base), **thing.override})
+
+    def fallback_of(self, thing: Object) -> AnyModel | None:
+        """The object's fallback; None where it has a material or asks for no other."""
+        own = thing.fallback
+        if thing.material is not None:
+            return None
+        return self.materials[own] if isinstance(own, str) else own
 
     def named_cameras(self) -> dict[str, Perspective | Orthographic]:
         """The cameras by name, at least one."""

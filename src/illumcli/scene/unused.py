@@ -43,6 +43,8 @@ def _views(scene: Scene) -> Iterator[Fault]:
     film, cameras = scene.film, scene.named_cameras()
     for name, camera in cameras.items():
         path: Path = ("cameras", name) if scene.cameras else ("camera",)
+        if camera.fit is not None:
+            yield (*path, "extent"), "is not used, fit says how much is seen; leave one of them out"
         if _parallel(camera.up, [b - a for a, b in zip(camera.position, camera.target, strict=True)]):
             yield (*path, "up"), "is not used, it lies along the line of sight; give another direction"
     for key in ("width", "height", "samples"):
@@ -110,7 +112,9 @@ def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
     if model is not None and model.isotropic:
         yield (*path, "grain"), f"is not used, the model {dict(model)['model']} has none; leave it out"
     own = _sources(scene)[number][1]
-    if thing.override and thing.material is None and getattr(own, "materials", False):
+    if thing.material is not None:
+        yield (*path, "fallback"), "is not used, the object has a material of its own; leave one of them out"
+    if thing.override and thing.material is None and (thing.fallback or getattr(own, "materials", False)):
         fact = "replaces all that the mesh file selects by one material; give the object a material"
         yield (*path, "override"), fact
     x, y, z = thing.transform.scale

@@ -15,11 +15,13 @@ from illumcli.geometry.assemble import World
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.repairs import Repairs, joined, located, path_of
 from illumcli.models._base import IlluminationModel
-from illumcli.records import Record
+from illumcli.models._parameters import VertexValues
+from illumcli.records import Record, Value
 
 Token: TypeAlias = tuple[str, ...]
 """Which material it is, whatever its parameters are: `("material", name)` of the scene, `("object", name)` of
-one object, `("mesh", mesh, name)` of a mesh's own library, or `("default",)`."""
+one object, `("fallback", name)` of what its mesh has no material for, `("mesh", mesh, name)` of a mesh's own
+library, or `("default",)`; behind `"colors"` with vertex colours, behind `"meant"` as exporters mean it."""
 
 DEFAULT: Token = ("default",)
 
@@ -38,47 +40,64 @@ class Numbering(Record):
         return self.of_object.take(world.objects.take(triangle))
 
 
-def numbering(
-    world: World, own: Sequence[Token | None], named: Collection[str], imported: Sequence[str | None]
-) -> Numbering:
+class Choice(Value):
+    """What decides about the materials of an object."""
+
+    own: Token | None
+    """The object's material; None where its mesh selects materials by name."""
+    library: str | None = None
+    """Name of the mesh where its file's own materials and vertex colours are imported."""
+    fallback: Token | None = None
+    """For polygons without a material; where it is given, no material of the scene is selected by name."""
+
+    def token(self, mesh: Mesh, name: str | None, named: Collection[str]) -> Token:
+        """The material of polygons for which the mesh selects `name`, or nothing."""
+        if self.own is not None:
+            return self.own
+        if name in named and self.fallback is None:
+            return "material", str(name)
+        if self.library is not None and name in mesh.materials:
+            token: Token = ("mesh", self.library, str(name))
+            token = token if self.fallback is None else ("meant", *token)
+        else:
+            token = self.fallback or DEFAULT
+        colors = mesh.attributes.get("color") if self.library is not None else None
+        if colors is None or colors.ndim != 2 or colors.shape[1] < 3:
+            return token
+        return "colors", *token
+
+
+def numbering(world: World, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
     """Numbers the materials of all objects.
 
     Parameters
     ----------
-    own : sequence
-        Each object's own material, None where its mesh selects them.
+    choices : sequence
+        Per object.
     named : collection of str
         The scene's materials, which a mesh file selects by name.
-    imported : sequence
-        Per object: the name of the mesh whose own library has what the scene does not name, or None.
     """
     tokens: dict[Token, int] = {}
-    of_object = np.zeros(len(own), np.int32)
+    of_object = np.zeros(len(choices), np.int32)
     of_triangle = np.zeros(len(world.triangles), np.int32)
     several = False
-    for i, (placed, token, library) in enumerate(zip(world.placed, own, imported, strict=True)):
+    for i, (placed, choice) in enumerate(zip(world.placed, choices, strict=True)):
         mesh = placed.mesh
-        if token is not None or not mesh.material_names:
-            of_object[i] = tokens.setdefault(token or DEFAULT, len(tokens))
+        names = (None, *mesh.material_names) if choice.own is None else (None,)
+        found = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
+        if len(names) == 1:
+            of_object[i] = found[0]
             continue
         several = True
-        choices = [tokens.setdefault(DEFAULT, len(tokens))]
-        for name in mesh.material_names:
-            if name in named:
-                choices.append(tokens.setdefault(("material", name), len(tokens)))
-            elif library is not None and name in mesh.materials:
-                choices.append(tokens.setdefault(("mesh", library, name), len(tokens)))
-            else:
-                choices.append(choices[0])
         selected = (
             mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
         )
         mine = world.objects == i
         polygon = world.polygons[mine] - placed.first_polygon
-        of_triangle[mine] = np.asarray(choices, np.int32).take(selected.take(polygon) + 1)
+        of_triangle[mine] = np.asarray(found, np.int32).take(selected.take(polygon) + 1)
     if several:
-        for i, (placed, token) in enumerate(zip(world.placed, own, strict=True)):
-            if token is not None or not placed.mesh.material_names:
+        for i, (placed, choice) in enumerate(zip(world.placed, choices, strict=True)):
+            if choice.own is not None or not placed.mesh.material_names:
                 of_triangle[world.objects == i] = of_object[i]
     return Numbering(tuple(tokens), of_object, of_triangle if several else None)
 
@@ -117,24 +136,58 @@ def materials(
     libraries : mapping
         Mesh by name, those whose own library is used.
     """
-    models: list[IlluminationModel] = []
-    substitutes: list[Mapping[str, Substitute] | None] = []
-    for token in numbering.tokens:
-        if token[0] == "mesh":
-            mesh, folder = libraries[token[1]], Path(token[1]).parent
-            models.append(imported_model(mesh.materials[token[2]], folder))
-            own = mesh.substitutes.get(token[2], {})
-            substitutes.append(
-                {key: Substitute(each.value, path_of(each.first, token[1])) for key, each in own.items()}
-            )
-        else:
-            models.append(known[token])
-            substitutes.append(None)
+
+    def model_of(token: Token) -> IlluminationModel:
+        match token:
+            case "colors", *own:
+                return with_vertex_colors(model_of(tuple(own)), origin(token)[0] == "mesh")
+            case "meant", *own:
+                return as_meant(model_of(tuple(own)))
+            case "mesh", library, name:
+                return imported_model(libraries[library].materials[name], Path(library).parent)
+        return known[token]
+
+    models = tuple(map(model_of, numbering.tokens))
+    imported = [own if own[0] == "mesh" else None for own in map(origin, numbering.tokens)]
+    substitutes = [None if own is None else _substitutes(libraries[own[1]], own) for own in imported]
     names = tuple(token[-1] for token in numbering.tokens)
     lobes = tuple(model.lobes() for model in models)
-    used = dict.fromkeys(token[1] for token in numbering.tokens if token[0] == "mesh")
+    used = dict.fromkeys(own[1] for own in imported if own is not None)
     repairs = joined(located(libraries[name].material_repairs, name) for name in used)
-    return Materials(tuple(models), names, numbering, lobes, repairs, tuple(substitutes))
+    return Materials(models, names, numbering, lobes, repairs, tuple(substitutes))
+
+
+def _substitutes(mesh: Mesh, token: Token) -> dict[str, Substitute]:
+    """What stands in for textures of a material of the mesh's library, with places by the mesh's path."""
+    own = mesh.substitutes.get(token[2], {})
+    return {key: Substitute(each.value, path_of(each.first, token[1])) for key, each in own.items()}
+
+
+def origin(token: Token) -> Token:
+    """The token without what stands before it."""
+    return origin(token[1:]) if token[0] in ("colors", "meant") else token
+
+
+def as_meant(model: IlluminationModel) -> IlluminationModel:
+    """A material of a mesh's own library, without what exporters write that know nothing of it.
+
+    Their ambient colour is most often all white or all black: light from everywhere leaves by the diffuse
+    colour instead, where there is one. An exponent of 0 stands for no highlight, not for one all over.
+    """
+    changes: dict[str, Any] = {}
+    if model.ambient is not None and model.diffuse_color() != (0.0, 0.0, 0.0):
+        changes["ambient"] = None
+    if getattr(model, "exponent", None) == 0 and "specular" in model.fields():
+        changes["specular"] = (0.0, 0.0, 0.0)
+    return model.replaced(**changes) if changes else model
+
+
+def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> IlluminationModel:
+    """The model with vertex colours in place of a diffuse colour that does not vary, or times that colour."""
+    if "diffuse" not in model.fields() or "diffuse" in model.varying():
+        return model
+    own = dict(model)["diffuse"] if is_factor else (1.0, 1.0, 1.0)
+    return model.replaced(diffuse=VertexValues(vertex="color", factor=own)) if any(own) else model
 
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:

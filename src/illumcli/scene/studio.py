@@ -1,0 +1,107 @@
+"""The scene around a mesh that is given instead of a scene, and how it turns with the view that is asked for.
+
+AZIMUTH goes about the axis that is up, in degrees: 0 looks at the front, the side of +z where y is up (of -y
+where z is up), 90 at the side of +x. ELEVATION rises from the horizon to 90 straight above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import atan2, cos, radians, sin
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+from illumcli.description import Description, written
+from illumcli.scene.override import Override, assign
+from illumcli.scene.source import Node, Place, Problem
+from illumcli.values import Within
+
+STUDIO = Path(__file__).with_name("studio.yaml")
+SETTINGS = "studio"
+"""First step of the overrides that set what a `Studio` holds: `-D studio.view=[90,10]`."""
+
+Up: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+class Studio(Description):
+    """How the studio shows its mesh."""
+
+    view: tuple[Annotated[float, Within(ge=-360, le=360)], Annotated[float, Within(ge=-90, le=90)]] | None = (
+        None
+    )
+    """Azimuth and elevation [degrees]; by default those of the studio's camera, about 24 and 13."""
+    up: Up = "y"
+    """The axis of the mesh's file that points up."""
+
+
+class Settings(Description):
+    """What overrides may say besides the scene."""
+
+    studio: Studio = written({})
+
+
+ROTATIONS: Mapping[str, tuple[float, float, float]] = {
+    "x": (0, 0, 90),
+    "y": (0, 0, 0),
+    "z": (-90, 0, 0),
+    "-x": (0, 0, -90),
+    "-y": (180, 0, 0),
+    "-z": (90, 0, 0),
+}
+"""What turns each axis up: degrees about x, then y, then z."""
+
+
+def arranged(tree: Node, studio: Studio) -> Node:
+    """The studio's scene as a view and a mesh's axes ask for it.
+
+    The lights go around with the camera, and nothing stands between the mesh and a camera below its floor.
+    """
+    changes: dict[str, Sequence[float] | None] = {}
+    if studio.up != "y":
+        changes["objects.subject.transform.rotate"] = ROTATIONS[studio.up]
+    if studio.view is not None:
+        azimuth, elevation = map(radians, studio.view)
+        x, _, z = _numbers(tree, ("camera", "position"))
+        changes["camera.position"] = (
+            sin(azimuth) * cos(elevation),
+            sin(elevation),
+            cos(azimuth) * cos(elevation),
+        )
+        # what is up in the picture stays so straight above and below
+        changes["camera.up"] = (
+            -sin(azimuth) * sin(elevation),
+            cos(elevation),
+            -cos(azimuth) * sin(elevation),
+        )
+        turn = azimuth - atan2(x, z)
+        for number in range(len(_parts(tree, "lights"))):
+            place = _numbers(tree, ("lights", number, "position"))
+            changes[f"lights.{number}.position"] = _turned(place, turn)
+        if elevation < 0:
+            changes["objects.floor"] = None
+    problems: list[Problem] = []
+    for path, numbers in changes.items():
+        at = Place(str(STUDIO))
+        value = Node(None if numbers is None else [Node(float(each), at) for each in numbers], at)
+        tree = assign(tree, Override(tuple(path.split(".")), value, path), problems) or tree
+    return tree
+
+
+def _numbers(tree: Node, path: tuple[str | int, ...]) -> tuple[float, float, float]:
+    found = tree.find(path)
+    assert found is not None
+    x, y, z = found.plain()
+    return x, y, z
+
+
+def _parts(tree: Node, name: str) -> list[Node]:
+    found = tree.find((name,))
+    assert found is not None
+    assert isinstance(found.value, list)
+    return found.value
+
+
+def _turned(position: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
+    """A position turned about the y axis, from z towards x."""
+    x, y, z = position
+    return x * cos(angle) + z * sin(angle), y, z * cos(angle) - x * sin(angle)

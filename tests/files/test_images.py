@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from illumcli.errors import IllumError, InputError, OutputError
 from illumcli.files import images
 from illumcli.files.images import flip, layers, read_image, read_metadata, read_texture, write_sheet
-from illumcli.files.writer import ImageWriter, channel_types
+from illumcli.files.writer import ImageWriter, bits_of, channel_types
 
 LAYERED = ("R", "G", "B", "A", "Z", "P.X", "P.Y", "P.Z", "N.X", "key.R", "objectId")
 
@@ -458,6 +458,52 @@ def test_metadata_is_read_without_pixels(tmp_path):
     data = (tmp_path / "a.exr").read_bytes()
     (tmp_path / "a.exr").write_bytes(data[: len(data) // 2])
     assert read_metadata(tmp_path / "a.exr")["illum:seed"] == 3
+
+
+# ------------------------------------------------------------------ whole numbers
+
+
+IDS = np.array([[0, 1, 2**24 + 1, 2**24 + 3, 123_456_789, 2**31 - 1, 2**32 - 1]], np.uint32)
+
+
+@pytest.mark.parametrize("colour", [None, "half", "float"])
+def test_whole_numbers_of_32_bits_are_exact(tmp_path, colour):
+    """One by one, as other readers see them, and through a second file."""
+    types = {"id.Y": "uint"} if colour is None else {"R": colour, "id.Y": "uint", "Z": "float"}
+    band = np.full((1, IDS.shape[1], len(types)), 0.5, np.float32)
+    band[..., list(types).index("id.Y")] = bits_of(IDS)
+    path = tmp_path / "a.exr"
+    with ImageWriter(path, IDS.shape[1], 1, types) as writer:
+        writer.write_band(0, band)
+    found = read_image(path).channels
+    assert found["id.Y"].dtype == np.uint32
+    np.testing.assert_array_equal(found["id.Y"], IDS)
+    for name in types.keys() - {"id.Y"}:
+        assert found[name].dtype == np.float32
+        assert (found[name] == 0.5).all()
+    with_library = oiio.ImageInput.open(str(path))
+    spec = with_library.spec()
+    c = spec.channelnames.index("id.Y")
+    assert spec.channelformat(c) == oiio.UINT
+    np.testing.assert_array_equal(
+        np.asarray(with_library.read_scanlines(0, 0, 0, 1, 0, c, c + 1, oiio.UINT))[..., 0], IDS
+    )
+
+
+def test_a_texture_of_whole_numbers_has_their_values(tmp_path):
+    with ImageWriter(tmp_path / "a.exr", 2, 1, {"Y": "uint"}) as writer:
+        writer.write_band(0, bits_of(np.array([[[3], [70000]]], np.uint32)))
+    assert read_texture(tmp_path / "a.exr").ravel().tolist() == [3, 70000]
+
+
+def test_colour_beside_whole_numbers_must_be_finite(tmp_path):
+    band = np.zeros((1, 2, 2), np.float32)
+    band[0, 1, 1] = np.nan
+    with (
+        pytest.raises(IllumError, match="channel Z"),
+        ImageWriter(tmp_path / "a.exr", 2, 1, {"id.Y": "uint", "Z": "float"}) as writer,
+    ):
+        writer.write_band(0, band)
 
 
 # ------------------------------------------------------------------ textures

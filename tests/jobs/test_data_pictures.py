@@ -97,3 +97,24 @@ def test_nothing_seen_is_black_however_far_things_are(tmp_path):
     run(tmp_path / "far.yaml", pattern=str(tmp_path / "z.png"), only=["depth"], cache=False)
     shown = read_image(tmp_path / "z.png").channels["Y"]
     assert sorted(np.unique(shown * 255).round().tolist()) == [0, 1]
+
+
+def test_ids_beyond_single_precision_stay_exact_the_whole_way(tmp_path, monkeypatch):
+    """From the samples through tiles, pixels and the file: neighbours beyond 2^24 stay apart."""
+    from illumcli.plan import stages
+
+    def triangle_id(hits):
+        return (hits.triangle + 2**24 + 1).astype(np.uint32)
+
+    (tmp_path / "s.yaml").write_text(SCENE)
+    names = {"half": ["triangle_id", "beauty"], "float": ["depth", "triangle_id"]}
+    run(tmp_path / "s.yaml", pattern=str(tmp_path / "plain.exr"), only=["triangle_id"], cache=False)
+    plain = read_image(tmp_path / "plain.exr").channels["triangleId.Y"]
+    monkeypatch.setattr(stages, "triangle_id", triangle_id)
+    for colour, only in names.items():
+        path = tmp_path / f"{colour}.exr"
+        run(tmp_path / "s.yaml", [f"outputs.colour={colour}"], str(path), only, cache=False)
+        found = read_image(path).channels["triangleId.Y"]
+        assert found.dtype == np.uint32
+        np.testing.assert_array_equal(found, np.where(plain > 0, plain + 2**24, 0))
+    assert len(np.unique(plain)) > 100

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, no_utf8, shown
+from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, bits_of, no_utf8, numbers_of, shown
 from illumcli.memory import refuse_little
 from illumcli.pixels import from_srgb
 from illumcli.records import Record
@@ -28,6 +29,7 @@ import OpenImageIO as oiio  # noqa: E402
 
 SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
 READ_ROWS = 64  # rows held at once while reading back
+HEADER = 1 << 24  # bytes in which the channels of a file written here are named
 
 _HINTS: Mapping[str, Any] = {
     # measured on a render of 12 layers: zip at level 1 is as small as at 4 and as fast as none
@@ -54,7 +56,7 @@ class ExrFile:
 
     Parameters
     ----------
-    channels : mapping of name to `half` or `float`
+    channels : mapping of name to `half`, `float` or `uint`
     metadata : mapping of name to number, text or tuple of them
         Integers of 32 bits, floats in single precision, texts and tuples of one kind stay what they are;
         larger integers become text.
@@ -79,11 +81,14 @@ class ExrFile:
                 raise MemoryError
             raise Refused(f"{reason}; install one that writes .exr")
         self._output = output
-        kinds = [oiio.TypeDesc(kind) for kind in channels.values()]
+        # whole numbers go through the library as floats of the same bits: it would convert them by way of
+        # floats of 24 digits; the header is told their type when all is written
+        self._numbers = [name for name, kind in channels.items() if kind == "uint"]
+        kinds = [oiio.TypeDesc("float" if kind == "uint" else kind) for kind in channels.values()]
         widest = max(kinds, key=lambda kind: kind.size())
         spec = oiio.ImageSpec(width, height, len(kinds), widest)
         spec.channelnames = self._names
-        if len(set(channels.values())) > 1:
+        if len(set(map(str, kinds))) > 1:
             spec.channelformats = tuple(kinds)
         for name, value in {**_HINTS, **metadata}.items():
             _set(spec, name, value)
@@ -91,7 +96,7 @@ class ExrFile:
         self._check(self._output.open(os.fspath(path), spec))
 
     def write(self, band: NDArray[Any]) -> None:
-        """The next rows, (h, W, C) with the values the file will hold."""
+        """The next rows, (h, W, C) with the values the file will hold, those of `uint` as bits."""
         band = np.ascontiguousarray(band)
         self._dtype = band.dtype.type
         self._hash.update(band.data)
@@ -101,6 +106,8 @@ class ExrFile:
     def close(self) -> None:
         """The end of the file."""
         self._check(self._output.close())
+        if self._numbers:
+            _call_numbers(self._path, self._numbers)
 
     def is_as_written(self) -> bool:
         """Does the closed file hold the pixels it was given? It is read back in bands."""
@@ -127,12 +134,31 @@ class ExrFile:
             raise Refused(message or "no reason given")
 
 
+def _call_numbers(path: Path, names: Sequence[str]) -> None:
+    """Change the type of channels in the header of an EXR from float to whole numbers of 32 bits.
+
+    The file holds the same bytes for both. A header is a list of name, type, size and value; the value of
+    `channels` is one of name, type, four bytes, and the steps of sampling (OpenEXR file layout, openexr.com).
+    """
+    with path.open("r+b") as file:
+        header = bytearray(file.read(HEADER))
+        at = header.index(b"channels\0chlist\0") + len(b"channels\0chlist\0") + 4
+        while header[at]:
+            name = bytes(header[at : header.index(0, at)]).decode()
+            at += len(name.encode()) + 1
+            if name in names:
+                file.seek(at)
+                file.write(struct.pack("<i", 0))
+            at += 16
+
+
 class Image(Record):
     """An image as its file has it."""
 
     width: int
     height: int
-    channels: dict[str, NDArray[np.float32]]  # by name (`R`, `Z`, `P.X`), (H, W); integers as 0..1
+    channels: dict[str, NDArray[Any]]
+    """By name (`R`, `Z`, `P.X`), (H, W) float32, integers as 0..1; uint32 where an EXR has whole numbers."""
     encoded: bool  # integers, which stand for display values; else linear
     metadata: dict[str, Any]
 
@@ -152,7 +178,8 @@ def read_image(path: str | os.PathLike[str]) -> Image:
         for band in source.bands(np.float32):
             planes[:, y : y + len(band)] = np.moveaxis(band, -1, 0)
             y += len(band)
-        channels = dict(zip(source.names, planes, strict=True))
+        channels: dict[str, NDArray[Any]] = dict(zip(source.names, planes, strict=True))
+        channels |= {source.names[c]: numbers_of(planes[c]) for c in source.numbers}
         return Image(width, height, channels, source.encoded, source.metadata())
 
 
@@ -189,6 +216,8 @@ def read_texture(
         small = source.dtype == np.uint8
         space = space or ("srgb" if source.encoded else "linear")
         texels = np.concatenate(list(source.bands(np.uint8 if small else np.float32)))
+        for c in source.numbers:
+            texels[..., c] = numbers_of(texels[..., c])
     steps = np.arange(256) / 255
     if small:
         straight, curved = steps.astype(np.float32), from_srgb(steps).astype(np.float32)
@@ -344,7 +373,15 @@ class _Source:
     def dtype(self) -> np.dtype[Any]:
         """The file's own type, the widest of its channels."""
         name = str(self._spec.format)
-        return np.dtype({"half": "float16", "float": "float32"}.get(name, name))
+        return np.dtype(
+            {"half": "float16", "float": "float32", "uint": "uint32", "int": "int32"}.get(name, name)
+        )
+
+    @property
+    def numbers(self) -> list[int]:
+        """The channels that hold whole numbers, which only EXR has."""
+        formats = self._spec.channelformats or [self._spec.format] * self._spec.nchannels
+        return [c for c, kind in enumerate(formats) if self._format == "openexr" and kind == oiio.UINT]
 
     @property
     def encoded(self) -> bool:
@@ -357,22 +394,29 @@ class _Source:
         return None if names == self.names else [self.names.index(name) for name in names]
 
     def bands(self, dtype: Any) -> Iterator[NDArray[Any]]:
-        """(h, W, C) `dtype`, the whole image from the top."""
+        """(h, W, C) `dtype`, the whole image from the top; whole numbers of an EXR as bits of float32."""
         spec = self._spec
         kind = {np.float16: oiio.HALF, np.uint8: oiio.UINT8, np.uint16: oiio.UINT16}.get(dtype, oiio.FLOAT)
-        top, bottom, channels = spec.y, spec.y + spec.height, (0, spec.nchannels)
-        rows = spec.tile_height or READ_ROWS
+        top, bottom, rows = spec.y, spec.y + spec.height, spec.tile_height or READ_ROWS
         for y0 in range(top, bottom, rows):
             y1 = min(y0 + rows, bottom)
-            if spec.tile_height:
-                columns = (spec.x, spec.x + spec.width)
-                band = self._input.read_tiles(0, 0, *columns, y0, y1, 0, 1, *channels, kind)
-            else:
-                band = self._input.read_scanlines(0, 0, y0, y1, 0, *channels, kind)
-            message = self._input.geterror()  # for JPEG the message alone tells
-            if band is None or message:
-                raise self._refusal(message)
-            yield band.reshape(y1 - y0, spec.width, spec.nchannels)
+            band = self._rows(y0, y1, (0, spec.nchannels), kind)
+            for c in self.numbers:
+                band[..., c] = bits_of(self._rows(y0, y1, (c, c + 1), oiio.UINT))[..., 0]
+            yield band
+
+    def _rows(self, y0: int, y1: int, channels: tuple[int, int], kind: Any) -> NDArray[Any]:
+        """(h, W, channels) rows of some channels, from the first to before the last."""
+        spec = self._spec
+        if spec.tile_height:
+            columns = (spec.x, spec.x + spec.width)
+            band = self._input.read_tiles(0, 0, *columns, y0, y1, 0, 1, *channels, kind)
+        else:
+            band = self._input.read_scanlines(0, 0, y0, y1, 0, *channels, kind)
+        message = self._input.geterror()  # for JPEG the message alone tells
+        if band is None or message:
+            raise self._refusal(message)
+        return band.reshape(y1 - y0, spec.width, channels[1] - channels[0])
 
     def metadata(self) -> dict[str, Any]:
         return {entry.name: _plain(entry.value) for entry in self._spec.extra_attribs}

@@ -20,11 +20,21 @@ from illumcli.pixels import refuse_nonfinite
 from illumcli.records import Value
 
 LARGEST_HALF = 65504.0
-ChannelType: TypeAlias = Literal["half", "float", "uint8", "uint16"]
+ChannelType: TypeAlias = Literal["half", "float", "uint", "uint8", "uint16"]
 Metadata: TypeAlias = Mapping[str, Any]
 
-_DTYPES = {"half": np.float16, "float": np.float32, "uint8": np.uint8, "uint16": np.uint16}
-_KINDS = {".exr": ("openexr", {"half", "float"}), ".png": ("png", {"uint8", "uint16"})}
+_DTYPES = {"half": np.float16, "uint8": np.uint8, "uint16": np.uint16}
+_KINDS = {".exr": ("openexr", {"half", "float", "uint"}), ".png": ("png", {"uint8", "uint16"})}
+
+
+def bits_of(numbers: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Whole numbers as bands of an EXR hold them: the same bits, called floats, which nothing counts with."""
+    return np.ascontiguousarray(numbers).view(np.float32)
+
+
+def numbers_of(bits: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """The whole numbers that `bits_of` was given."""
+    return np.ascontiguousarray(bits).view(np.uint32)
 
 
 def channel_types(names: Sequence[str], colour: Literal["half", "float"] = "half") -> dict[str, ChannelType]:
@@ -54,7 +64,8 @@ class ImageWriter:
     path
         Ends in `.exr` or `.png`.
     channels : mapping of name to type, in the order of the bands' last axis
-        EXR: half or float, any names. PNG: uint8 or uint16, one type, named Y, Y A, R G B or R G B A.
+        EXR: half, float or uint, which are whole numbers of 32 bits, any names. PNG: uint8 or uint16, one
+        type, named Y, Y A, R G B or R G B A.
     metadata : mapping of name to number, text or tuple of them
         EXR keeps integers of 32 bits, floats in single precision, texts and tuples of one kind; larger
         integers become text. PNG keeps text alone.
@@ -88,8 +99,10 @@ class ImageWriter:
         self._width, self._height = width, height
         self._channels = dict(channels)
         self._halves = [c for c, kind in enumerate(self._channels.values()) if kind == "half"]
+        self._light = [c for c, kind in enumerate(self._channels.values()) if kind != "uint"]
         kinds = set(self._channels.values())
-        self._dtype: Any = _DTYPES[kinds.pop()] if len(kinds) == 1 else np.float32  # as written and read back
+        # as written and read back
+        self._dtype: Any = _DTYPES.get(kinds.pop(), np.float32) if len(kinds) == 1 else np.float32
         self._rows = 0
         self._clamped = 0
         self._written: Written | None = None
@@ -107,7 +120,8 @@ class ImageWriter:
         Parameters
         ----------
         band : (h, W, C)
-            float32 for EXR; the channels' own integers for PNG (`film.encode.picture` makes them).
+            float32 for EXR, in which the channels of type uint hold the bits of uint32 (`bits_of`); the
+            channels' own integers for PNG (`film.encode` makes them).
 
         Raises
         ------
@@ -118,7 +132,8 @@ class ImageWriter:
         if y0 != self._rows or y1 > self._height or band.shape[1:] != (self._width, len(self._channels)):
             raise ValueError(f"{self._named}: a band {band.shape} at row {y0}, after {self._rows} rows")
         if band.dtype.kind == "f":
-            refuse_nonfinite(band, list(self._channels), self._named, y0)
+            counted = band if len(self._light) == len(self._channels) else band[..., self._light]
+            refuse_nonfinite(counted, [list(self._channels)[c] for c in self._light], self._named, y0)
         with self._or_nothing():
             self._file.write(self._stored(band))
         self._rows = y1

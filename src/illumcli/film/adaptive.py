@@ -26,7 +26,7 @@ DARK = 0.05
 
 
 def differs_in_shape(
-    objects: NDArray[np.float32],
+    objects: NDArray[np.uint32],
     normals: NDArray[np.float32],
     lane: Ids,
     shape: tuple[int, int],
@@ -38,7 +38,7 @@ def differs_in_shape(
 
     Parameters
     ----------
-    objects : (M,) float32
+    objects : (M,) uint32
     normals : (M, 3) float32
         Of the samples that see something; 0 stands for the others.
     lane : (M,) int32

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,8 +28,8 @@ def pixel_means(values: NDArray[np.float32], lane: Ids, pixels: int, samples: in
     return by_pixel.mean(axis=2, dtype=np.float64).T.astype(F)
 
 
-def pixel_nearest(values: NDArray[np.float32], lane: Ids, nearest: Ids, pixels: int) -> NDArray[np.float32]:
-    """(P, k) of the sample nearest to each pixel's centre, 0 where that sample sees nothing.
+def pixel_nearest(values: NDArray[Any], lane: Ids, nearest: Ids, pixels: int) -> NDArray[Any]:
+    """(P, k) of the sample nearest to each pixel's centre, in the values' type, 0 where it sees nothing.
 
     Parameters
     ----------
@@ -41,6 +43,6 @@ def pixel_nearest(values: NDArray[np.float32], lane: Ids, nearest: Ids, pixels: 
     )
     row[lane] = np.arange(len(lane))
     which = row[nearest]
-    out = np.zeros((pixels, values.shape[1]), F)
+    out = np.zeros((pixels, values.shape[1]), values.dtype)
     out[which >= 0] = values[which[which >= 0]]
     return out

@@ -40,7 +40,7 @@ from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)
 """No band of tiles is higher [pixels]."""
-BYTES = {"half": 2, "float": 4, "uint8": 1, "uint16": 2}
+BYTES = {"half": 2, "float": 4, "uint": 4, "uint8": 1, "uint16": 2}
 Progress = Callable[[str, int, int], None]
 """Called with what is going on, how much is done and how much there is."""
 
@@ -384,11 +384,12 @@ def channels(scene: Any, target: Target) -> dict[str, Any]:
 
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]
-        names = ("Y",) if len(layer.channels) == 1 and not layer.name.endswith("_id") else tuple("RGB")
+        names = ("Y",) if len(layer.channels) == 1 and layer.kind != "id" else tuple("RGB")
         has_alpha = layer.buffer == "beauty" and scene.film.background is None
         return dict.fromkeys((*names, "A") if has_alpha else names, "uint8")
     names = tuple(name for layer in _beauty_first(target.layers) for name in _channels(scene, layer))
-    return dict(channel_types(tuple(dict.fromkeys(names)), scene.outputs.colour))
+    types = dict(channel_types(tuple(dict.fromkeys(names)), scene.outputs.colour))
+    return types | {name: "uint" for layer in target.layers if layer.kind == "id" for name in layer.channels}
 
 
 def _beauty_first(layers: Sequence[Layer]) -> list[Layer]:
@@ -405,6 +406,8 @@ def _channels(scene: Any, layer: Layer) -> tuple[str, ...]:
 
 def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any) -> NDArray[Any]:
     """(rows, columns, channels) of one file's tile, as its writer takes them."""
+    from illumcli.files.writer import bits_of
+
     parts = {layer.name: composed(scene, layer, layers) for layer in target.layers}
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]
@@ -414,8 +417,9 @@ def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any
         return plain(shown, str(target.path), tile.y, tile.x)
     seen: dict[str, NDArray[np.float32]] = {}
     for layer in _beauty_first(target.layers):
+        values = bits_of(parts[layer.name]) if layer.kind == "id" else parts[layer.name]
         for k, name in enumerate(_channels(scene, layer)):
-            seen.setdefault(name, parts[layer.name][..., k])
+            seen.setdefault(name, values[..., k])
     return np.stack(list(seen.values()), axis=-1)
 
 
@@ -428,7 +432,7 @@ def preview_scale(target: Target, frame: Any) -> float:
     return float(np.linalg.norm(np.subtract(camera.target, camera.position)))
 
 
-def composed(scene: Any, layer: Layer, layers: Planes) -> NDArray[np.float32]:
+def composed(scene: Any, layer: Layer, layers: Planes) -> NDArray[Any]:
     """The layer's pixels; the beauty over its background, or with its alpha where there is none."""
     values = layers[layer.name]
     if layer.buffer != "beauty":

@@ -27,7 +27,7 @@ from illumcli.rays.tracer import Interrupted
 from illumcli.records import Record
 from illumcli.visibility.arriving import Lit
 
-Planes: TypeAlias = dict[str, NDArray[np.float32]]  # layer -> (rows, columns, channels)
+Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32 or, ids, uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
 Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
 """A tile and its layers to what is wanted of it, (rows, columns, channels) by name; any thread."""

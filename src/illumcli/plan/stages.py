@@ -776,16 +776,16 @@ def uv(world: World, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
     return surface.uv(world, uvs, corner_weights_at(world, None, hits.triangle, hits.u, hits.v))
 
 
-def object_id(world: World, hits: Hits) -> Lanes:
+def object_id(world: World, hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the object, from 1."""
-    return (world.objects.take(hits.triangle) + 1).astype(F)
+    return (world.objects.take(hits.triangle) + 1).astype(np.uint32)
 
 
-def material_id(world: World, numbering: Numbering, hits: Hits) -> Lanes:
+def material_id(world: World, numbering: Numbering, hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the material, from 1."""
-    return (numbering.number(world, hits.triangle) + 1).astype(F)
+    return (numbering.number(world, hits.triangle) + 1).astype(np.uint32)
 
 
-def triangle_id(hits: Hits) -> Lanes:
+def triangle_id(hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the triangle, from 1."""
-    return (hits.triangle + 1).astype(F)
+    return (hits.triangle + 1).astype(np.uint32)

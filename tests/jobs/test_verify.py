@@ -40,16 +40,18 @@ def write(tmp_path):
 
 
 @pytest.fixture
-def illum_verify(monkeypatch, capsys):
+def illum_verify(monkeypatch, capfd):
     """Runs the command as a shell does: status, stdout, stderr."""
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["illum", "verify", *map(str, words)])
         monkeypatch.setattr(os, "_exit", sys.exit)
+        for name in ("stdout", "stderr"):  # which the command makes its own
+            monkeypatch.setattr(sys, name, getattr(sys, name))
         monkeypatch.setattr(signal, "signal", lambda number, handler: None)
         with pytest.raises(SystemExit) as stop:
             main()
-        return (stop.value.code, *capsys.readouterr())
+        return (stop.value.code, *capfd.readouterr())
 
     return call
 

@@ -24,6 +24,20 @@ def test_bytes_behind_the_announced_end_are_counted(tmp_path: Path, square: Any)
     assert read_mesh(path).repairs["bytes behind the announced end"].first == ""
 
 
+def test_an_announced_length_that_is_wrong_is_counted(tmp_path: Path, square: Any) -> None:
+    scene = square()
+    scene.data += b"an image"  # behind all geometry
+    path = scene.write(tmp_path / "a.glb")
+    whole = path.read_bytes()
+    for length in (0, 12, 100, len(whole) - 4, len(whole) + 4):
+        path.write_bytes(whole[:8] + length.to_bytes(4, "little") + whole[12:])
+        assert read_mesh(path).polygon_count == 2
+        word = "shorter" if length > len(whole) else "longer"
+        assert counted(path) == {f"files {word} than announced": 1}
+    path.write_bytes(whole[:-6])
+    assert counted(path) == {"files shorter than announced": 1, "buffers shorter than announced": 1}
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
 def test_json_in_other_encodings(tmp_path: Path, square: Any, encoding: str) -> None:
     scene = square()

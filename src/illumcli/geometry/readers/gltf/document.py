@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.readers._files import TAKEN, beside, content, nearby
 from illumcli.geometry.repairs import Repair, note
+from illumcli.records import Value
 
 READ = frozenset({"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"})
 """Extensions that a file may need and that are read in full."""
@@ -32,6 +33,8 @@ class Document:
     json: dict[str, Any]
     chunk: bytes | None
     """The binary chunk of a .glb file."""
+    cut: bool = False
+    """The .glb file is shorter than it says."""
     buffers: dict[int, bytes] = field(default_factory=dict)
     repairs: dict[str, Repair] = field(default_factory=dict)
 
@@ -97,7 +100,8 @@ class Document:
         start = self.integer(entry, "byteOffset", where, 0)
         end = start + self.integer(entry, "byteLength", where)
         if end > len(data):
-            raise self.wrong(f"{where} ends at byte {end} of its buffer, which has {len(data)}")
+            fact = f"{where} ends at byte {end} of its buffer, which has {len(data)}"
+            raise self.wrong(f"the file is cut off, {fact}" if self.cut else fact)
         return data, start, end
 
     def buffer(self, index: Any) -> bytes:
@@ -164,9 +168,8 @@ def _altchars(data: bytes) -> bytes | None:
 def open_document(path: Path) -> Document:
     """The document in a file of either kind, checked to be glTF 2."""
     data = content(path)
-    chunk, surplus = None, 0
-    if data.startswith(b"glTF"):
-        data, chunk, surplus = _chunks(path, data)
+    chunks = _chunks(path, data) if data.startswith(b"glTF") else _Chunks(data, None, False, 0)
+    data = chunks.json
     try:
         text = data.decode(json.detect_encoding(data), "replace")
         parsed = json.loads(text.rstrip("\0 \t\r\n"))
@@ -180,9 +183,13 @@ def open_document(path: Path) -> Document:
     version = parsed["asset"].get("version")
     if not str(version).startswith("2"):
         raise InputError(f"{path}: is glTF of version {version!r:.20}; export it as glTF 2")
-    document = Document(path, parsed, chunk)
-    if surplus:
-        document.count("bytes behind the announced end", "", surplus)
+    document = Document(path, parsed, chunks.binary, cut=chunks.cut)
+    if chunks.surplus > 0:
+        document.count("bytes behind the announced end", "", chunks.surplus)
+    elif chunks.surplus:
+        document.count("files longer than announced")
+    if chunks.cut:
+        document.count("files shorter than announced")
     _name_extensions(document)
     return document
 
@@ -196,27 +203,41 @@ def _name_extensions(document: Document) -> None:
             document.count(f"required extension {name!s:.60}, read in its core state")
 
 
-def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None, int]:
-    """The JSON and the binary chunk of a .glb file, and how many bytes lie behind its announced end."""
+class _Chunks(Value):
+    """What a .glb file consists of."""
+
+    json: bytes
+    binary: bytes | None
+    cut: bool
+    """The last chunk is longer than the file."""
+    surplus: int
+    """Bytes behind the announced end and all chunks; negative where chunks go on behind the announced end."""
+
+
+def _chunks(path: Path, data: bytes) -> _Chunks:
+    """The first JSON and the first binary chunk of a .glb file, in any order, among others.
+
+    An announced length that is wrong is of no matter where the chunks are whole: behind it chunks are looked
+    for as long as these are not found.
+    """
     version, length = int.from_bytes(data[4:8], "little"), int.from_bytes(data[8:12], "little")
     if version != 2:
         raise InputError(f"{path}: is binary glTF of version {version}; export it as glTF 2")
-    if length > len(data):
-        raise InputError(
-            f"{path}: announces {length} bytes and has {len(data)}; the file is cut off, export it again"
-        )
-    chunks: dict[bytes, bytes] = {}
-    at = 12
-    while at + 8 <= length:
+    found: dict[bytes, bytes] = {}
+    at, cut = 12, False
+    while at + 8 <= len(data):
         size, kind = int.from_bytes(data[at : at + 4], "little"), data[at + 4 : at + 8]
-        at += 8
-        if at + size > length:
-            raise InputError(f"{path}: a chunk reaches beyond the end of the file; export the mesh again")
-        chunks.setdefault(kind, data[at : at + size])
-        at += size
-    if b"JSON" not in chunks:
+        wanted = kind in (b"JSON", b"BIN\0") and kind not in found
+        if at >= length and not wanted:
+            break
+        cut = at + 8 + size > len(data)
+        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if b"JSON" not in found:
         raise InputError(f"{path}: has no JSON chunk; export the mesh again")
-    return chunks[b"JSON"], chunks.get(b"BIN\0"), len(data) - length
+    cut = cut or length > len(data)
+    surplus = 0 if cut else length - at if at > length else len(data) - length
+    return _Chunks(found[b"JSON"], found.get(b"BIN\0"), cut, surplus)
 
 
 def extensions(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:

@@ -113,10 +113,10 @@ def a_wide_spot_is_a_point(case: Case, random: Random, studio: Studio) -> None:
     light; one that looks past the scene is dark. Premise: no depth cue into a colour."""
     case = case.copy()
     case.scene.pop("depth_cue", None)
-    distance = 10 ** random.uniform(0.8, 5)
+    distance = 10 ** random.uniform(0.9, 5)
     place = np.array(scenes.direction(random, 0.3)) * distance
     point = {"light": "point", "name": "l0", "position": place.tolist(), "attenuation": {"law": "none"}}
-    half = math.degrees(math.atan(4 / (distance - 4))) if distance > 8 else 60.0
+    half = math.degrees(math.atan(6 / (distance - 6))) if distance > 12 else 80.0
     softness = random.choice([0.0, 0.5])
     cone = min(half / (1 - softness), 180.0)
     spot = point | {"light": "spot", "target": [0, 0, 0], "angle": cone, "softness": softness}
@@ -130,7 +130,7 @@ def a_wide_spot_is_a_point(case: Case, random: Random, studio: Studio) -> None:
         return studio(own, layers)
 
     close(under(point), under(spot), outliers=0)
-    if distance > 20:
+    if distance > 30:
         past = under(spot | {"target": aside.tolist()})
         lit = max(
             float(np.abs(values).max(initial=0)) for (_, layer), values in past.items() if layer == "l0"

@@ -23,7 +23,7 @@ from illumcli.scene.load import load
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, pictures, same
 from metamorphic.premises import UNDRAWN, at_centres, fixed_samples, one_camera, without_rays
 from metamorphic.relation import relation
-from metamorphic.scenes import Case
+from metamorphic.scenes import MEASUREMENT, Case
 
 
 @relation("exact")
@@ -33,8 +33,9 @@ def a_layer_does_not_know_of_others(case: Case, random: Random, studio: Studio) 
     path = case.write(studio.folder())
     every = (*ALL, *light_layers(case), *(f"shadow.{name}" for name in light_layers(case)))
     whole = pictures(path, layers=(*every, "triangle_id"))
-    some = random.sample(every, random.randint(1, 4))
-    for part in (pictures(path, layers=some), pictures(path, layers=every)):
+    light = [name for name in every if name != "obscurance"]  # whose rays reach far in most scenes
+    asked = [random.sample(names, random.randint(1, 4)) for names in (every, light, light)]
+    for part in (pictures(path, layers=names) for names in (*asked, every)):
         same({key: whole[key] for key in part}, part)
 
 
@@ -102,14 +103,25 @@ def each_view_is_a_scene(case: Case, random: Random, studio: Studio) -> None:
 
 
 @relation("exact")
-def all_samples_at_once(case: Case, random: Random, studio: Studio) -> None:
-    """Adaptive sampling that begins with all samples is none."""
+def an_adaptive_pixel_has_few_or_all_samples(case: Case, random: Random, studio: Studio) -> None:
+    """Every pixel of an adaptive picture is that of the few samples alone or that of all. Premise: several
+    samples, since a single one looks through the centre."""
     case = fixed_samples(case)
     for camera in case.scene["cameras"].values():
         camera.pop("samples", None)
-    adaptive = case.copy()
-    adaptive.scene["film"]["adaptive"] = case.scene["film"]["samples"]
-    same(studio(case), studio(adaptive))
+
+    def sampled(**film: Any) -> Pictures:
+        own = case.copy()
+        own.scene["film"] |= film
+        return studio(own, layers)
+
+    layers = (*ALL, *light_layers(case))
+    few, many = random.choice([(2, 3), (2, 6), (3, 5)])
+    first, every = sampled(samples=few), sampled(samples=many)
+    for key, values in sampled(samples=many, adaptive=few).items():
+        agrees = [(values == other[key]).all(axis=-1) for other in (first, every)]
+        neither = ~(agrees[0] | agrees[1])
+        assert not neither.any(), f"{key}: {int(neither.sum())} pixels have neither {few} nor {many} samples"
 
 
 @relation("exact")
@@ -221,7 +233,7 @@ def extends_is_a_merge(case: Case, random: Random, studio: Studio) -> None:
     folder = studio.folder()
     case.write(folder)
     under = random.choice(["", "below/"])
-    files = [*case.meshes, *case.images]
+    files = [*case.meshes, *case.images, MEASUREMENT]
 
     def away(value: Any) -> Any:
         if isinstance(value, dict):

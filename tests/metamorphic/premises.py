@@ -118,7 +118,7 @@ def without_images(case: Case, random: Random) -> Case:
 
 def plain_material(random: Random, thing: dict[str, Any], grained: bool = True) -> None:
     """Give an object a material of its own that does not vary over the surface."""
-    names = [name for name in scenes.MODELS if grained or name not in scenes.GRAINED]
+    names = [name for name in scenes.SMALL if grained or name not in scenes.GRAINED]
     model = random.choice(names)
     thing.pop("override", None)
     thing["material"] = {"model": model, **scenes.MODELS[model](random)}

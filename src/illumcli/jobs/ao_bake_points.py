@@ -107,16 +107,16 @@ class VertexPoints(Points):
         # the starts, at the angles that their numbers say
         place = np.tile(np.arange(STARTS), len(lanes)) + np.repeat(offset, STARTS)
         turn = place / STARTS * whole[own] - (upto - before - angle)[own]
+        turn = turn.clip(0, angle[own]).astype(F)
         base, ahead, aside, ng = self._fans(wedge)
-        turn = turn.clip(0, angle[own])
         origins = rows(base, own)
         origins += np.cos(turn)[:, None] * rows(ahead, own)
         origins += np.sin(turn)[:, None] * rows(aside, own)
-        return Hemispheres(rows(self.n, lanes), columns(origins, F), rows(ng, own))
+        return Hemispheres(rows(self.n, lanes), origins, rows(ng, own))
 
     def _fans(self, wedge: NDArray[np.int64]) -> tuple[Vectors, Vectors, Vectors, Vectors]:
         """Of some wedges: the corner, lifted off its triangle, and two steps inside, along the next edge and
-        at right angles to it, (K, 3) float64 each; the triangle's normal, float32."""
+        at right angles to it; the triangle's normal: (K, 3) float32 each."""
         vertex, triangle = self.wedges.vertex[wedge], self.wedges.triangle[wedge]
         corner, following, last = (
             columns(rows(self.world.vertices, vertex[:, k]), np.float64) for k in range(3)
@@ -127,7 +127,7 @@ class VertexPoints(Points):
         reach = np.minimum(INSIDE * np.sqrt(np.minimum(dot(ahead, ahead), dot(back, back))), height / 4)
         normal = ng.astype(np.float64)
         along = unit(ahead - dot(ahead, normal)[:, None] * normal) * reach[:, None]
-        return columns(lifted(corner, ng, edge), np.float64), along, cross(normal, along), ng
+        return lifted(corner, ng, edge), columns(along, F), columns(cross(normal, along), F), ng
 
     def above(self, clear: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if not len(self.number):
@@ -135,13 +135,20 @@ class VertexPoints(Points):
         return np.logical_and.reduceat(clear[self.wedges.triangle], self.wedges.first[:-1])
 
 
+class Sides(Record):
+    """What K vertices have on one smooth side: a vertex and a normal, and the corners that have both."""
+
+    vertex: NDArray[np.int32]  # (K,)
+    row: NDArray[np.int64]  # (K,) of the points
+    angle: NDArray[np.float64]  # (K,) of all its corners [rad]
+
+
 class Vertices(Record):
     """The corners of a world and the points they take their values from."""
 
     points: VertexPoints
     row: NDArray[np.int64]  # (C,) row of `points` for each polygon corner, -1 where it has none
-    angle: NDArray[np.float64]  # (C,) [rad]
-    vertex: NDArray[np.int32]  # (C,) of each corner
+    sides: Sides
     count: int  # vertices
     unreferenced: int  # vertices that no polygon names
     without_normal: int  # vertices of polygons without area alone
@@ -163,8 +170,11 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     has = own & (dot(n, n) > 0.25) & (corner_angle > 0)
     casting = np.flatnonzero(has)
     thing = _thing_of_vertex(world)
+    side, first_corner = _sides(vertex[casting], rows(n, casting))
+    first_corner = casting[first_corner]
+    into, first = _points_of(world, thing, vertex[first_corner], rows(n, first_corner))
     row = np.full(len(vertex), -1, np.int64)
-    row[casting], first = _points_of(world, thing, vertex[casting], rows(n, casting))
+    row[casting] = into[side]
 
     # their wedges, point by point
     order = np.argsort(row[owner], kind="stable")
@@ -172,7 +182,7 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     begins = np.searchsorted(row[owner][order], np.arange(len(first) + 1))
     wedges = Wedges(begins, wedge_triangle[order], wedge_vertex[order], angle[order].astype(F))
 
-    corner = casting[first]
+    corner = first_corner[first]
     at = vertex[corner]
     points = VertexPoints(
         world,
@@ -185,16 +195,16 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     )
     used, asked = np.zeros(len(world.vertices), bool), np.zeros(len(world.vertices), bool)
     used[vertex], asked[vertex[casting]] = True, True
-    pairs = np.unique(row[casting] * np.int64(len(world.vertices)) + vertex[casting])
+    angles = np.bincount(side, corner_angle[casting], len(first_corner)).astype(np.float64)
+    sides = Sides(vertex[first_corner], into, angles)
     return Vertices(
         points,
         row,
-        corner_angle,
-        vertex,
+        sides,
         len(world.vertices),
         int((~used).sum()),
         int((used & ~asked).sum()),
-        len(pairs) - len(first),
+        len(first_corner) - len(first),
     )
 
 
@@ -292,51 +302,53 @@ def _runs_forwards(
     return ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
 
 
+def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(C,) the side of each corner, those of one vertex and equal normals, and the first corner of each side,
+    in ascending order."""
+    # most vertices have one normal: that of their first corner
+    corners = np.arange(len(vertex))
+    first = np.zeros(vertex.max(initial=-1) + 1, np.int64)
+    first[vertex[::-1]] = corners[::-1]
+    lowest = first[vertex]
+    others = np.flatnonzero((n != rows(n, lowest)).any(axis=1))
+    if others.size:
+        order, same = _equal_rows(np.ascontiguousarray(rows(n, others)), vertex[others])
+        begins = np.append(True, ~same)
+        lowest[others[order]] = others[order][begins][np.cumsum(begins) - 1]
+    is_first = lowest == corners
+    return (np.cumsum(is_first) - 1)[lowest], np.flatnonzero(is_first)
+
+
 def _points_of(
     world: World, thing: Ids, vertex: NDArray[np.int32], n: Vectors
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(C,) which point each corner belongs to, and the first corner of every point, in ascending order.
+    """(K,) the point that each side belongs to, and the first side of every point, in ascending order.
 
-    Corners of one object whose places are equal and whose normals are, or nearly, belong to one point.
+    Sides of one object belong to one point where their places are equal and their normals are, or nearly.
     """
-    # corners with the same bits, in groups numbered by their first corners
-    place = np.ascontiguousarray(world.vertices)[vertex]
-    first, group = _grouped(np.concatenate([place, np.ascontiguousarray(n)], axis=1), thing[vertex])
-
-    # groups at one place whose normals differ in their last digits
-    order, same = _equal_rows(place[first], thing[vertex[first]])
-    normal, into = rows(n, first), np.arange(len(first))
+    order, same = _equal_rows(np.ascontiguousarray(world.vertices)[vertex], thing[vertex])
+    into = np.arange(len(vertex))
     for shift, lanes in _runs(same):
         a, b = order[lanes], order[lanes + shift]
-        near = np.flatnonzero(length(rows(normal, a) - rows(normal, b)) < SAME_NORMAL)
+        near = np.flatnonzero(length(rows(n, a) - rows(n, b)) < SAME_NORMAL)
         np.minimum.at(into, b[near], a[near])
     while (into[into] != into).any():
         into = into[into]
-    kept, into = np.unique(into, return_inverse=True)
-    return into.ravel()[group], first[kept]
+    is_first = into == np.arange(len(into))
+    return (np.cumsum(is_first) - 1)[into], np.flatnonzero(is_first)
 
 
-def _grouped(table: NDArray[np.float32], thing: Ids) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The first of each group of equal rows of one object, ascending, and (N,) the group of every row."""
-    order, same = _equal_rows(table, thing)
-    begins = np.append(np.ones(min(len(order), 1), bool), ~same)
-    group = np.empty(len(order), np.int64)
-    group[order] = np.cumsum(begins) - 1
-    first, rank = np.unique(order[begins], return_inverse=True)
-    return first, rank.ravel()[group]
-
-
-def _equal_rows(table: NDArray[np.float32], thing: Ids) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _equal_rows(table: NDArray[np.float32], owner: Ids) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Rows in an order in which equal ones of one object follow each other, by number, and (N - 1,) whether
     each equals the one before; zeros of either sign are equal."""
     bits = (table + F(0)).view(np.uint32).astype(np.uint64)
-    key = thing.astype(np.uint64)
+    key = owner.astype(np.uint64)
     for column in bits.T:
         key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
     order = np.argsort(key, kind="stable")
     a, b = order[:-1], order[1:]
-    same = (key[a] == key[b]) & (thing[a] == thing[b]) & (table[a] == table[b]).all(axis=1)
+    same = (key[a] == key[b]) & (owner[a] == owner[b]) & (table[a] == table[b]).all(axis=1)
     return order, same
 
 

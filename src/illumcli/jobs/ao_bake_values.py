@@ -27,13 +27,11 @@ def baked_values(
     bent : (M, 3), optional
         Unit mean direction of what is open.
     """
-    has = np.flatnonzero(vertices.row >= 0)
-    row, vertex, angle = vertices.row[has], vertices.vertex[has], vertices.angle[has]
-
     # the share of each point in its vertices; different points err independently
-    pair, back = np.unique(vertex * np.int64(len(w) + 1) + row, return_inverse=True)
+    sides = vertices.sides
+    pair, back = np.unique(sides.vertex * np.int64(len(w) + 1) + sides.row, return_inverse=True)
     at, point = np.divmod(pair, len(w) + 1)
-    share = np.bincount(back.ravel(), angle, len(pair))
+    share = np.bincount(back.ravel(), sides.angle, len(pair))
     whole = np.bincount(at, share, vertices.count)
 
     def mean(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -52,9 +50,11 @@ def baked_values(
         return made
 
     # some vertex has several
+    has = np.flatnonzero(vertices.row >= 0)
+
     def of_corners(values: NDArray[Any], otherwise: float) -> NDArray[np.float32]:
         out = np.full((len(vertices.row), *values.shape[1:]), otherwise, F)
-        out[has] = values[row]
+        out[has] = values[vertices.row[has]]
         return out
 
     return replace(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable
 
 
 class IllumError(Exception):
     """A run that cannot go on; its text names the place, the fact and the way out.
 
-    `exit_code` is what the command line ends with: 1 failed while running.
+    `exit_code` is what the command line ends with: 1 a fault of the program.
     """
 
     exit_code = 1
@@ -40,3 +41,27 @@ class OutputError(IllumError):
     """An output or the cache cannot be written; nothing half-written is left."""
 
     exit_code = 5
+
+
+LITTLE_MEMORY = "out of memory; make the film, the meshes or the samples smaller"
+
+
+def known(error: BaseException) -> IllumError | None:
+    """The same as one of ours, where its cause are the surroundings; None for a fault of the program."""
+    match error:
+        case IllumError():
+            return error
+        case MemoryError() | OSError(errno=errno.ENOMEM):
+            return LimitError(LITTLE_MEMORY)
+        case OSError():
+            place = f"{error.filename}: " if error.filename else ""
+            fact = f"{place}{error.strerror or error}"
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                return LimitError(f"{fact}; raise the limit on open files (ulimit -n)")
+            return OutputError(f"{fact}; check the disk and the permissions")
+        case ImportError():  # most often too little memory to map a library
+            said = str(error).strip().splitlines()[-1:] or ["no reason given"]
+            return LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again")
+        case RuntimeError() if "start new thread" in str(error):  # it wants memory, too
+            return LimitError(LITTLE_MEMORY)
+    return None

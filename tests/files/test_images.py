@@ -602,7 +602,7 @@ def test_flip_that_the_library_refuses_is_no_number(monkeypatch):
 def test_a_sheet_shows_every_picture_in_a_cell_with_its_label(tmp_path, count):
     shades = np.linspace(40, 240, count).astype(int).tolist()
     pictures = [np.full((20 + 10 * k, 40, 3 if k % 2 else 1), shades[k], np.uint8) for k in range(count)]
-    write_sheet(tmp_path / "s.png", iter(pictures), [f"{'a long label ' * 9}{k}" for k in range(count)])
+    write_sheet(tmp_path / "s.png", iter(pictures), [f"{'a long label ' * 9}{k}" for k in range(count)], "c")
     sheet = read_image(tmp_path / "s.png")
     assert sheet.width % (images.SHEET_CELL + 8) == 0
     columns = sheet.width // (images.SHEET_CELL + 8)
@@ -622,5 +622,5 @@ def test_a_sheet_shows_every_picture_in_a_cell_with_its_label(tmp_path, count):
 
 def test_a_sheet_needs_a_label_for_every_picture(tmp_path):
     with pytest.raises(ValueError, match="zip"):
-        write_sheet(tmp_path / "s.png", [np.zeros((4, 4, 3), np.uint8)], ["a", "b"])
+        write_sheet(tmp_path / "s.png", [np.zeros((4, 4, 3), np.uint8)], ["a", "b"], "c")
     assert os.listdir(tmp_path) == []

@@ -11,6 +11,7 @@ from plyfile import PlyData, PlyElement
 
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
+from illumcli.files.atomic import beside
 from illumcli.files.vertex_data import read_npz
 from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.readers import read_mesh
@@ -306,7 +307,7 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run(path, [out], Settings(), threads=2)
     assert not out.exists()
-    assert [p.name for p in tmp_path.glob(".*")] == [".out.npz.unfinished"]
+    assert list(tmp_path.glob(".*")) == [beside(out, "unfinished")]
     monkeypatch.setattr(Caster, "_run", cast)
     _, report = run(path, [out], Settings(), threads=2)
     _, whole = run(path, [tmp_path / "two.npz"], Settings(), threads=2)

@@ -179,7 +179,7 @@ def test_no_other_file_is_replaced_unasked(tmp_path):
 
 
 def test_only_png_and_svg_are_drawn(tmp_path):
-    with pytest.raises(InputError, match=r"are .png or .svg"):
+    with pytest.raises(InputError, match=r"is written as \.png or \.svg"):
         run(["lambert"], output=tmp_path / "x.pdf")
 
 

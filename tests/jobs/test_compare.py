@@ -193,5 +193,5 @@ def test_heat_of_equal_images_is_black(pair, tmp_path):
 
 
 def test_heat_is_a_png(pair, tmp_path):
-    with pytest.raises(InputError, match=r"heat\.exr: the heat picture is a PNG"):
+    with pytest.raises(InputError, match=r"heat\.exr: a heat picture is written as \.png"):
         run(*pair, heat_file=tmp_path / "heat.exr")

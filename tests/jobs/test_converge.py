@@ -115,7 +115,7 @@ def test_what_cannot_be_measured_is_refused(scene):
 
 
 def test_a_single_level_of_no_error_has_no_slope():
-    still = curve("spiral", [point(Sampling(1, 4, "spiral", 0), 4, [converge.Run(0, 1, 10, 0.1, 0.0)])])
+    still = curve("spiral", [point(Sampling(1, 4, "spiral", 0), 4, [converge.Run(0, 1, 10, 0.1, 0.0, "")])])
     assert math.isnan(still.slope)
     assert math.isnan(still.count_for(0.1))
     assert drawn([still]) == "no error to draw"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 
 import pytest
 
 from illumcli.errors import InputError
 from illumcli.files.images import read_image
-from illumcli.jobs.sweep import at_frame, axis_of, run, split, variants_of
+from illumcli.jobs.sweep import Settings, at_frame, axis_of, run, split, variants_of
 
 SCENE = """
 version: 1
@@ -133,12 +134,14 @@ def test_a_sweep_goes_on_where_it_stopped(illum, scene, tmp_path):
     axis = "materials.clay.specular=0.1,0.2,0.3"
     assert illum("sweep", scene, "-D", axis).returncode == 0
     (tmp_path / "ball-0.2.png").unlink()
-    stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.png")}
+    held = {path.name: (path.stat().st_ino, os.utime(path, (1e9, 1e9))) for path in tmp_path.glob("*.png")}
     again = illum("sweep", scene, "-D", axis, "--table", "t.csv")
     assert again.stdout.split() == ["ball-0.1.png", "ball-0.2.png", "ball-0.3.png"]
     assert again.stderr.count("kept") == 2
-    assert {name: (tmp_path / name).stat().st_mtime_ns for name in stamps} == stamps
-    assert [line.split(",")[4] for line in (tmp_path / "t.csv").read_text().split()] == [
+    for name, (inode, _) in held.items():  # the same file, dated now
+        assert (tmp_path / name).stat().st_ino == inode
+        assert (tmp_path / name).stat().st_mtime > scene.stat().st_mtime
+    assert [line.split(",")[5] for line in (tmp_path / "t.csv").read_text().split()] == [
         "state", "kept", "rendered", "kept"
     ]  # fmt: skip
 
@@ -157,17 +160,34 @@ def test_what_has_an_effect_in_some_variant_is_not_told(scene, tmp_path):
     variants = variants_of(
         ["ambient=0,0.2", "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"]
     )
-    done = run(scene, variants, str(tmp_path / "{ambient}.png"), cache=False)
+    done = run(scene, variants, Settings(pattern=str(tmp_path / "{ambient}.png"), cache=False))
     assert len(done.warnings) == 1
     assert "a single sample looks" in done.warnings[0]
 
 
-def test_all_problems_are_said_before_anything_is_rendered(illum, scene, tmp_path):
-    done = illum("sweep", scene, "-D", "materials.clay.exponent=4,-1,x")
-    assert done.returncode == 2
-    assert "exponent=-1" in done.stderr
-    assert "exponent=x" in done.stderr
+def test_faults_of_values_are_told_first_and_the_other_variants_are_done(illum, scene, tmp_path):
+    words = ("sweep", scene, "-D", "materials.clay.exponent=-1,4,x")
+    stopped = illum(*words, "--stop-at-first")
+    assert stopped.returncode == 2
     assert not list(tmp_path.glob("*.png"))
+    done = illum(*words, "--table", "t.csv", "--report", "r.json")
+    assert (done.returncode, done.stdout) == (2, "ball-4.png\n")
+    assert done.stderr.splitlines() == [
+        "exponent -1: -D materials.clay.exponent=-1: must be at least 0, is -1",
+        "exponent x: -D materials.clay.exponent=x: must be a number, is text 'x'",
+        "2 of 3 variants failed",
+    ]
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert [row["state"] for row in rows] == ["failed", "rendered", "failed"]
+    assert [row["content"] == "incomplete" for row in rows] == [True, False, True]
+    assert "must be at least 0" in json.loads((tmp_path / "r.json").read_text())[0]["error"]
+
+    mended = illum("sweep", scene, "-D", "materials.clay.exponent=-1,4", "--table", "t.csv")
+    assert mended.returncode == 5
+    assert "t.csv: a different file is there" in mended.stderr
+
+
+def test_names_that_clash_are_told_before_anything_is_rendered(illum, scene, tmp_path):
     clash = illum("sweep", scene, "-D", "ambient=0.1,0.2", "-o", "same.png")
     assert clash.returncode == 2
     assert "same.png: the name of 2 images" in clash.stderr

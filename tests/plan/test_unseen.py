@@ -13,8 +13,8 @@ from illumcli.files.store import Store
 from illumcli.geometry.assemble import stand
 from illumcli.geometry.mesh import Mesh
 from illumcli.jobs.render import run
+from illumcli.jobs.sweep import Settings, variants_of
 from illumcli.jobs.sweep import run as sweep
-from illumcli.jobs.sweep import variants_of
 from illumcli.plan import artifacts as policy
 from illumcli.plan.artifacts import Artifacts
 from illumcli.plan.execute import Tally, bands, run_once
@@ -165,7 +165,7 @@ def test_the_job_counts_and_names_them(scene, tmp_path, monkeypatch):
 
 def test_a_sweep_shares_what_remains(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = sweep(scene, variants_of(["materials.red.exponent=3,9,27"]), cache=False)
+    done = sweep(scene, variants_of(["materials.red.exponent=3,9,27"]), Settings(cache=False))
     rays = [sum(outcome.report.rays.values()) for outcome in done.outcomes]
     assert rays[0] > 0
     assert rays[1:] == [0, 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import os
 import signal
@@ -15,7 +14,7 @@ import click
 
 from illumcli import __version__
 from illumcli.cli._streams import open_standard_streams
-from illumcli.errors import IllumError, LimitError, OutputError
+from illumcli.errors import IllumError, OutputError, known
 from illumcli.memory import refuse_little
 
 _TO_LOAD = 160 << 20
@@ -110,31 +109,13 @@ def _status() -> int:
     try:
         code = illum.main(standalone_mode=False)
         return code if isinstance(code, int) else 0
-    except IllumError as error:
-        return _told(error)
     except click.ClickException as error:
         error.show()
         return error.exit_code
-    except MemoryError:
-        return _told(LimitError(_LITTLE_MEMORY))
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        fact = f"{place}{error.strerror or error}"
-        if error.errno == errno.ENOMEM:
-            return _told(LimitError(_LITTLE_MEMORY))
-        if error.errno in (errno.EMFILE, errno.ENFILE):
-            return _told(LimitError(f"{fact}; raise the limit on open files (ulimit -n)"))
-        return _told(OutputError(f"{fact}; check the disk and the permissions"))
-    except ImportError as error:  # most often too little memory to map a library
-        said = str(error).strip().splitlines()[-1:] or ["no reason given"]
-        return _told(LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again"))
-    except RuntimeError as error:
-        if "start new thread" not in str(error):
+    except Exception as error:
+        if (fault := known(error)) is None:
             raise
-        return _told(LimitError(_LITTLE_MEMORY))
-
-
-_LITTLE_MEMORY = "out of memory; make the film, the meshes or the samples smaller"
+        return _told(fault)
 
 
 def _told(error: IllumError) -> int:

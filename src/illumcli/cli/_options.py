@@ -12,7 +12,8 @@ import click
 
 C = TypeVar("C", bound=Callable[..., Any])
 
-SCENE = click.Path(exists=True, dir_okay=False, path_type=Path)
+SCENE = click.Path(path_type=Path)
+"""Whether it is there is found when it is read: one that is missing stops no other."""
 
 scene_argument = click.argument("scene", type=SCENE)
 scenes_argument = click.argument("scenes", metavar="SCENE...", type=SCENE, nargs=-1, required=True)
@@ -82,9 +83,22 @@ def studio_options(command: C) -> C:
     return cast(C, look(turn(arranged)))
 
 
+keep_going_option = click.option(
+    "--keep-going/--stop-at-first",
+    default=True,
+    show_default=True,
+    help="Where one of several fails: do the others all the same, or stop. The exit code is the first one's.",
+)
+
 strict_option = click.option(
     "--strict", is_flag=True, help="Refuse meshes and textures that need repairs, instead of counting them."
 )
+
+
+def tell(text: str) -> None:
+    """Say something that is no result."""
+    click.echo(text, err=True)
+
 
 no_cache_option = click.option(
     "--no-cache",

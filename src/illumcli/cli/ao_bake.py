@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from illumcli.cli._options import SCENE, overrides_option, strict_option
+from illumcli.cli._options import SCENE, keep_going_option, overrides_option, strict_option, tell
+
+if TYPE_CHECKING:
+    from illumcli.jobs.ao_bake import Report
 
 _EPILOG = """\b
 Examples:
   illum ao-bake bunny.ply -o bunny.npz
+  illum ao-bake parts/*.obj -o 'baked/{scene}.npz'
   illum ao-bake bunny.obj -o bunny.glb -o bunny.ply --target-error 0.005
   illum ao-bake rock.glb -o rock.ao.glb --falloff exponential --tau 2 --max-distance 0.5r --ground y
   illum ao-bake scenes/teapot.yaml -o baked/teapot.npz --occluders own
@@ -34,16 +38,15 @@ class _Distance(click.ParamType):
 
 
 @click.command(name="ao-bake", epilog=_EPILOG)
-@click.argument("source", metavar="INPUT", type=SCENE)
+@click.argument("inputs", metavar="INPUT...", type=SCENE, nargs=-1, required=True)
 @click.option(
     "-o",
     "--output",
-    "outputs",
+    "patterns",
     metavar="OUT",
     multiple=True,
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help=".npz, .ply or .glb; may be repeated.",
+    help=".npz, .ply or .glb; may be repeated, may hold {scene}, the name of the input.",
 )
 @click.option("--samples", type=click.IntRange(1, 65536), help="Rays per vertex, by default 256.")
 @click.option(
@@ -106,15 +109,16 @@ class _Distance(click.ParamType):
 @click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
 @overrides_option
 @click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
+    "--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what happened, as JSON."
 )
-@click.option("--force", is_flag=True, help="Replace files that differ.")
+@click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
+@keep_going_option
 @strict_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 @click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too, and where time went.")
 def ao_bake(
-    source: Path,
-    outputs: tuple[Path, ...],
+    inputs: tuple[Path, ...],
+    patterns: tuple[str, ...],
     samples: int | None,
     target_error: float | None,
     max_distance: float | str | None,
@@ -127,19 +131,21 @@ def ao_bake(
     overrides: tuple[str, ...],
     report: Path | None,
     force: bool,
+    keep_going: bool,
     strict: bool,
     quiet: bool,
     verbose: bool,
     **more: Any,
 ) -> None:
-    """Bake obscurance at every vertex of INPUT, a mesh file or a scene; print the path of every file.
+    """Bake obscurance at every vertex of each INPUT, a mesh file or a scene; print the path of every file.
 
     1 is open. The values keep the order of the file's own vertices, and each says its standard error. A
     vertex with several normals has their mean, and one value for each where the file can hold it. An
     interrupted bake goes on where it stopped when the same command is given again.
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs.ao_bake import Settings, run, write_report
+    from illumcli.jobs import ao_bake_all as job
+    from illumcli.jobs.ao_bake import Settings
     from illumcli.jobs.repairs import told
 
     if samples is not None and target_error is not None:
@@ -161,22 +167,26 @@ def ao_bake(
         occluders=occluders or ("scene",),
         **more,
     )
-    paths, done = run(source, outputs, settings, overrides, threads, force, reporter(quiet), strict)
-    for path in paths:
-        click.echo(path)
-    if not quiet:
-        for kept in done.kept:
-            click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in told(done.repairs, verbose):
-            click.echo(f"{source}: {line}", err=True)
-        for text in dict.fromkeys(done.left_out):
-            click.echo(f"left out: {text}", err=True)
-        for text in done.warnings:
-            click.echo(text, err=True)
-        if done.written:
-            click.echo(done.summary(), err=True)
-    if verbose:
-        for name, seconds in done.seconds.items():
-            click.echo(f"{seconds:8.3f} s  {name}", err=True)
-    if report is not None:
-        write_report(report, done)
+
+    def written(source: Path, paths: list[Path], done: Report) -> None:
+        for path in paths:
+            click.echo(path)
+        if not quiet:
+            for kept in done.kept:
+                click.echo(f"{kept}: kept, its content is the same", err=True)
+            for line in told(done.repairs, verbose):
+                click.echo(f"{source}: {line}", err=True)
+            for text in dict.fromkeys(done.left_out):
+                click.echo(f"left out: {text}", err=True)
+            for text in done.warnings:
+                click.echo(text, err=True)
+            if done.written:
+                click.echo(done.summary(), err=True)
+        if verbose:
+            for name, seconds in done.seconds.items():
+                click.echo(f"{seconds:8.3f} s  {name}", err=True)
+
+    asked = job.Asked(settings, patterns, overrides, threads, force, strict, keep_going)
+    is_kept = job.run(inputs, asked, report, reporter(quiet), written, tell)
+    if is_kept and not quiet:
+        click.echo(f"{report}: kept, its content is the same", err=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
+_FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
   illum brdf lambert oren_nayar -D oren_nayar.sigma=0.5

@@ -26,6 +26,7 @@ Examples:
     metavar="FILE.png",
     help="Picture of |B - A|, largest over channels, in false colours.",
 )
+@click.option("--force", is_flag=True, help="Replace a picture of --heat that differs.")
 @click.option("--max-rmse", type=float, metavar="X", help="Root of the mean squared difference.")
 @click.option("--max-mae", type=float, metavar="X", help="Mean absolute difference.")
 @click.option("--max-relative", type=float, metavar="X", help="Mean of (B - A)^2 / (A^2 + 0.01).")
@@ -39,6 +40,7 @@ def compare(
     test: Path,
     names: tuple[str, ...],
     heat: Path | None,
+    force: bool,
     no_flip: bool,
     as_json: bool,
     **bounds: float | None,
@@ -58,7 +60,9 @@ def compare(
     limits = {name: bound for name, bound in bounds.items() if bound is not None}
     if no_flip and "max_flip" in limits:
         raise click.UsageError("--max-flip needs FLIP; leave --no-flip out")
-    comparison = run(reference, test, names, not no_flip, heat)
+    comparison = run(reference, test, names, not no_flip, heat, force)
+    if comparison.heat_is_kept:
+        click.echo(f"{heat}: kept, its content is the same", err=True)
     if as_json:
         click.echo(json.dumps(as_data(comparison), indent=2))
     else:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from illumcli.jobs.converge import Vary
     from illumcli.jobs.sampled import Sampler
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
+_FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
   illum converge scenes/obscurance.yaml
@@ -51,6 +51,7 @@ Examples:
 @click.option("--csv", "csv_file", type=_FILE, metavar="FILE.csv", help="A line per picture rendered.")
 @click.option("-o", "--output", type=_FILE, metavar="FILE.png", help="The curves as .png or .svg.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
 @no_cache_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
 def converge(
@@ -69,6 +70,7 @@ def converge(
     csv_file: Path | None,
     output: Path | None,
     as_json: bool,
+    force: bool,
     cache: bool,
     quiet: bool,
 ) -> None:
@@ -85,16 +87,14 @@ def converge(
     from illumcli.jobs import converge_report
     from illumcli.jobs.converge import SAMPLERS, run
 
-    if output is not None:
-        converge_report.check_picture(output)
+    files = converge_report.Outputs(csv_file, output, force)
     found = run(
         scene, overrides, vary, first, last, layer, samplers or SAMPLERS, repeats, seed, threads, camera,
-        width, reporter(quiet), cache,
+        width, reporter(quiet), cache, files.check,
     )  # fmt: skip
-    if csv_file is not None:
-        converge_report.write_csv(csv_file, found)
-    if output is not None:
-        converge_report.write_picture(output, found)
+    files.write(found)
+    for kept in files.kept if not quiet else []:
+        click.echo(f"{kept}: kept, its content is the same", err=True)
     if as_json:
         click.echo(json.dumps(found.as_data(), indent=2))
         return

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from illumcli.cli._options import (
+    keep_going_option,
     no_cache_option,
     overrides_option,
     scenes_argument,
     strict_option,
     studio_options,
+    tell,
 )
+
+if TYPE_CHECKING:
+    from illumcli.jobs.render_all import Rendered
 
 
 @click.command()
@@ -34,9 +40,13 @@ from illumcli.cli._options import (
 )
 @click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
 @click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write what happened, as JSON."
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="FILE.json",
+    help="Write what happened, as JSON.",
 )
-@click.option("--force", is_flag=True, help="Replace files that differ.")
+@click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
+@keep_going_option
 @strict_option
 @no_cache_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress.")
@@ -53,6 +63,7 @@ def render(
     threads: int | None,
     report: Path | None,
     force: bool,
+    keep_going: bool,
     strict: bool,
     cache: bool,
     quiet: bool,
@@ -69,44 +80,37 @@ def render(
       illum render bunny.obj
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs.render import run, write_report
+    from illumcli.jobs import render_all as job
     from illumcli.jobs.repairs import told
 
-    reports = []
-    for scene in scenes:
-        choice = None
-        if target_error is not None:
-            from illumcli.jobs.target import chosen
-
-            choice = chosen(scene, target_error, overrides, only, seed, threads)
-        counts = choice.overrides if choice else ()
-        paths, done = run(
-            scene, (*overrides, *counts), pattern, only, seed, threads, force, reporter(quiet), cache, strict
-        )
-        if choice is not None:
-            done.error = choice.as_data()
-            if not quiet:
-                reached = f"for an error of {target_error:g}; reached {done.error['reached']:.3g}"
-                click.echo(f"{scene}: {' '.join(counts)}, {reached}", err=True)
-        reports.append(done)
-        for path in paths:
+    def written(done: Rendered) -> None:
+        found = done.report
+        if done.counts and not quiet:
+            reached = f"for an error of {target_error:g}; reached {found.error['reached']:.3g}"
+            click.echo(f"{done.scene}: {' '.join(done.counts)}, {reached}", err=True)
+        for path in done.paths:
             click.echo(path)
-        for kept in [] if quiet else done.kept:
+        for kept in [] if quiet else found.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in [] if quiet else told(done.repairs, verbose):
-            click.echo(f"{scene}: {line}", err=True)
-        for warning in done.warnings:
+        for line in [] if quiet else told(found.repairs, verbose):
+            click.echo(f"{done.scene}: {line}", err=True)
+        for warning in found.warnings:
             click.echo(warning, err=True)
-        if verbose and done.clamped:
-            fact = f"{done.clamped} values beyond 65504, the largest of half precision, are written as that"
-            click.echo(f"{scene}: {fact}; outputs.colour: float keeps them", err=True)
+        if verbose and found.clamped:
+            fact = f"{found.clamped} values beyond 65504, the largest of half precision, are written as that"
+            click.echo(f"{done.scene}: {fact}; outputs.colour: float keeps them", err=True)
         if verbose:
-            for camera, reused in done.reused.items():
+            for camera, reused in found.reused.items():
                 for name, where in reused.items():
                     click.echo(f"reused {name} of {camera}: from the {where}", err=True)
-            for name, why in done.skipped.items():
+            for name, why in found.skipped.items():
                 click.echo(f"skipped {name}: {why}", err=True)
-            for name, seconds in sorted(done.seconds.items(), key=lambda item: -item[1]):
-                click.echo(f"{seconds:8.3f} s {done.rays.get(name, 0):12d} rays  {name}", err=True)
-    if report is not None:
-        write_report(report, reports)
+            for name, seconds in sorted(found.seconds.items(), key=lambda item: -item[1]):
+                click.echo(f"{seconds:8.3f} s {found.rays.get(name, 0):12d} rays  {name}", err=True)
+
+    settings = job.Settings(
+        overrides, pattern, only, seed, threads, target_error, force, cache, strict, keep_going
+    )
+    is_kept = job.run(scenes, settings, report, reporter(quiet), written, tell)
+    if is_kept and not quiet:
+        click.echo(f"{report}: kept, its content is the same", err=True)

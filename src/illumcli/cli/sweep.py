@@ -7,12 +7,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import allow_option, no_cache_option, scene_argument, strict_option, studio_options
+from illumcli.cli._options import (
+    allow_option,
+    keep_going_option,
+    no_cache_option,
+    scene_argument,
+    strict_option,
+    studio_options,
+)
 
 if TYPE_CHECKING:
     from illumcli.jobs.sweep import Outcome
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
+_FILE = click.Path(path_type=Path)
 
 
 @click.command()
@@ -45,6 +52,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="By default the scene's.")
 @click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
 @click.option("--force", is_flag=True, help="Replace files that differ, render those that do not.")
+@keep_going_option
 @strict_option
 @no_cache_option
 @allow_option
@@ -65,6 +73,7 @@ def sweep(
     seed: int | None,
     threads: int | None,
     force: bool,
+    keep_going: bool,
     strict: bool,
     cache: bool,
     quiet: bool,
@@ -88,11 +97,17 @@ def sweep(
     said: set[str] = set()
 
     def written(outcome: Outcome) -> None:
-        for path in outcome.paths if outcome.report else []:
+        # a fault of the scene itself is that of every variant
+        if outcome.error is not None and str(outcome.error) not in said:
+            said.add(str(outcome.error))
+            click.echo(f"{outcome.label}: {outcome.error}", err=True)
+        if outcome.report is None:
+            return
+        for path in outcome.paths:
             click.echo(path)
-        for kept in outcome.report.kept if outcome.report and not quiet else []:
+        for kept in outcome.report.kept if not quiet else []:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in told(outcome.report.repairs, verbose) if outcome.report and not quiet else []:
+        for line in told(outcome.report.repairs, verbose) if not quiet else []:
             if line not in said:
                 click.echo(f"{scene}: {line}", err=True)
             said.add(line)
@@ -100,15 +115,13 @@ def sweep(
     if reference is not None and table is None:
         raise click.UsageError("--reference is what the errors of --table are against; give --table")
     variants = job.variants_of(overrides, together, rows, frames)
-    progress = reporter(quiet)
-    done = job.run(scene, variants, pattern, only, seed, threads, force, cache, progress, written, strict)
+    settings = job.Settings(
+        pattern=pattern, only=only, seed=seed, threads=threads, force=force, cache=cache, strict=strict,
+        keep_going=keep_going,
+    )  # fmt: skip
+    files = job.Files(sheet, table, report, reference)
+    done = job.run(scene, variants, settings, files, reporter(quiet), written)
     for warning in done.warnings:
         click.echo(warning, err=True)
-    if table is not None:
-        job.write_table(table, done, reference)
-    if sheet is not None:
-        job.sheet(done, sheet)
-    if report is not None:
-        job.write_report(report, done)
-    if error := job.failed(done):
-        raise error
+    for kept in done.kept if not quiet else []:
+        click.echo(f"{kept}: kept, its content is the same", err=True)

@@ -7,6 +7,7 @@ A rename is atomic; the two fsyncs keep a crash of the machine from leaving an e
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 from collections.abc import Iterator
@@ -53,13 +54,13 @@ class Part:
     def __init__(self, target: str | os.PathLike[str]) -> None:
         self._named = os.fspath(target)
         self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
-        folder, name = self.target.parent, self.target.name
-        self.path = folder / f".{name}.{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part"
+        folder = self.target.parent
+        self.path = beside(self.target, f"{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part")
         with refusals(self._named):
             if self.target.exists() and not self.target.is_file():
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
             folder.mkdir(parents=True, exist_ok=True)
-            _remove_left_over(folder, name)
+            _remove_left_over(self.target)
             _open.add(self.path)  # before it exists: a signal may end this call anywhere
             os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
 
@@ -147,15 +148,24 @@ def _force(path: Path) -> None:
         os.close(handle)
 
 
+def beside(target: Path, ending: str) -> Path:
+    """A hidden file that belongs to `target`, beside it, by a name that is short whatever `target`'s is."""
+    return target.with_name(f".{_digest(os.fsencode(target.name))}.{ending}")
+
+
 def _host() -> str:
     """The machine's name as part of a file name: a process number means nothing on another machine."""
-    return re.sub(r"\W", "", os.uname().nodename) or "host"
+    return _digest(os.uname().nodename.encode())
 
 
-def _remove_left_over(folder: Path, name: str) -> None:
-    """Remove parts of `name` whose process on this machine is gone."""
-    ours = re.compile(rf"\.{re.escape(name)}\.{_host()}\.(\d+)\.[0-9a-f]{{8}}\.part")
-    for entry in os.scandir(folder):
+def _digest(name: bytes) -> str:
+    return hashlib.blake2b(name, digest_size=6).hexdigest()
+
+
+def _remove_left_over(target: Path) -> None:
+    """Remove parts of `target` whose process on this machine is gone."""
+    ours = re.compile(re.escape(beside(target, _host()).name) + r"\.(\d+)\.[0-9a-f]{8}\.part")
+    for entry in os.scandir(target.parent):
         match = ours.fullmatch(entry.name)
         if match and not _alive(int(match[1])):
             with suppress(FileNotFoundError):  # another process was faster

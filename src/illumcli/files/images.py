@@ -276,7 +276,7 @@ def flip(
 
 
 def write_sheet(
-    path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], labels: Sequence[str]
+    path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], labels: Sequence[str], content: str
 ) -> None:
     """Write a contact sheet as PNG: pictures row by row, each scaled to a cell, its label below.
 
@@ -286,6 +286,8 @@ def write_sheet(
         Display values; taken one at a time.
     labels : sequence of str
         As many.
+    content : str
+        Hash of all that the sheet shows; the file says it.
     """
     side, gap, text = SHEET_CELL, 8, 14
     columns = max(1, min(len(labels), round((len(labels) * 1.6) ** 0.5)))
@@ -305,7 +307,8 @@ def write_sheet(
     cells += [blank] * (-len(cells) % columns)
     rows = [np.concatenate(cells[k : k + columns], axis=1) for k in range(0, len(cells), columns)]
     whole = np.concatenate(rows)
-    with ImageWriter(path, whole.shape[1], whole.shape[0], dict.fromkeys("RGB", "uint8")) as writer:
+    about = {"illum:content": content}
+    with ImageWriter(path, whole.shape[1], whole.shape[0], dict.fromkeys("RGB", "uint8"), about) as writer:
         writer.write_band(0, whole)
 
 

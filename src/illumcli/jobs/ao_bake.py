@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from illumcli import __version__
 from illumcli.arrays import F, columns, cross, rows, unit
 from illumcli.demand import order
-from illumcli.errors import InputError, OutputError
+from illumcli.errors import InputError
+from illumcli.files.atomic import beside
+from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.vertex_data import (
     SUFFIXES,
     Baked,
     Shape,
     add_to_glb,
     mesh_hash,
-    read_content,
     write_glb,
     write_npz,
     write_ply,
@@ -40,7 +41,7 @@ from illumcli.jobs.repairs import refuse_repairs, repairs_data
 from illumcli.plan import stages
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
-from illumcli.records import Value
+from illumcli.records import Record, Value
 from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.visibility.horizon import Horizon
@@ -140,51 +141,90 @@ def run(
     InputError, OutputError
         Before anything is baked, where it can be known then.
     """
+    work = prepared(path, outputs, settings, overrides, force, strict)
+    return baked(work, settings, threads, progress)
+
+
+class Work(Record):
+    """A bake whose meshes were read: what it is about and the files that are due."""
+
+    path: Path
+    outputs: tuple[Path, ...]
+    due: tuple[Path, ...]
+    scene: Scene
+    surfaces: Surfaces
+    hashes: tuple[str, ...]
+    """Of the meshes."""
+    content: str
+    repairs: Repairs
+    clock: _Clock
+
+
+def prepared(
+    path: Path,
+    outputs: Sequence[Path],
+    settings: Settings,
+    overrides: Sequence[str] = (),
+    force: bool = False,
+    strict: bool = False,
+) -> Work:
+    """What a bake takes, after looking at all that could stand against it; no ray is cast."""
     check_outputs(outputs)
     if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
     clock = _Clock()
     loaded = bare(path, overrides) if path.suffix.lower() in MESH_SUFFIXES else load(path, overrides)
-    scene = loaded.scene
-    surfaces, repairs = surfaces_of(scene, loaded)
-    world = surfaces.world
-    meshes = [placed.mesh for placed in world.placed]
-    hashes = [mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes]
-    content = content_hash(scene, hashes, surfaces.normals, settings)
-    threads = threads or len(os.sched_getaffinity(0))
-    report = Report(str(path), content, settings.seed, threads, target_error=settings.target_error)
-    report.vertices, report.triangles = len(world.vertices), len(world.triangles)
-    report.repairs = repairs
+    surfaces, repairs = surfaces_of(loaded.scene, loaded)
+    meshes = [placed.mesh for placed in surfaces.world.placed]
+    hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
+    content = content_hash(loaded.scene, hashes, surfaces.normals, settings)
     if strict:
         refuse_repairs(str(path), repairs)
-    due = [each for each in outputs if not is_kept(each, content, force)]
-    report.kept = [str(each) for each in outputs if each not in due]
+    due = tuple(each for each in outputs if not is_kept(each, [content], force))
+    return Work(path, tuple(outputs), due, loaded.scene, surfaces, hashes, content, repairs, clock)
+
+
+def baked(
+    work: Work,
+    settings: Settings,
+    threads: int | None = None,
+    progress: Progress = lambda what, done, of: None,
+) -> tuple[list[Path], Report]:
+    """The files of a bake, written or kept, and the report."""
+    scene, world, due, clock = work.scene, work.surfaces.world, work.due, work.clock
+    threads = threads or len(os.sched_getaffinity(0))
+    report = Report(str(work.path), work.content, settings.seed, threads, target_error=settings.target_error)
+    report.vertices, report.triangles = len(world.vertices), len(world.triangles)
+    report.repairs = work.repairs
+    report.kept = [str(each) for each in work.outputs if each not in due]
+    for each in report.kept:
+        refresh(Path(each))
     clock.lap(report, "read")
     if due:
-        part = due[0].with_name(f".{due[0].name}.unfinished")
-        baked = bake(scene, surfaces, settings, threads, progress, report, part, clock)
+        part = beside(due[0], "unfinished")
+        values = bake(scene, work.surfaces, settings, threads, progress, report, part, clock)
+        names = scene.object_names()
         about = {
-            "content": content,
+            "content": work.content,
             "version": __version__,
-            "input": path.name,
-            "meshes": dict(zip(scene.object_names(), hashes, strict=True)),
+            "input": work.path.name,
+            "meshes": dict(zip(names, work.hashes, strict=True)),
             "vertices": {
-                name: len(mesh.vertices) for name, mesh in zip(scene.object_names(), meshes, strict=True)
+                name: len(placed.mesh.vertices) for name, placed in zip(names, world.placed, strict=True)
             },
             "corners": {
-                name: len(mesh.corners) for name, mesh in zip(scene.object_names(), meshes, strict=True)
+                name: len(placed.mesh.corners) for name, placed in zip(names, world.placed, strict=True)
             },
             "parameters": parameters(settings),
             "seed": settings.seed,
             "rmse": report.rmse,
             "rays": sum(report.rays.values()),
         }
-        baked = replace(baked, about=about)
-        write(path, due, scene, world, baked, settings, report)
+        write(work.path, due, scene, world, replace(values, about=about), settings, report)
         part.unlink(missing_ok=True)
         clock.lap(report, "write")
     report.written = [str(each) for each in due]
-    return list(outputs), report
+    return list(work.outputs), report
 
 
 def surfaces_of(scene: Scene, loaded: Loaded) -> tuple[Surfaces, Repairs]:
@@ -234,21 +274,6 @@ def content_hash(scene: Scene, hashes: Sequence[str], normals: CornerVectors, se
     for array in (normals.values, normals.index):
         digest.update(np.ascontiguousarray(array.T).data)
     return digest.hexdigest()
-
-
-def is_kept(path: Path, content: str, force: bool) -> bool:
-    """True where the file is there already with the same content.
-
-    Raises
-    ------
-    OutputError
-        A different file stands there and `force` is not given.
-    """
-    if force or not path.exists():
-        return False
-    if read_content(path) != content:
-        raise OutputError(f"{path}: a different file is there; use --force to replace it, or another -o")
-    return True
 
 
 def bake(
@@ -424,13 +449,6 @@ def primitives(path: Path) -> list[tuple[int, int, int]]:
 
     found = primitives_of(path)
     return found if len({each[:2] for each in found}) == len(found) else []
-
-
-def write_report(path: Path, report: Report) -> None:
-    """Write the report as JSON."""
-    from illumcli.files.atomic import write_text
-
-    write_text(path, json.dumps(report.as_data(), indent=1) + "\n")
 
 
 class _Clock:

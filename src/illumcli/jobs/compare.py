@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli import __version__
 from illumcli.errors import InputError, ThresholdError
+from illumcli.files.content import file_digest
 from illumcli.files.images import Image, flip, layers, read_image
+from illumcli.files.outputs import is_kept, refresh, refuse_suffix
 from illumcli.files.writer import ChannelType, ImageWriter
 from illumcli.film.heat import heat
 from illumcli.film.metrics import Difference, absolute_difference, difference
+from illumcli.plan.keys import digest
 from illumcli.records import Value
 from illumcli.variants import suggestion
 
@@ -63,11 +67,17 @@ class Comparison(Value):
     layers: tuple[LayerDifference, ...]
     only_in_reference: tuple[str, ...]  # channels
     only_in_test: tuple[str, ...]
-    heat_scale: float | None  # the value that is brightest in the heat picture, where one was written
+    heat_scale: float | None  # the value that is brightest in the heat picture, where there is one
+    heat_is_kept: bool
 
 
 def run(
-    reference: Path, test: Path, names: Sequence[str] = (), flips: bool = True, heat_file: Path | None = None
+    reference: Path,
+    test: Path,
+    names: Sequence[str] = (),
+    flips: bool = True,
+    heat_file: Path | None = None,
+    force: bool = False,
 ) -> Comparison:
     """The differences of `test` from `reference`, by layer.
 
@@ -78,26 +88,39 @@ def run(
     flips
         Whether FLIP is computed for layers with R, G and B; it takes far longer than all else.
     heat_file
-        PNG of the largest difference over the channels of the first layer, in false colours.
+        PNG of the largest difference over the channels of the first layer, in false colours. One that is
+        there with the same content is kept.
 
     Raises
     ------
     InputError
         Unreadable files, files of different size or kind, unknown layers.
+    OutputError
+        The heat picture cannot be written; a different file is there and `force` is not given.
     """
-    if heat_file is not None and heat_file.suffix.lower() != ".png":
-        raise InputError(f"{heat_file}: the heat picture is a PNG; let its name end in .png")
+    if heat_file is not None:
+        refuse_suffix(heat_file, "a heat picture", ".png")
     a, b = _read_both(reference, test)
     shared = layers(name for name in a.channels if name in b.channels)
     compared = _chosen(shared, names, f"{reference}, {test}")
+    kept, content = False, ""
+    if heat_file is not None:
+        files = file_digest(reference), file_digest(test)
+        content = digest((__version__, files, next(iter(compared))))
+        kept = is_kept(heat_file, [content], force)
     found = [_layer(a, b, name, channels, flips) for name, channels in compared.items()]
+    if heat_file is not None and kept:
+        refresh(heat_file)
+    elif heat_file is not None:
+        _write_heat(heat_file, a, b, found[0], content)
     return Comparison(
         reference=reference,
         test=test,
         layers=tuple(found),
         only_in_reference=tuple(name for name in a.channels if name not in b.channels),
         only_in_test=tuple(name for name in b.channels if name not in a.channels),
-        heat_scale=None if heat_file is None else _write_heat(heat_file, a, b, found[0]),
+        heat_scale=None if heat_file is None else _heat_scale(found[0]),
+        heat_is_kept=kept,
     )
 
 
@@ -261,14 +284,17 @@ def _stacked(image: Image, channels: Sequence[str]) -> NDArray[np.float32]:
     return np.stack([image.channels[channel] for channel in channels], axis=-1)
 
 
-def _write_heat(path: Path, a: Image, b: Image, layer: LayerDifference) -> float:
-    scale = layer.difference.largest or 1.0
-    metadata = {"illum:layer": layer.name, "illum:heat_scale": scale}
+def _heat_scale(layer: LayerDifference) -> float:
+    return layer.difference.largest or 1.0
+
+
+def _write_heat(path: Path, a: Image, b: Image, layer: LayerDifference, content: str) -> None:
+    scale = _heat_scale(layer)
+    metadata = {"illum:layer": layer.name, "illum:heat_scale": scale, "illum:content": content}
     types: dict[str, ChannelType] = dict.fromkeys("RGB", "uint8")
     worst = absolute_difference(_stacked(a, layer.channels), _stacked(b, layer.channels)).max(axis=-1)
     with ImageWriter(path, a.width, a.height, types, metadata) as writer:
         writer.write_band(0, heat(worst, scale))
-    return scale
 
 
 def _number(value: float) -> float | None:

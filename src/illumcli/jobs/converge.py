@@ -56,6 +56,8 @@ class Run(Value):
     seconds: float
     rmse: float
     """Against the reference, its own error taken off."""
+    content: str
+    """Hash of all that the error depends on."""
 
 
 class Point(Value):
@@ -122,6 +124,7 @@ def run(
     width: int | None = 320,
     progress: Progress = lambda what, done, of: None,
     cache: bool = True,
+    planned: Callable[[list[str]], None] = lambda contents: None,
 ) -> Convergence:
     """A scene's layer rendered at doubling samples, by every sampler in turn, and its error.
 
@@ -137,6 +140,8 @@ def run(
         By default `obscurance` where only that is varied, else `beauty`.
     width
         The film is scaled down to at most this: error per pixel hardly depends on it.
+    planned
+        Gets the content of every picture before any is rendered, in the order of the result's runs.
     """
     loaded = load(path, overrides)
     if seed is not None:
@@ -149,6 +154,15 @@ def run(
     few, many = DOUBLED[vary]
     levels = samplings(scene, vary, first or few, last or max(many, 2 * (first or few)), samplers)
     _check(own, vary)
+    finest = max(levels, key=lambda level: level.rays)
+    contents = {
+        (level.sampler, _count(level, vary), repeat): _content(
+            own, replace(level, seed=own_seed), finest, vary
+        )
+        for repeat, own_seed in enumerate(_seeds(scene, repeats))
+        for level in levels
+    }
+    planned([contents[key] for key in sorted(contents, key=lambda key: (samplers.index(key[0]), *key[1:]))])
     expected = sum(level.pixel * (1 + level.obscurance) for level in levels) * repeats
     made = 0
 
@@ -157,17 +171,16 @@ def run(
         made += sampling.pixel * (1 + sampling.obscurance)
         progress(own.loaded.name, made, expected)
 
-    finest = max(levels, key=lambda level: level.rays)
     truth, reference = referred(own, finest, vary, opened_store() if cache else None)
     runs: dict[tuple[Sampler, int], list[Run]] = {}
-    for repeat in range(repeats):
-        own_seed = stream(scene.seed, f"converge:{repeat}")
+    for repeat, own_seed in enumerate(_seeds(scene, repeats)):
         for level in levels:  # in turn, so that whatever else the machine does meets all alike
             sampling = replace(level, seed=own_seed)
             values, rays, seconds = own.picture(sampling)
             error = rmse_of(values, truth, reference.rmse)
             key = level.sampler, _count(level, vary)
-            runs.setdefault(key, []).append(Run(repeat, own_seed, rays, seconds, error))
+            content = contents[(*key, repeat)]
+            runs.setdefault(key, []).append(Run(repeat, own_seed, rays, seconds, error, content))
             advance(sampling)
     curves = tuple(
         curve(
@@ -212,6 +225,23 @@ def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequenc
     return found
 
 
+def _seeds(scene: Scene, repeats: int) -> list[int]:
+    return [stream(scene.seed, f"converge:{repeat}") for repeat in range(repeats)]
+
+
+def _content(own: Subject, sampling: Sampling, finest: Sampling, vary: Vary) -> str:
+    """Hash of all that a picture and its reference depend on."""
+    halves = [_key(own, half) for half in _halves(own, finest, vary)]
+    return digest((own.layer.name, _key(own, sampling), halves))
+
+
+def _halves(own: Subject, finest: Sampling, vary: Vary) -> list[Sampling]:
+    """How the two halves of the reference are sampled; by Owen's sampler: a bias of the spiral would show."""
+    pixel, each = FINER[vary]
+    half = Sampling(finest.pixel * pixel, finest.obscurance * each, "owen", 0)
+    return [replace(half, seed=stream(own.scene.seed, f"reference:{name}")) for name in "ab"]
+
+
 def _count(sampling: Sampling, vary: Vary) -> int:
     return sampling.pixel if vary == "pixels" else sampling.rays
 
@@ -228,10 +258,8 @@ def _check(own: Subject, vary: Vary) -> None:
 def referred(
     own: Subject, finest: Sampling, vary: Vary, store: Store | None
 ) -> tuple[NDArray[np.float64], Reference]:
-    """The reference and its error, kept in the store; by Owen's sampler: a bias of the spiral would show."""
-    pixel, each = FINER[vary]
-    half = Sampling(finest.pixel * pixel, finest.obscurance * each, "owen", 0)
-    halves = [replace(half, seed=stream(own.scene.seed, f"reference:{name}")) for name in "ab"]
+    """The reference and its error, kept in the store."""
+    halves = _halves(own, finest, vary)
     key = digest([(own.layer.name, *_key(own, half)) for half in halves])
     stored = store.read(key) if store is not None else None
     if stored is not None:
@@ -242,7 +270,7 @@ def referred(
             store.save(key, {"buffer": "reference", "layer": own.layer.name}, [a, b])
             store.finish()
     error = math.sqrt(np.square((a.astype(np.float64) - b) / 2).mean())
-    return (a.astype(np.float64) + b) / 2, Reference(half, error, stored is not None)
+    return (a.astype(np.float64) + b) / 2, Reference(replace(halves[0], seed=0), error, stored is not None)
 
 
 def _key(own: Subject, sampling: Sampling) -> tuple[str, str]:

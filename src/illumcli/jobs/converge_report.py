@@ -10,11 +10,13 @@ from pathlib import Path
 
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
+from illumcli.files.outputs import is_kept, refresh, refuse_suffix
 from illumcli.jobs.converge import Convergence, Curve
+from illumcli.plan.keys import digest
 
 COLUMNS = (
     "scene", "camera", "layer", "width", "height", "vary", "sampler", "pixel_samples", "obscurance_rays",
-    "count", "repeat", "seed", "rays", "seconds", "rmse", "reference_rmse",
+    "count", "repeat", "seed", "content", "rays", "seconds", "rmse", "reference_rmse",
 )  # fmt: skip
 MARKS = {"spiral": "o", "owen": "x", "random": "."}
 
@@ -85,16 +87,11 @@ def as_csv(found: Convergence) -> str:
                 writer.writerow(
                     (
                         found.scene, found.camera, found.layer, found.width, found.height, found.vary,
-                        curve.sampler, p.pixel, p.obscurance, p.count, run.repeat, run.seed, run.rays,
-                        f"{run.seconds:.6f}", f"{run.rmse:.9g}", f"{found.reference.rmse:.9g}",
+                        curve.sampler, p.pixel, p.obscurance, p.count, run.repeat, run.seed, run.content,
+                        run.rays, f"{run.seconds:.6f}", f"{run.rmse:.9g}", f"{found.reference.rmse:.9g}",
                     )
                 )  # fmt: skip
     return out.getvalue()
-
-
-def write_csv(path: Path, found: Convergence) -> None:
-    """Write `as_csv`."""
-    write_text(path, as_csv(found))
 
 
 def drawn(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str:
@@ -122,26 +119,55 @@ def drawn(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str:
     return "\n".join([*lines, f"{'RMSE':>8} +{'-' * width}", f"{'':8}  {ends}", f"{'':8}  {legend}"])
 
 
-def check_picture(path: Path) -> None:
-    """Refuse, before anything is rendered, a picture that could not be drawn.
+class Outputs:
+    """The files that a measurement is to be written to; those that hold it already are kept.
 
     Raises
     ------
     InputError
-        A suffix that is neither .png nor .svg; matplotlib is not installed.
+        A suffix that is not written; matplotlib is not installed.
     """
-    if path.suffix.lower() not in (".png", ".svg"):
-        raise InputError(f"{path}: the curves are drawn as .png or .svg")
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError:
-        raise InputError(
-            "pictures of curves need matplotlib; install it: pip install 'illumcli[plot]', or use --csv"
-        ) from None
+
+    def __init__(self, table: Path | None, picture: Path | None, force: bool) -> None:
+        self.kept: list[Path] = []
+        self._table, self._picture, self._force = table, picture, force
+        self._content = ""
+        if table is not None:
+            refuse_suffix(table, "a table", ".csv")
+        if picture is not None:
+            refuse_suffix(picture, "a picture of curves", ".png", ".svg")
+            try:
+                import matplotlib.figure  # noqa: F401
+            except ImportError:
+                way = "install it: pip install 'illumcli[plot]', or use --csv"
+                raise InputError(f"pictures of curves need matplotlib; {way}") from None
+
+    def check(self, contents: Sequence[str]) -> None:
+        """Look at all that stands against writing what is made from `contents`.
+
+        Raises
+        ------
+        OutputError
+            A different file is there and is not to be replaced; a file cannot be written.
+        """
+        self._content = digest(contents)
+        if self._table is not None and is_kept(self._table, contents, self._force):
+            self.kept.append(self._table)
+        if self._picture is not None and is_kept(self._picture, [self._content], self._force):
+            self.kept.append(self._picture)
+
+    def write(self, found: Convergence) -> None:
+        """Write what is not kept."""
+        if self._table is not None and self._table not in self.kept:
+            write_text(self._table, as_csv(found))
+        if self._picture is not None and self._picture not in self.kept:
+            write_picture(self._picture, found, self._content)
+        for path in self.kept:
+            refresh(path)
 
 
-def write_picture(path: Path, found: Convergence) -> None:
-    """Draw error over samples and over seconds, both axes in logarithms."""
+def write_picture(path: Path, found: Convergence, content: str) -> None:
+    """Draw error over samples and over seconds, both axes in logarithms; the file says its content."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
@@ -166,5 +192,6 @@ def write_picture(path: Path, found: Convergence) -> None:
         over_count.legend()
         figure.suptitle(f"{found.scene}, {found.width} x {found.height}")
         out = io.BytesIO()
-        figure.savefig(out, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+        about = {"Date": None, "Identifier": content} if kind == "svg" else {"illum:content": content}
+        figure.savefig(out, format=kind, dpi=150, metadata=about)
     write_bytes(path, out.getvalue())

@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli import __version__
-from illumcli.errors import InputError, OutputError
+from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
+from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
@@ -118,6 +119,25 @@ class Work(Value):
     plan: Plan
     targets: tuple[Target, ...]
 
+    @property
+    def content(self) -> str:
+        """Hash of all that the pixels of its files depend on."""
+        return digest([target.content for target in self.targets])
+
+    def due(self, force: bool) -> list[Target]:
+        """The files that are to be written: not those that are there already with the same content.
+
+        Raises
+        ------
+        OutputError
+            A different file is there and `force` is not given; a file cannot be written.
+        LimitError
+            Memory or disk cannot hold what is due.
+        """
+        due = [each for each in self.targets if not is_kept(each.path, [each.content], force)]
+        refuse_too_large(self, due)
+        return due
+
 
 def run(
     path: Path,
@@ -143,6 +163,22 @@ def run(
     """
     start = time.perf_counter()
     work = prepared(load(path, overrides), pattern, only, seed)
+    paths, report = run_prepared(work, pattern, threads, force, progress, cache, strict)
+    report.total_seconds = time.perf_counter() - start
+    return paths, report
+
+
+def run_prepared(
+    work: Work,
+    pattern: str | None = None,
+    threads: int | None = None,
+    force: bool = False,
+    progress: Progress = lambda what, done, of: None,
+    cache: bool = True,
+    strict: bool = False,
+) -> tuple[list[Path], Report]:
+    """The same for a scene that was loaded and planned already."""
+    start = time.perf_counter()
     store = opened_store() if cache else None
     report = rendered(work, store, Memory(), threads, force, progress, strict)
     report.warnings += unused_keys(work, pattern)
@@ -205,13 +241,11 @@ def rendered(
     """
     start = time.perf_counter()
     threads = threads or len(os.sched_getaffinity(0))
-    identity = digest([target.content for target in work.targets])
     report = Report(
-        str(work.loaded.path), identity, work.scene.seed, threads, skipped=dict(work.plan.skipped)
+        str(work.loaded.path), work.content, work.scene.seed, threads, skipped=dict(work.plan.skipped)
     )
-    due = [target for target in work.targets if not is_kept(target, force)]
+    due = work.due(force)
     report.kept = [str(target.path) for target in work.targets if target not in due]
-    refuse_too_large(work, due)
     tally = Tally()
     first = Artifacts(store, memory)
     steps = framed(work.plan, first, tally, threads) if due else work.plan
@@ -245,6 +279,8 @@ def rendered(
     report.seconds, report.rays, report.spared = dict(tally.seconds), dict(tally.rays), dict(tally.spared)
     report.refined = tally.refined
     report.written = [str(target.path) for target in due]
+    for path in report.kept:
+        refresh(Path(path))
     report.total_seconds = time.perf_counter() - start
     return report
 
@@ -299,29 +335,6 @@ def content(scene: Scene, steps: Plan, view: View, layers: Sequence[Layer], suff
     shown = (film.background, film.exposure if suffix == ".png" else 0.0)
     buffers = dict.fromkeys([*(layer.buffer for layer in layers), "alpha"])
     return digest((coded, shown, content_key(steps, view, buffers)))
-
-
-def is_kept(target: Target, force: bool) -> bool:
-    """True where the file is there already with the same content.
-
-    Raises
-    ------
-    OutputError
-        A different file stands there and `force` is not given.
-    """
-    if force or not target.path.exists():
-        return False
-    from illumcli.files.images import read_metadata
-
-    try:
-        same = read_metadata(target.path).get("illum:content") == target.content
-    except InputError:
-        same = False
-    if not same:
-        raise OutputError(
-            f"{target.path}: a different file is there; use --force to replace it, or another -o"
-        )
-    return True
 
 
 def _render_view(
@@ -483,9 +496,6 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), **{name: version(name) for name in names}}
 
 
-def write_report(path: Path, reports: Iterator[Report] | Sequence[Report]) -> None:
-    """Write one report, or a list of several, as JSON."""
-    from illumcli.files.atomic import write_text
-
-    data = [report.as_data() for report in reports]
-    write_text(path, json.dumps(data[0] if len(data) == 1 else data, indent=1) + "\n")
+def report_text(entries: Sequence[Mapping[str, Any]]) -> str:
+    """One entry, or a list of several, as JSON; each says its `content`."""
+    return json.dumps(entries[0] if len(entries) == 1 else entries, indent=1) + "\n"

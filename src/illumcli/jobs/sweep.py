@@ -5,31 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import itertools
-import json
 import math
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from illumcli.errors import IllumError, InputError
 from illumcli.files.names import check_unique
 from illumcli.geometry.formula import parse as formula
-from illumcli.jobs.render import (
-    Progress,
-    Report,
-    Work,
-    is_kept,
-    opened_store,
-    prepared,
-    rendered,
-    unused_keys,
-)
+from illumcli.jobs.batch import Batch
+from illumcli.jobs.render import Progress, Report, Work, opened_store, prepared, rendered, unused_keys
+from illumcli.jobs.render_all import Settings
+from illumcli.jobs.sweep_files import Files, checked
 from illumcli.plan.artifacts import Memory
 from illumcli.records import Value
 from illumcli.scene.load import load
@@ -66,14 +58,22 @@ class Variant(Value):
 class Outcome:
     """What became of a variant."""
 
+    number: int
+    """From 1."""
     variant: Variant
-    work: Work
+    work: Work | None = None
+    """None where the scene has a fault with these values."""
     report: Report | None = None
     error: IllumError | None = None
 
     @property
+    def label(self) -> str:
+        """What messages call it."""
+        return self.variant.label or f"variant {self.number}"
+
+    @property
     def paths(self) -> list[Path]:
-        return [target.path for target in self.work.targets]
+        return [target.path for target in self.work.targets] if self.work else []
 
 
 @dataclass(slots=True)
@@ -81,6 +81,8 @@ class Sweep:
     """What happened."""
 
     outcomes: list[Outcome] = field(default_factory=list)
+    kept: list[Path] = field(default_factory=list)
+    """Of the files about all variants, those that were the same already."""
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
 
@@ -88,87 +90,90 @@ class Sweep:
 def run(
     path: Path,
     variants: Sequence[Variant],
-    pattern: str | None = None,
-    only: Sequence[str] = (),
-    seed: int | None = None,
-    threads: int | None = None,
-    force: bool = False,
-    cache: bool = True,
+    settings: Settings | None = None,
+    files: Files | None = None,
     progress: Progress = lambda what, done, of: None,
-    written: Any = lambda outcome: None,
-    strict: bool = False,
+    written: Callable[[Outcome], None] = lambda outcome: None,
 ) -> Sweep:
-    """Render every variant; `written` is called with the outcome of each as soon as it is known.
-
-    `strict` refuses variants whose meshes or textures need repairs.
+    """Render every variant and write the files about all of them; `written` gets the outcome of each as soon
+    as it is known.
 
     A variant that fails is noted and the others go on. Files that are there with the same content are kept,
     so that a sweep that was stopped goes on where it was.
 
     Raises
     ------
-    InputError, LimitError, OutputError
-        Before anything is rendered, for all variants at once.
+    IllumError
+        At last, where any variant failed; before anything is rendered, where all failed, one did and
+        `settings` stop at the first, or what holds for all of them is wrong.
     """
     start = time.perf_counter()
-    works = _prepared(path, variants, pattern, only, seed)
-    due = [any(not is_kept(target, force) for target in work.targets) for work in works]
-    store = opened_store() if cache else None
+    settings, files = settings or Settings(), files or Files()
+    sweep = Sweep([Outcome(number, variant) for number, variant in enumerate(variants, 1)])
+    batch = Batch("variants", len(variants), settings.keep_going, lambda said: None)
+
+    # all that can be known before the first ray
+    due = _prepared(path, sweep, settings, batch, written)
+    if len(batch.failures) == len(variants) or (batch.failures and not settings.keep_going):
+        batch.finish()
+    check_unique([str(target) for outcome in sweep.outcomes for target in outcome.paths])
+    to_write = checked(files, sweep.outcomes, settings.force)
+
+    store = opened_store() if settings.cache else None
     memory = Memory()
-    sweep = Sweep()
-    for number, (variant, work) in enumerate(zip(variants, works, strict=True)):
-        outcome = Outcome(variant, work)
-        following = next((later for later in range(number + 1, len(works)) if due[later]), None)
-        try:
-            after = None if following is None else works[following]
-            outcome.report = rendered(work, store, memory, threads, force, progress, strict, after)
-        except IllumError as error:
-            outcome.error = error
+    for number in batch.due():
+        outcome = sweep.outcomes[number]
+        assert outcome.work is not None
+        following = next((sweep.outcomes[later].work for later in due if later > number), None)
+        with _noted(outcome, batch, written):
+            outcome.report = rendered(
+                outcome.work, store, memory, settings.threads, settings.force, progress, settings.strict,
+                following,
+            )  # fmt: skip
+            written(outcome)
         memory.retire()
-        sweep.outcomes.append(outcome)
-        written(outcome)
-    sweep.warnings += _in_all([unused_keys(work, pattern) for work in works])
+    works = [outcome.work for outcome in sweep.outcomes if outcome.work]
+    sweep.warnings += _in_all([unused_keys(work, settings.pattern) for work in works])
     if store is not None:
         store.finish()
         sweep.warnings += [store.warning] if store.warning else []
     sweep.seconds = time.perf_counter() - start
+    if any(outcome.report for outcome in sweep.outcomes):
+        sweep.kept = to_write.write(sweep.outcomes)
+    batch.finish()
     return sweep
 
 
 def _prepared(
-    path: Path, variants: Sequence[Variant], pattern: str | None, only: Sequence[str], seed: int | None
-) -> list[Work]:
-    """Every variant's plan and files; all their problems at once."""
-    works: list[Work] = []
-    problems: dict[str, None] = {}
-    for variant in variants:
-        try:
-            loaded = load(path, variant.overrides)
-            own = pattern or default_pattern(variants)
-            works.append(prepared(loaded, own, only, seed, {"frame": variant.frame}))
-        except InputError as error:
-            problems |= dict.fromkeys(error.problems)
-    if problems:
-        raise InputError(problems)
-    check_unique([str(target.path) for work in works for target in work.targets])
-    return works
+    path: Path, sweep: Sweep, settings: Settings, batch: Batch, written: Callable[[Outcome], None]
+) -> list[int]:
+    """Plan every variant that has no fault; the indices of those that are due."""
+    pattern = settings.pattern or default_pattern([outcome.variant for outcome in sweep.outcomes])
+    due = []
+    for index, outcome in enumerate(sweep.outcomes):
+        with _noted(outcome, batch, written):
+            loaded = load(path, outcome.variant.overrides)
+            frame = {"frame": outcome.variant.frame}
+            work = prepared(loaded, pattern, settings.only, settings.seed, frame)
+            due += [index] if work.due(settings.force) else []
+            outcome.work = work
+    return due
+
+
+@contextmanager
+def _noted(outcome: Outcome, batch: Batch, written: Callable[[Outcome], None]) -> Iterator[None]:
+    """What goes wrong within is the outcome."""
+    with batch.piece(outcome.number - 1):
+        yield
+    if (failure := batch.failures.get(outcome.number - 1)) is not None:
+        outcome.error = failure
+        written(outcome)
 
 
 def _in_all(groups: Sequence[Sequence[str]]) -> list[str]:
     """The lines of the first group that stand in every other too."""
     common = set(groups[0]).intersection(*groups) if groups else set()
     return [line for line in groups[0] if line in common] if groups else []
-
-
-def failed(sweep: Sweep) -> IllumError | None:
-    """What went wrong with the variants that failed, with the first one's exit code; None where none did."""
-    wrong = [(outcome, outcome.error) for outcome in sweep.outcomes if outcome.error is not None]
-    if not wrong:
-        return None
-    lines = [f"{outcome.variant.label or 'variant'}: {error}" for outcome, error in wrong]
-    whole = IllumError("\n".join([*lines, f"{len(wrong)} of {len(sweep.outcomes)} variants failed"]))
-    whole.exit_code = wrong[0][1].exit_code
-    return whole
 
 
 def default_pattern(variants: Sequence[Variant]) -> str:
@@ -337,95 +342,3 @@ def _rows(path: Path) -> list[dict[str, str]]:
     if problems:
         raise InputError(problems)
     return [dict(zip(head, (cell.strip() for cell in line), strict=True)) for line in lines[1:]]
-
-
-# --- what comes of them -----------------------------------------------------------------------------------
-
-
-def table(sweep: Sweep, reference: str | None = None) -> str:
-    """CSV: a line per variant with its values, file, seconds, rays, mean light and, against `reference` (a
-    variant's number from 1, or an image file), RMSE and largest difference of its first file."""
-    from illumcli.film.metrics import difference
-
-    paths = list(dict.fromkeys(name for outcome in sweep.outcomes for name in outcome.variant.values))
-    against = None if reference is None else _reference(sweep, reference)
-    measures = ["mean"] + (["rmse", "largest"] if against is not None else [])
-    out = io.StringIO()
-    lines = csv.writer(out, lineterminator="\n")
-    lines.writerow(["variant", "frame", *paths, "file", "state", "seconds", "rays", "reused", *measures])
-    for number, outcome in enumerate(sweep.outcomes, 1):
-        report = outcome.report
-        state = "failed" if report is None else "rendered" if report.written else "kept"
-        reused = sum(len(names) for names in report.reused.values()) if report else 0
-        row: list[Any] = [number, outcome.variant.frame, *(outcome.variant.values.get(p, "") for p in paths)]
-        row += [outcome.paths[0], state, f"{report.total_seconds:.4f}" if report else "",
-                sum(report.rays.values()) if report else "", reused]  # fmt: skip
-        if report is not None:
-            picture = colors(outcome.paths[0])
-            row.append(f"{picture.mean(dtype=np.float64):.9g}")
-            if against is not None:
-                if against.shape != picture.shape:
-                    raise InputError(f"{outcome.paths[0]}: is of another size than the reference")
-                apart = difference(against, picture)
-                row += [f"{apart.rmse:.9g}", f"{apart.largest:.9g}"]
-        lines.writerow(row)
-    return out.getvalue()
-
-
-def write_table(path: Path, sweep: Sweep, reference: str | None = None) -> None:
-    """Write the table."""
-    from illumcli.files.atomic import write_text
-
-    write_text(path, table(sweep, reference))
-
-
-def _reference(sweep: Sweep, reference: str) -> NDArray[np.float32]:
-    if not reference.isdigit():
-        return colors(Path(reference))
-    if not 1 <= int(reference) <= len(sweep.outcomes):
-        raise InputError(f"--reference {reference}: there are variants 1 to {len(sweep.outcomes)}")
-    return colors(sweep.outcomes[int(reference) - 1].paths[0])
-
-
-def colors(path: Path) -> NDArray[np.float32]:
-    """(H, W, 3) or (H, W, 1) an image's R G B, or its first channel where it has none."""
-    from illumcli.files.images import read_image
-
-    found = read_image(path).channels
-    names = ("R", "G", "B") if {"R", "G", "B"} <= found.keys() else (next(iter(found)),)
-    return np.stack([found[name] for name in names], axis=-1)
-
-
-def sheet(sweep: Sweep, path: Path) -> None:
-    """Write a contact sheet: the first picture of every variant, with its values below."""
-    from illumcli.files.images import write_sheet
-    from illumcli.film.encode import picture
-
-    def shown(outcome: Outcome) -> NDArray[Any]:
-        file = outcome.paths[0]
-        exposure = outcome.work.scene.film.exposure
-        light = colors(file)
-        if file.suffix.lower() == ".png":
-            return np.rint(light * 255).astype(np.uint8)
-        return picture(light, exposure, 8, str(file))
-
-    done = [outcome for outcome in sweep.outcomes if outcome.report is not None]
-    if done:
-        labels = [outcome.variant.label or f"frame {outcome.variant.frame}" for outcome in done]
-        write_sheet(path, map(shown, done), labels)
-
-
-def report_data(sweep: Sweep) -> list[dict[str, Any]]:
-    """Every variant's report, with its values."""
-    return [
-        {"values": dict(outcome.variant.values), "frame": outcome.variant.frame}
-        | (outcome.report.as_data() if outcome.report else {"error": str(outcome.error)})
-        for outcome in sweep.outcomes
-    ]
-
-
-def write_report(path: Path, sweep: Sweep) -> None:
-    """Write all reports as JSON."""
-    from illumcli.files.atomic import write_text
-
-    write_text(path, json.dumps(report_data(sweep), indent=1) + "\n")

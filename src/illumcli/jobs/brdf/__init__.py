@@ -12,6 +12,7 @@ from pydantic_core import ValidationError
 
 from illumcli.description import Description
 from illumcli.errors import InputError, OutputError
+from illumcli.files.outputs import refresh, refuse_suffix
 from illumcli.jobs.brdf import views
 from illumcli.models._base import IlluminationModel
 from illumcli.scene.faults import faults
@@ -54,9 +55,10 @@ def run(
     OutputError
         A different file is there and `force` is not given.
     """
-    kind = "" if output is None else output.suffix.lower().removeprefix(".")
-    if output is not None and kind not in ("png", "svg"):
-        raise InputError(f"{output}: pictures of BRDFs are .png or .svg; choose one of these")
+    if output is not None:
+        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg")
+    if table is not None:
+        refuse_suffix(table, "a table", ".csv")
     models = described(names, overrides)
     files: dict[Path, bytes] = {}
     if table is not None:
@@ -64,6 +66,7 @@ def run(
     if output is not None:
         from illumcli.jobs.brdf.figure import drawn
 
+        kind = output.suffix.lower().removeprefix(".")
         files[output] = drawn(models, chosen, angles, log, times_cos, kind)
     _write(files, force)
     return list(files)
@@ -158,12 +161,19 @@ def slices_table(models: Mapping[str, IlluminationModel], angles: Sequence[float
 
 
 def _write(files: Mapping[Path, bytes], force: bool) -> None:
-    from illumcli.files.atomic import write_bytes
+    """Write the files; one that holds the same bytes is kept."""
+    from illumcli.files.atomic import refusals, write_bytes
 
+    kept = []
     for path, data in files.items():
-        if not force and path.exists() and path.read_bytes() != data:
-            raise OutputError(
-                f"{path}: a different file is there; use --force to replace it, or another name"
-            )
+        with refusals(str(path)):
+            if not force and path.is_file():
+                if path.read_bytes() != data:
+                    fact = "a different file is there; use --force to replace it, or another name"
+                    raise OutputError(f"{path}: {fact}")
+                kept.append(path)
     for path, data in files.items():
-        write_bytes(path, data)
+        if path in kept:
+            refresh(path)
+        else:
+            write_bytes(path, data)

@@ -1,0 +1,103 @@
+"""Outputs before there is any work: may they be written, and do they hold already what would be written?
+
+Every file names the content that it was made from, or those that its rows and entries were made from. Equal
+contents give equal files, but for what differs from run to run: seconds, rays, what was reused. So a file is
+told to be the same without making it anew.
+"""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from illumcli.errors import InputError, OutputError
+from illumcli.files.atomic import refusals
+
+INCOMPLETE = "incomplete"
+"""The content of what failed: a file that holds it may be replaced."""
+_SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
+
+
+def refuse_suffix(path: Path, what: str, *suffixes: str) -> None:
+    """Raise InputError where `path` ends in none of `suffixes`, as `what` is written."""
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: {what} is written as {' or '.join(suffixes)}; let the name end so")
+
+
+def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
+    """True where the file is there already with the same contents, so that it is as good as written.
+
+    Else it is going to be written: what stands against that is raised now. Nothing is made yet, no folder
+    either.
+
+    Raises
+    ------
+    OutputError
+        A different file stands there and `force` is not given; the file cannot be written.
+    """
+    with refusals(str(path)):
+        if path.is_file() and not force:
+            stored = stored_contents(path)
+            if stored == list(contents) and INCOMPLETE not in stored:
+                return True
+            pairs = zip(stored, contents, strict=False)
+            if len(stored) != len(contents) or any(a not in (b, INCOMPLETE) for a, b in pairs):
+                raise OutputError(
+                    f"{path}: a different file is there; use --force to replace it, or another name"
+                )
+        _refuse_unwritable(Path(os.path.realpath(path)), str(path))
+    return False
+
+
+def refresh(path: Path) -> None:
+    """Date a file that is kept now, so that `make` takes it for made."""
+    with suppress(OSError):  # somebody else's file, a folder that is read-only
+        os.utime(path)
+
+
+def stored_contents(path: Path) -> list[str]:
+    """The contents that a file of ours names; empty where it is none."""
+    try:
+        match path.suffix.lower():
+            case ".csv":
+                with path.open(newline="", encoding="utf-8") as file:
+                    return [row["content"] for row in csv.DictReader(file)]
+            case ".json":
+                found = json.loads(path.read_text(encoding="utf-8"))
+                return [entry["content"] for entry in (found if isinstance(found, list) else [found])]
+            case ".svg":
+                return _SVG.findall(path.read_text(encoding="utf-8"))
+            case ".png" | ".exr":
+                from illumcli.files.images import read_metadata
+
+                return [str(read_metadata(path)["illum:content"])]
+            case _:
+                from illumcli.files.vertex_data import read_content
+
+                content = read_content(path)
+                return [] if content is None else [content]
+    except (InputError, KeyError, TypeError, ValueError, csv.Error):
+        return []
+
+
+def _refuse_unwritable(target: Path, named: str) -> None:
+    """Raise what the operating system will have against writing `target`."""
+    if os.path.lexists(target) and not target.is_file():
+        raise OutputError(f"{named}: is a folder or a device; give the name of a file")
+    folder, names = target.parent, [target.name]
+    while not folder.exists():
+        names.append(folder.name)
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    if max(len(os.fsencode(name)) for name in names) > os.pathconf(folder, "PC_NAME_MAX"):
+        raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        number = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.EACCES
+        raise OSError(number, os.strerror(number))

@@ -1,0 +1,120 @@
+"""Files that are there already: the same, another, incomplete; and what stands against writing new ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+
+import pytest
+
+from illumcli.errors import InputError, OutputError
+from illumcli.files import outputs
+from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
+from illumcli.files.writer import ImageWriter
+
+TWO = {
+    "t.csv": "a,content,seconds\n1,one,0.5\n2,two,0.7\n",
+    "t.json": json.dumps([{"content": "one", "seconds": 3}, {"content": "two"}]),
+}
+ONE = {
+    "t.json": json.dumps({"content": "one"}),
+    "t.svg": "<svg><dc:identifier>one</dc:identifier></svg>",
+}
+
+
+@pytest.mark.parametrize(("name", "text"), TWO.items())
+def test_a_file_of_equal_contents_is_kept_and_no_other(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_text(text)
+    assert is_kept(path, ["one", "two"])
+    assert not is_kept(path, ["one", "two"], force=True)
+    for contents in (["one"], ["two", "one"], ["one", "three"], ["one", "two", "three"], [INCOMPLETE, "two"]):
+        with pytest.raises(OutputError, match="a different file is there; use --force"):
+            is_kept(path, contents)
+        assert not is_kept(path, contents, force=True)
+
+
+@pytest.mark.parametrize(("name", "text"), ONE.items())
+def test_the_content_of_one_thing(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_text(text)
+    assert is_kept(path, ["one"])
+    with pytest.raises(OutputError):
+        is_kept(path, ["two"])
+
+
+@pytest.mark.parametrize("suffix", ["png", "exr"])
+def test_images_say_their_content(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    kind = {"png": "uint8", "exr": "half"}[suffix]
+    import numpy as np
+
+    with ImageWriter(path, 2, 2, {"Y": kind}, {"illum:content": "one"}) as writer:
+        writer.write_band(0, np.zeros((2, 2, 1), np.uint8 if suffix == "png" else np.float32))
+    assert is_kept(path, ["one"])
+    with pytest.raises(OutputError):
+        is_kept(path, ["two"])
+
+
+def test_what_was_incomplete_is_replaced(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(TWO["t.csv"].replace("two", INCOMPLETE))
+    assert not is_kept(path, ["one", "two"])
+    assert not is_kept(path, ["one", INCOMPLETE])
+    with pytest.raises(OutputError):
+        is_kept(path, ["three", "two"])
+
+
+@pytest.mark.parametrize("suffix", ["csv", "json", "png", "exr", "svg", "npz", "ply", "glb", "txt"])
+@pytest.mark.parametrize("data", [b"", b"\xff\0", b"[1, 2]", b"{}", b"a,b\n1\n", b'{"content": 3}'])
+def test_files_of_others_are_never_replaced(tmp_path, suffix, data):
+    path = tmp_path / f"t.{suffix}"
+    path.write_bytes(data)
+    with pytest.raises(OutputError, match="a different file is there"):
+        is_kept(path, ["one"])
+
+
+def test_nothing_is_made_by_looking(tmp_path):
+    assert not is_kept(tmp_path / "x" / "y" / "t.csv", ["one"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.csv").mkdir()
+    long = "n" * 300
+    for name, fact in (
+        ("file/t.csv", "part of the path is a file"),
+        ("file/x/t.csv", "part of the path is a file"),
+        ("folder.csv", "is a folder or a device"),
+        (f"{long}.csv", "shorten the name"),
+        (f"new/{long}/t.csv", "shorten the name"),
+        (f"{long}/t.csv", "shorten the name"),
+    ):
+        for force in (False, True):
+            with pytest.raises(OutputError, match=re.escape(str(tmp_path / name)) + f": .*{fact}"):
+                is_kept(tmp_path / name, ["one"], force)
+    with pytest.raises(OutputError, match="is a folder or a device"):
+        is_kept(outputs.Path("/dev/null"), ["one"], True)
+
+
+def test_a_folder_that_is_read_only_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(outputs.os, "access", lambda path, mode: False)
+    with pytest.raises(OutputError, match="Permission denied; choose a folder you may write to"):
+        is_kept(tmp_path / "new" / "t.csv", ["one"])
+
+
+def test_suffixes():
+    refuse_suffix(outputs.Path("a.CSV"), "a table", ".csv")
+    with pytest.raises(InputError, match=r"a\.txt: a table is written as \.csv or \.json; let"):
+        refuse_suffix(outputs.Path("a.txt"), "a table", ".csv", ".json")
+
+
+def test_a_file_that_is_kept_is_dated_now(tmp_path):
+    path = tmp_path / "a"
+    path.write_text("")
+    os.utime(path, (1e9, 1e9))
+    refresh(path)
+    assert path.stat().st_mtime > 1.5e9
+    refresh(tmp_path / "none")

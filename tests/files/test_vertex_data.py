@@ -26,6 +26,7 @@ from illumcli.files.vertex_data import (
 )
 from illumcli.geometry.readers import read_mesh
 from illumcli.geometry.readers.gltf import primitives_of
+from illumcli.geometry.readers.gltf.document import open_document
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 ABOUT = {"content": "abc", "vertices": {"a": 4, "b": 4}, "meshes": {"a": "hash a", "b": "hash b"}}
@@ -241,10 +242,11 @@ def test_a_glb_is_written_again_with_all_it_has(tmp_path):
     document, data = vertex_data._read_glb(tmp_path / "in.glb")
     document["extras"] = {"mine": 1}
     vertex_data._Buffer(document, data).write(tmp_path / "in.glb")
-    counts = primitives_of(tmp_path / "in.glb")
+    opened = open_document(tmp_path / "in.glb")
+    counts = primitives_of(opened)
     assert counts == [(0, 0, 4), (1, 0, 4)]
     again = Baked(baked(8).obscurance[::-1], baked(8).standard_error, None, ABOUT)
-    add_to_glb(tmp_path / "out.glb", tmp_path / "in.glb", counts, again)
+    add_to_glb(tmp_path / "out.glb", (opened.json, opened.chunk or b""), counts, again)
     mesh = read_mesh(tmp_path / "out.glb")
     np.testing.assert_allclose(mesh.attributes["_OBSCURANCE"], again.obscurance)
     np.testing.assert_array_equal(mesh.vertices, read_mesh(tmp_path / "in.glb").vertices)

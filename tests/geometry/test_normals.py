@@ -114,7 +114,7 @@ def test_angle_weights_give_a_cube_corner_its_diagonal_however_it_is_cut(cut, ot
     for side, split, other in zip(SIDES, cut, other_diagonal, strict=True):
         a, b, c, d = np.roll(side, int(other))
         polygons += [[a, b, c], [a, c, d]] if split else [[a, b, c, d]]
-    made = corner_normals(ragged(*polygons, vertices=CUBE))
+    made = corner_normals(ragged(*polygons, vertices=CUBE), crease=180.0)
     np.testing.assert_allclose(made.normals, (2 * CUBE - 1) / np.sqrt(3), atol=1e-15)
 
 
@@ -122,8 +122,9 @@ def test_a_reflex_corner_counts_more_than_half_a_turn():
     """An L-shaped floor with a wall in its reflex corner, whole and cut in triangles."""
     points = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [1, 1, 1], [2, 1, 1]]
     wall = [3, 2, 7, 6]  # faces -y
-    whole = corner_normals(ragged([0, 1, 2, 3, 4, 5], wall, vertices=points))
-    cut = corner_normals(ragged([0, 1, 3], [1, 2, 3], [3, 4, 0], [4, 5, 0], wall, vertices=points))
+    whole = corner_normals(ragged([0, 1, 2, 3, 4, 5], wall, vertices=points), crease=180.0)
+    parts = ragged([0, 1, 3], [1, 2, 3], [3, 4, 0], [4, 5, 0], wall, vertices=points)
+    cut = corner_normals(parts, crease=180.0)
     np.testing.assert_allclose(whole.normals[3], cut.normals[3], atol=1e-15)
     tilted = np.array([0, -1, 3]) / np.sqrt(10)  # a quarter turn of wall, three of floor
     np.testing.assert_allclose(whole.normals[3], tilted, atol=1e-15)
@@ -135,53 +136,138 @@ def test_a_crease_keeps_the_faces_of_a_box_flat(weights):
     own = np.repeat(polygon_normals(cube()), 4, axis=0)
     np.testing.assert_allclose(flat.normals[flat.index], own, atol=1e-15)
     round_ = corner_normals(cube(), weights, crease=90.0)
-    smooth = corner_normals(cube(), weights)
+    smooth = corner_normals(cube(), weights, crease=180.0)
     np.testing.assert_allclose(round_.normals[round_.index], smooth.normals[smooth.index], atol=1e-15)
 
 
-def test_a_crease_averages_only_the_polygons_within_it():
-    """Four facets 10 degrees apart meet at one vertex: a corner sees its neighbours to each side."""
-    angle = np.radians([0, 10, 20, 30, 40])
+def around_an_apex(*degrees, closed=False):
+    """Facets round a vertex high above a rim whose points stand at these angles."""
+    angle = np.radians(degrees)
     rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    apex = [0.0, 0.0, 5.0]
-    fan = [[5, i, i + 1] for i in range(4)]
-    mesh = ragged(*fan, vertices=[*rim, apex])
+    last = len(rim)
+    fan = [[last, i, (i + 1) % last] for i in range(last if closed else last - 1)]
+    return ragged(*fan, vertices=[*rim, [0.0, 0.0, 50.0]])
+
+
+def at_the_apex(mesh, **how):
+    made = corner_normals(mesh, "equal", **how)
+    return made.normals[made.index[::3]]
+
+
+def mean(normals):
+    total = normals.sum(axis=0)
+    return total / np.linalg.norm(total)
+
+
+def test_a_vertex_is_split_at_its_sharp_edges():
+    """Five facets about 10 degrees apart but for one edge of 35, and one fan of them to each side of it."""
+    mesh = around_an_apex(0, 10, 20, 30, 90, 100)
     facets = polygon_normals(mesh)
-    made = corner_normals(mesh, "equal", crease=12.0)
-    for polygon in range(4):
-        near = facets[max(polygon - 1, 0) : polygon + 2].sum(axis=0)
+    sharp, smooth = at_the_apex(mesh, crease=20.0), at_the_apex(mesh, crease=40.0)
+    np.testing.assert_allclose(sharp[:3], np.tile(mean(facets[:3]), (3, 1)), atol=1e-12)
+    np.testing.assert_allclose(sharp[3:4], facets[3:4], atol=1e-12)
+    np.testing.assert_allclose(smooth, np.tile(mean(facets), (5, 1)), atol=1e-12)
+
+
+def test_one_sharp_edge_alone_splits_nothing():
+    """Round a closed fan the polygons of either side follow each other the other way."""
+    mesh = around_an_apex(0, 85, 170, 195, 280, 305, closed=True)
+    facets = polygon_normals(mesh)
+    turns = np.degrees(np.arccos((facets * np.roll(facets, 1, axis=0)).sum(axis=1)))
+    assert np.count_nonzero(turns > 75) == 1
+    np.testing.assert_allclose(at_the_apex(mesh, crease=75.0), np.tile(mean(facets), (6, 1)), atol=1e-12)
+
+
+def prism(sides, chamfer=0.0):
+    """A prism with its edges at the ends cut off at 45 degrees."""
+    angle = np.arange(sides) * 2 * np.pi / sides
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    levels = [(1.0, 0.0), (1.0, 1.0)]
+    if chamfer:
+        inner = 1 - chamfer / np.cos(np.pi / sides)
+        levels = [(inner, 0.0), (1.0, chamfer), (1.0, 1 - chamfer), (inner, 1.0)]
+    vertices = np.concatenate([ring * [r, r, 0] + [0, 0, z] for r, z in levels])
+    i, j = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = [
+        [k * sides + a, k * sides + b, (k + 1) * sides + b, (k + 1) * sides + a]
+        for k in range(len(levels) - 1)
+        for a, b in zip(i.tolist(), j.tolist(), strict=True)
+    ]
+    ends = [list(range(sides))[::-1], list(range(len(vertices) - sides, len(vertices)))]
+    return ragged(*faces, *ends, vertices=vertices)
+
+
+@pytest.mark.parametrize(
+    ("sides", "is_round"), [(4, False), (6, False), (8, False), (9, True), (12, True), (64, True)]
+)
+@pytest.mark.parametrize("chamfer", [0.0, 0.1])
+def test_edges_of_parts_are_sharp_and_coarse_cylinders_round_by_default(sides, is_round, chamfer):
+    mesh = prism(sides, chamfer)
+    made = corner_normals(mesh)
+    corner, size = made.normals[made.index], np.diff(mesh.starts)
+    own = np.repeat(polygon_normals(mesh), size, axis=0)
+    is_end = np.repeat(size == sides, size) & (np.abs(own[:, 2]) > 0.99)
+    np.testing.assert_allclose(corner[is_end], own[is_end], atol=1e-12)
+    upright = np.abs(own[:, 2]) < 0.01
+    np.testing.assert_allclose(corner[upright][:, 2], 0, atol=1e-12)
+    radial = mesh.vertices[mesh.corners[upright]] * [1, 1, 0]
+    wanted = radial / np.linalg.norm(radial, axis=1)[:, None] if is_round else own[upright]
+    np.testing.assert_allclose(corner[upright], wanted, atol=1e-12)
+
+
+def test_smoothing_groups_say_what_is_averaged_whatever_the_angle():
+    """Sides of a cube: two share a group, one has one of its own, one is flat, two are not spoken of."""
+    groups = np.array([1, 1, 2, 0, -1, -1], np.int32)
+    mesh = cube(polygon_smoothing=groups)
+    made = corner_normals(mesh)
+    own = polygon_normals(mesh)
+    corner = made.normals[made.index].reshape(6, 4, 3)
+    np.testing.assert_allclose(corner[2:], np.repeat(own[2:, None], 4, axis=1), atol=1e-12)
+    shared = cube(polygon_smoothing=np.array([1, 3, 1, 0, 3, -1], np.int32))
+    made = corner_normals(shared)
+    corner, at = made.normals[made.index].reshape(6, 4, 3), shared.corners.reshape(6, 4)
+    for side, beside in ((0, 2), (2, 0), (1, 4), (4, 1)):
+        meets = np.isin(at[side], at[beside])
+        assert np.count_nonzero(meets) == 2
         np.testing.assert_allclose(
-            made.normals[made.index[3 * polygon]], near / np.linalg.norm(near), atol=1e-14
+            corner[side][meets], np.tile(mean(own[[side, beside]]), (2, 1)), atol=1e-12
         )
+        np.testing.assert_allclose(corner[side][~meets], np.tile(own[side], (2, 1)), atol=1e-12)
+    by_angle = corner_normals(shared, crease=180.0)
+    np.testing.assert_allclose(by_angle.normals[by_angle.index[0]], -CORNER)
+    own_normals = replace(shared, normals=own, corner_normals=np.repeat(range(6), 4).astype(np.int32))
+    kept = corner_normals(own_normals)
+    np.testing.assert_allclose(kept.normals[kept.index], np.repeat(own, 4, axis=0))
 
 
 def test_the_files_normals_are_kept_and_the_bad_ones_replaced():
     own = np.array([[0, 0, 3.0], [0, 0, 0], [np.nan, 0, 1], [1e-200, 0, 0]])
     mesh = cube(normals=own, corner_normals=np.array([0, 1, 2, 3] + [0] * 20, np.int32))
-    made = corner_normals(mesh)
+    made = corner_normals(mesh, crease=180.0)
     corner = made.normals[made.index]
     np.testing.assert_array_equal(corner[[0, 3, 4]], [[0, 0, 1], [1, 0, 0], [0, 0, 1]])
     np.testing.assert_allclose(corner[1:3], (2 * CUBE[[1, 3]] - 1) / np.sqrt(3))
     assert made.repairs == {"zero or non-finite normals": 2}
-    ignored = corner_normals(mesh, use_file=False)
+    ignored = corner_normals(mesh, crease=180.0, use_file=False)
     np.testing.assert_allclose(ignored.normals[ignored.index[0]], -CORNER)
 
 
 def test_corners_without_a_normal_of_the_file_are_computed_and_not_called_bad():
     own = 3 * polygon_normals(cube())
     mesh = cube(normals=own, corner_normals=np.array([-1, *np.repeat(range(6), 4)[1:]], np.int32))
-    made = corner_normals(mesh)
+    made = corner_normals(mesh, crease=180.0)
     np.testing.assert_allclose(made.normals[made.index[0]], -CORNER)
     assert made.repairs == {}
 
 
 def test_two_sheets_back_to_back_keep_their_own_sides():
     mesh = ragged([0, 1, 2], [2, 1, 0], vertices=[[0.1, 0, 0], [1, 0.3, 0], [0, 1, 0.7]])
-    made = corner_normals(mesh)
-    np.testing.assert_allclose(
-        made.normals[made.index], np.repeat(polygon_normals(mesh), 3, axis=0), atol=1e-15
-    )
-    assert made.repairs == {"vertices whose polygons cancel": 6}
+    for crease, repairs in ((180.0, {"vertices whose polygons cancel": 6}), (None, {})):
+        made = corner_normals(mesh, crease=crease)
+        np.testing.assert_allclose(
+            made.normals[made.index], np.repeat(polygon_normals(mesh), 3, axis=0), atol=1e-15
+        )
+        assert made.repairs == repairs
 
 
 def test_a_degenerate_polygon_weighs_nothing_and_alone_has_no_normal():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from illumcli.files.atomic import beside
 from illumcli.files.vertex_data import read_npz
 from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.readers import read_mesh
+from illumcli.geometry.readers.gltf.document import open_document
 from illumcli.jobs.ao_bake import Settings, run
 from illumcli.jobs.ao_bake_cast import Caster
 from illumcli.plan.execute import Tally, bands, run_once
@@ -202,6 +204,41 @@ def test_a_glb_keeps_all_it_has(text_mesh, tmp_path):
     first, second = read_mesh(tmp_path / "first.glb"), read_mesh(tmp_path / "second.glb")
     assert np.array_equal(first.attributes["color"], second.attributes["color"])
     assert not np.array_equal(first.attributes["_OBSCURANCE"], second.attributes["_OBSCURANCE"])
+
+
+def test_a_glb_that_is_written_oddly_keeps_all_it_has(text_mesh, tmp_path):
+    bake(text_mesh(STEP), tmp_path / "plain.glb", samples=16)
+    document = open_document(tmp_path / "plain.glb")
+    data = document.chunk
+    document.json["extras"] = {"mine": 1}
+    document.json["asset"]["extras"] = "notes"
+    document.json["buffers"].append({"byteLength": 4, "uri": "data:;base64,AAAA/w=="})
+
+    def write(path):
+        text = b"\xef\xbb\xbf" + json.dumps(document.json).encode() + b"\0\0"
+        chunks = struct.pack("<I", 4) + b"????1234"
+        chunks += struct.pack("<I", len(text)) + b"JSON" + text
+        chunks += (struct.pack("<I", len(data)) + b"BIN\0" + data) if document.chunk else b""
+        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks + b"more")
+        return path
+
+    bake(write(tmp_path / "odd.glb"), tmp_path / "out.glb", samples=16)
+    made = open_document(tmp_path / "out.glb")
+    assert made.json["extras"] == {"mine": 1}
+    assert made.json["buffers"][1] == document.json["buffers"][1]
+    assert "_OBSCURANCE" in made.json["meshes"][0]["primitives"][0]["attributes"]
+    np.testing.assert_array_equal(
+        read_mesh(tmp_path / "out.glb").vertices, read_mesh(tmp_path / "odd.glb").vertices
+    )
+
+    # a GLB whose first buffer is a file of its own is written anew
+    (tmp_path / "data.bin").write_bytes(data)
+    document.json["buffers"][0]["uri"] = "data.bin"
+    document.chunk = None
+    bake(write(tmp_path / "apart.glb"), tmp_path / "anew.glb", samples=16)
+    anew = read_mesh(tmp_path / "anew.glb")
+    assert "extras" not in open_document(tmp_path / "anew.glb").json
+    np.testing.assert_allclose(anew.vertices, read_mesh(tmp_path / "odd.glb").vertices)
 
 
 def test_copies_of_a_vertex_with_one_normal_get_the_same_value(tmp_path):

@@ -336,7 +336,7 @@ class _Buffer:
         """The GLB, whole or not at all."""
         data = b"".join(self.parts)
         data += b"\0" * (-len(data) % 4)
-        self.document["buffers"] = [{"byteLength": len(data)}]
+        self.document["buffers"] = [{"byteLength": len(data)}, *self.document.get("buffers", [])[1:]]
         text = json.dumps(self.document, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
         with Part(path) as part, part.path.open("wb") as file:
@@ -398,17 +398,23 @@ def write_glb(path: Path, shapes: Sequence[Shape], baked: Baked, channel: str | 
     buffer.write(path)
 
 
-def add_to_glb(path: Path, source: Path, counts: Sequence[tuple[int, int, int]], baked: Baked) -> None:
-    """The GLB `source` with `_OBSCURANCE` and `_STANDARD_ERROR` added to each primitive, all else as it is.
+def add_to_glb(
+    path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], baked: Baked
+) -> None:
+    """A GLB with `_OBSCURANCE` and `_STANDARD_ERROR` added to each primitive, all else as it is.
 
     Parameters
     ----------
+    source : (dict, bytes)
+        The JSON of the input, which is changed, and its binary chunk.
     counts : sequence of (mesh, primitive, vertices)
         The primitives in the order of the baked vertices, each once.
     """
-    document, data = _read_glb(source)
+    document, data = source
     buffer = _Buffer(document, data)
-    document.setdefault("asset", {}).setdefault("extras", {})["illum"] = dict(baked.about)
+    extras = document["asset"].get("extras")
+    about = {"illum": dict(baked.about)}
+    document["asset"]["extras"] = {**extras, **about} if isinstance(extras, dict) else about
     first = 0
     for mesh, primitive, count in counts:
         attributes = document["meshes"][mesh]["primitives"][primitive]["attributes"]

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import Lanes, Vectors, cross, dot, length, rows, unit
+from illumcli.geometry.components import components
 from illumcli.geometry.mesh import Mesh
 from illumcli.records import Record
 
@@ -31,6 +32,14 @@ Weights: TypeAlias = Literal["equal", "area", "angle"]
 
 EPS = np.finfo(np.float64).eps
 AGAINST = -0.01  # cosine below which a normal lies clearly on the other side of its polygon
+DEFAULT_CREASE = 40.0
+"""[degrees] Sharper edges of meshes without normals or smoothing groups stay sharp.
+
+Below the edges that parts are made with on purpose, 45 (chamfers, octagons), 60 (hexagons) and 90, also
+where a chamfer of a coarse cylinder is measured between its flat sides (41 for six sides); above those of
+curved surfaces: cylinders of nine sides and more, all but 0.5 % of the edges of scans, 1 % of a coarse model.
+"""
+MOST_AT_EDGE = 8  # polygons that meet at one edge are compared with so many that follow, less 1
 SAME_ANGLE = 1e-9  # [rad] polygons that meet at exactly the crease angle are still averaged
 
 
@@ -130,8 +139,10 @@ def corner_normals(
     weights : {"angle", "area", "equal"}
         What a polygon counts at its vertex. Only `angle` does not depend on how faces are cut into polygons.
     crease : float, optional
-        [degrees] A corner averages the polygons at its vertex that stand within this angle of its own; by
-        default all of them.
+        [degrees] Edges whose polygons meet at more than this are sharp. A corner averages the polygons around
+        its vertex that follow each other from its own without a sharp edge between; from 180 on all of them.
+        By default the file's smoothing groups say which are averaged, and, for polygons of which the file
+        says nothing, `DEFAULT_CREASE`.
     use_file : bool
         Take the file's normals. Those that are zero or not finite are computed instead, and counted.
     polygon_method : {"newell", "cross", "edge_average", "plane"}
@@ -207,7 +218,7 @@ def vertex_normal(
     second = np.roll(first, -1)
     triangles = np.stack([np.zeros_like(first), first, second], axis=1)[: len(around) if closed else -1]
     mesh = Mesh.of_triangles(np.vstack([np.asarray(vertex, np.float64), around]), triangles)
-    made = corner_normals(mesh, weighting, use_file=False)
+    made = corner_normals(mesh, weighting, crease=180.0, use_file=False)
     return made.normals[made.index[0]]
 
 
@@ -297,13 +308,24 @@ def _computed(
     if turned is not None:
         polygons = np.where(turned[:, None], -polygons, polygons)
     owner = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
-    if crease is None:
-        sums, total = _vertex_sums(mesh, weight, polygons, owner)
-        index = mesh.corners
-    else:
-        sums, total = _creased_sums(mesh, weight, polygons, owner, np.radians(crease))
-        index = np.arange(len(mesh.corners), dtype=np.int32)
-    return _with_polygons_own(sums, total, index, polygons, owner)
+    if crease == 0:
+        sound = dot(polygons, polygons) > 0
+        return CornerNormals(polygons, np.where(sound[owner], owner, -1).astype(np.int32), {})
+
+    # Corners that share a pool are averaged: those of a vertex, or of a vertex and smoothing group.
+    pool, by_angle = (mesh.corners, None) if crease is not None else _pools(mesh, owner)
+    sums, total = _sums(pool, weight, polygons, owner)
+
+    # Pools over which normals turn too far are split at their sharp edges.
+    limit = np.radians(DEFAULT_CREASE if crease is None else crease)
+    wide = _wide(pool, by_angle, rows(polygons, owner), sums, limit) if limit < np.pi else pool[:0]
+    if wide.size:
+        fan = _fans_between_edges(mesh, wide, polygons, owner, limit)
+        parts = _sums(fan, None if weight is None else weight[wide], polygons, owner[wide])
+        pool = pool.copy()
+        pool[wide] = len(sums) + fan
+        sums, total = np.concatenate([sums, parts[0]]), np.concatenate([total, parts[1]])
+    return _with_polygons_own(sums, total, pool.astype(np.int32), polygons, owner)
 
 
 def _with_polygons_own(
@@ -340,47 +362,81 @@ def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Lanes | 
     return angle
 
 
-def _vertex_sums(
-    mesh: Mesh, weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32]
+def _pools(mesh: Mesh, owner: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    """(C,) which corners are averaged together, by the file's smoothing groups, and (C,) where the angle
+    between polygons decides too: where the file says nothing. None: everywhere."""
+    if mesh.polygon_smoothing is None:
+        return mesh.corners, None
+    group = mesh.polygon_smoothing[owner]
+    known, number = np.unique(group, return_inverse=True)
+    key = mesh.corners.astype(np.int64) * len(known) + number
+    alone = len(mesh.vertices) * len(known) + np.arange(len(group))
+    pool = np.unique(np.where(group == 0, alone, key), return_inverse=True)[1]
+    return pool.ravel(), group < 0
+
+
+def _sums(
+    pool: NDArray[Any], weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32]
 ) -> tuple[Vectors, Lanes]:
-    """(V, 3) weighted sums of the polygon normals at each vertex, and (V,) of the weights."""
-    count = len(mesh.vertices)
-    sums = np.empty((count, 3), order="F")
+    """(K, 3) weighted sums of the polygon normals at the corners of each pool, and (K,) of the weights."""
+    total = np.bincount(pool, weight).astype(np.float64)
+    sums = np.empty((len(total), 3), order="F")
     for axis in range(3):
         part = polygons[:, axis][owner]
-        sums[:, axis] = np.bincount(mesh.corners, part if weight is None else part * weight, count)
-    return sums, np.bincount(mesh.corners, weight, count).astype(np.float64)
+        sums[:, axis] = np.bincount(pool, part if weight is None else part * weight)
+    return sums, total
 
 
-def _creased_sums(
-    mesh: Mesh, weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32], crease: float
-) -> tuple[Vectors, Lanes]:
-    """(C, 3) weighted sums over the polygons within `crease` [rad] of a corner's own, (C,) sums of weights.
+def _wide(
+    pool: NDArray[Any],
+    by_angle: NDArray[np.bool_] | None,
+    normal: Vectors,
+    sums: Vectors,
+    limit: float,
+) -> NDArray[np.intp]:
+    """Corners of the pools that may hold a sharp edge: of those where a polygon stands farther than half of
+    `limit` [rad] from the mean; any two others stand within it."""
+    apart = rows(unit(sums), pool) - normal
+    far = (dot(apart, apart) > (2 * np.sin(limit / 4)) ** 2) & (dot(normal, normal) > 0)
+    if by_angle is not None:
+        far &= by_angle
+    is_wide = np.zeros(len(sums), np.bool_)
+    is_wide[pool[far]] = True
+    return np.flatnonzero(is_wide[pool])
 
-    Corners are ordered by vertex, the busiest vertices first; step k pairs each with the k-th after it round
-    its vertex. The work is the sum of squared valences, the memory a few values per corner.
-    """
-    near = 2 * np.sin(min(crease, np.pi) / 2) + SAME_ANGLE  # compared as a chord, exact for small angles
-    valence = np.bincount(mesh.corners, minlength=len(mesh.vertices)).astype(np.int32)
-    busy = np.argsort(-valence, kind="stable")
-    rank = np.empty_like(busy)
-    rank[busy] = np.arange(len(busy))
-    order = np.argsort(rank[mesh.corners], kind="stable").astype(np.int32)
-    span = np.repeat(valence[busy], valence[busy])
-    end = np.repeat(np.cumsum(valence[busy], dtype=np.int32), valence[busy])
-    normal = rows(polygons, owner[order])
-    value = np.ones(len(order)) if weight is None else weight[order]
-    sums, total = normal * value[:, None], value.copy()
-    here = np.arange(len(order), dtype=np.int32)
-    for step in range(1, int(span.max(initial=1))):
-        many = int(np.searchsorted(-span, -step))  # corners of the vertices with more polygons than `step`
-        other = here[:many] + np.int32(step)
-        other -= np.where(other >= end[:many], span[:many], np.int32(0))
-        there = rows(normal, other)
-        apart = there - normal[:many]
-        counts = np.where(dot(apart, apart) <= near * near, value[other], 0.0)
-        sums[:many] += there * counts[:, None]
-        total[:many] += counts
-    back = np.empty_like(order)
-    back[order] = here
-    return rows(sums, back), total[back]
+
+def _fans_between_edges(
+    mesh: Mesh, corners: NDArray[Any], polygons: Vectors, owner: NDArray[np.int32], limit: float
+) -> NDArray[np.int64]:
+    """(M,) a number for the fan of each of these corners, which are all that their vertices have: polygons
+    around a vertex that follow each other over edges of at most `limit` [rad]."""
+    following = np.arange(1, len(mesh.corners) + 1)
+    following[mesh.starts[1:] - 1] = mesh.starts[:-1]
+    previous = np.empty_like(following)
+    previous[following] = np.arange(len(following))
+    place = np.full(len(following), -1)
+    place[corners] = np.arange(len(corners))
+
+    # The edges that end at these vertices, so ordered that those between the same two vertices follow each
+    # other: each is compared with some that come after it.
+    edge = np.unique(np.concatenate([corners, previous[corners]]))
+    ends = np.sort([mesh.corners[edge], mesh.corners[following[edge]]], axis=0)
+    key = ends[0].astype(np.int64) * len(mesh.vertices) + ends[1]
+    order = np.argsort(key, kind="stable")
+    edge, key = edge[order], key[order]
+    near = 2 * np.sin(limit / 2) + SAME_ANGLE  # compared as a chord, exact for small angles
+    joints = [np.zeros((2, 0), np.int64)]
+    for step in range(1, MOST_AT_EDGE):
+        same = np.flatnonzero(key[step:] == key[:-step])
+        if not same.size:
+            break
+        a, b = edge[same], edge[same + step]
+        apart = rows(polygons, owner[a]) - rows(polygons, owner[b])
+        soft = dot(apart, apart) <= near * near
+        a, b = a[soft], b[soft]
+        against = mesh.corners[a] == mesh.corners[following[b]]  # as neighbours run along an edge
+        start, end = np.where(against, following[b], b), np.where(against, b, following[b])
+        joints += [place[[a, start]], place[[following[a], end]]]
+    joint = np.concatenate(joints, axis=1)
+    first, second = joint[:, (joint >= 0).all(axis=0)]
+    return np.unique(components(first, second, len(corners)), return_inverse=True)[1].ravel()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
 from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.components import components
 
 NORMAL_STEPS = 512
 """Normals that round to the same multiples of 1 / NORMAL_STEPS are one: exporters write the normal of a
@@ -50,16 +51,7 @@ class SmoothParts:
         """(T,) a number for the part of each triangle; threads that ask at once find the same."""
         point = self._corner_points()
         first, second = point[:, :2].T.ravel(), point[:, 1:].T.ravel()
-        root = np.arange(point.max(initial=-1) + 1)
-        # Hook the larger of two roots that a triangle joins below the smaller, then flatten the trees.
-        while first.size:
-            low, high = np.sort([root.take(first), root.take(second)], axis=0)
-            apart = low != high
-            np.minimum.at(root, high[apart], low[apart])
-            first, second = first[apart], second[apart]
-            while not np.array_equal(flatter := root.take(root), root):
-                root = flatter
-        return root.take(point[:, 0])
+        return components(first, second, point.max(initial=-1) + 1).take(point[:, 0])
 
     def _corner_points(self) -> NDArray[np.int64]:
         """(T, 3) a number for the object, place and normal of each corner; equal ones share it."""

@@ -437,18 +437,24 @@ def write(
             write_ply(each, [], baked, path, settings.channel)
         elif kind == ".ply":
             write_ply(each, *shapes(settings.split), None, settings.channel)
-        elif alone == ".glb" and settings.channel is None and (counts := primitives(path)):
-            add_to_glb(each, path, counts, baked)
+        elif alone == ".glb" and settings.channel is None and (found := primitives(path)):
+            add_to_glb(each, *found, baked)
         else:
             write_glb(each, *shapes(True), settings.channel)
 
 
-def primitives(path: Path) -> list[tuple[int, int, int]]:
-    """(mesh, primitive, vertices) of a GLB in the order of its reader; empty where a mesh stands twice."""
+def primitives(path: Path) -> tuple[tuple[dict[str, Any], bytes], list[tuple[int, int, int]]] | None:
+    """JSON and binary chunk of a GLB, and (mesh, primitive, vertices) in the order of its reader; None where
+    a mesh stands twice, or where the first buffer is no chunk of the file."""
     from illumcli.geometry.readers.gltf import primitives_of
+    from illumcli.geometry.readers.gltf.document import open_document
 
-    found = primitives_of(path)
-    return found if len({each[:2] for each in found}) == len(found) else []
+    document = open_document(path)
+    found = primitives_of(document)
+    once = len({each[:2] for each in found}) == len(found)
+    if not once or (document.items("buffers") and "uri" in document.item("buffers", 0)):
+        return None
+    return (document.json, document.chunk or b""), found
 
 
 class _Clock:

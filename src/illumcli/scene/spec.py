@@ -51,7 +51,8 @@ class Normals(Description):
     """What each polygon counts for in a vertex normal. `angle`: its angle at the vertex, so that it does not
     matter how faces are cut into polygons. `area`: its area. `equal`: as much as any other."""
     crease: Annotated[float, Within(ge=0, le=180)] | None = None
-    """Polygons that meet at more than this keep their edge sharp [degrees]."""
+    """Polygons that meet at more than this keep their edge sharp [degrees]; 180: none. By default the file's
+    smoothing groups say so, and 40 degrees where it has none."""
     polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
     """How a polygon's own normal is found. `newell`: by Newell's sum over all corners, which suits every
     polygon. `cross`: by the edges at the first corner. `edge_average`: as the mean over all corners of the

@@ -6,6 +6,7 @@ import base64
 import json
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import read_mesh
+from illumcli.shading.materials import imported_model
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0.5], [1, 1, 0], [0, 1, 0.25], [0.5, 0.5, 1]], "<f4")
 FACES = [[0, 1, 2, 3], [0, 4, 1], [1, 4, 2], [2, 4, 3]]
@@ -62,31 +64,101 @@ def stl_binary() -> bytes:
 
 
 def gltf_parts() -> tuple[dict, bytes]:
-    indices = np.array(FACES[1:], "<u2").tobytes() + b"\0\0"
-    color = np.full((5, 4), 128, "u1").tobytes()
-    data = POINTS.tobytes() + indices + color
+    """A document with a bit of everything: skin, target, instances, sparse rows, textures, zeros."""
+    half = np.full((5, 4), 0.5, "<f4")
+    blocks = {
+        "points": POINTS,
+        "indices": np.array([*FACES[1:]], "<u2"),
+        "color": np.full((5, 4), 128, "u1"),
+        "uv": POINTS[:, :2].copy(),
+        "joints": np.array([[0, 1, 0, 0]] * 5, "u1"),
+        "weights": half,
+        "binding": np.tile(np.eye(4, dtype="<f4"), (2, 1, 1)),
+        "places": np.array([[0, 0, 0], [3, 0, 0]], "<f4"),
+        "row": np.array([4], "<u2"),
+        "moved": np.array([[0.5, 0.5, 2]], "<f4"),
+        "image": np.frombuffer(b"\x89PNG and no more", "u1"),
+    }
+    data, views = b"", {}
+    for name, block in blocks.items():
+        views[name] = {"buffer": 0, "byteOffset": len(data), "byteLength": block.nbytes}
+        data += block.tobytes() + b"\0" * (-block.nbytes % 4)
+    number = {name: i for i, name in enumerate(views)}
+
+    def accessor(name: str, kind: int, count: int, shape: str, **more: Any) -> dict[str, Any]:
+        return {"bufferView": number[name], "componentType": kind, "count": count, "type": shape, **more}
+
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": number["row"], "componentType": 5123},
+        "values": {"bufferView": number["moved"]},
+    }
+    accessors = [
+        accessor("points", 5126, 5, "VEC3", sparse=sparse),
+        accessor("indices", 5123, 9, "SCALAR"),
+        accessor("color", 5121, 5, "VEC4", normalized=True),
+        accessor("uv", 5126, 5, "VEC2"),
+        accessor("joints", 5121, 5, "VEC4"),
+        accessor("weights", 5126, 5, "VEC4"),
+        accessor("binding", 5126, 2, "MAT4"),
+        accessor("places", 5126, 2, "VEC3"),
+        {"componentType": 5126, "count": 5, "type": "VEC3"},
+    ]
+    own = {"POSITION": 0, "COLOR_0": 2, "TEXCOORD_0": 3, "TEXCOORD_1": 3, "NORMAL": 0}
+    turned = {"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 1, "scale": [2, 2], "texCoord": 1}}
     document = {
         "asset": {"version": "2.0"},
+        "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "extensionsRequired": ["KHR_texture_transform"],
+        "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [
-            {"mesh": 0, "rotation": [0, 0, 0.6, 0.8], "children": [1]},
-            {"mesh": 0, "scale": [1, 2, -1]},
+            {"mesh": 0, "rotation": [0, 0, 0.6, 0.8], "children": [1, 2, 3], "weights": [0.5]},
+            {
+                "mesh": 0,
+                "scale": [1, 2, -1],
+                "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 7, "SCALE": 7}}},
+            },
+            {"mesh": 1, "skin": 0, "extensions": {"KHR_node_visibility": {"visible": True}}},
+            {"matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 2, 3, 4, 1]},
         ],
+        "skins": [{"joints": [3, 0], "inverseBindMatrices": 6}],
         "meshes": [
-            {"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 2}, "indices": 1, "material": 0}]}
+            {
+                "primitives": [
+                    {"attributes": own, "indices": 1, "material": 0, "targets": [{"POSITION": 8}], "mode": 4}
+                ],
+                "weights": [1],
+            },
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": 0, "JOINTS_0": 4, "WEIGHTS_0": 5}, "indices": 1, "mode": 5}
+                ]
+            },
         ],
-        "materials": [{"name": "red"}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3"},
-            {"bufferView": 1, "componentType": 5123, "count": 9, "type": "SCALAR"},
-            {"bufferView": 2, "componentType": 5121, "count": 5, "type": "VEC4", "normalized": True},
+        "materials": [
+            {
+                "name": "red",
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [1, 0.5, 0.25, 1],
+                    "baseColorTexture": {"index": 0, "extensions": turned},
+                    "metallicFactor": 0.5,
+                    "roughnessFactor": 0.5,
+                },
+                "emissiveFactor": [1, 1, 1],
+                "emissiveTexture": {"index": 1, "texCoord": 0},
+                "extensions": {
+                    "KHR_materials_emissive_strength": {"emissiveStrength": 2},
+                    "KHR_materials_ior": {"ior": 1.5},
+                },
+            }
         ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 60},
-            {"buffer": 0, "byteOffset": 60, "byteLength": 20},
-            {"buffer": 0, "byteOffset": 80, "byteLength": 20},
-        ],
-        "buffers": [{"byteLength": 100}],
+        "textures": [{"source": 0, "sampler": 0}, {"source": 1}],
+        "images": [{"bufferView": number["image"], "mimeType": "image/png"}, {"uri": "wood.png"}],
+        "samplers": [{"wrapS": 33648, "wrapT": 33648, "magFilter": 9728}],
+        "accessors": accessors,
+        "bufferViews": list(views.values()),
+        "buffers": [{"byteLength": len(data)}],
     }
     return document, data
 
@@ -97,8 +169,10 @@ def gltf() -> bytes:
     return json.dumps(document).encode()
 
 
-def glb() -> bytes:
+def glb(changed: Any = None) -> bytes:
+    """The document in one file, its JSON replaced by `changed`."""
     document, data = gltf_parts()
+    document = document if changed is None else changed
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
@@ -186,6 +260,8 @@ def assert_sound(mesh: Mesh) -> None:
             assert len(ids) == mesh.polygon_count
             assert ids.min() >= -1
             assert ids.max() < len(names)
+    for keys in mesh.materials.values():
+        imported_model(keys, Path())
     for values in mesh.attributes.values():
         assert len(values) == len(mesh.vertices)
         assert values.dtype.kind in "iu" or np.isfinite(values).all()
@@ -229,3 +305,46 @@ def test_accidents_to_a_material_library(tmp_path: Path) -> None:
     for seed in range(400):
         (tmp_path / "a.mtl").write_bytes(mutated(np.random.default_rng(seed), mtl()))
         read_or_refused(tmp_path / "a.obj")
+
+
+ODD = [None, True, -1, 0, 1, 2, 5, 7, 99, 2**40, 2**70, 0.5, -0.0, 1e300, float("nan"), float("inf"), "", "0"]
+ODD += [
+    "x" * 5000,
+    "data:,",
+    "../a",
+    "\ud800",
+    [],
+    [0],
+    [0, 0],
+    [[0]],
+    ["a"],
+    {},
+    {"0": 0},
+    {"bufferView": 0},
+]
+
+
+def rewritten(rng: np.random.Generator, part: Any) -> Any:
+    """A part of a document with something else in one place of it."""
+    if not isinstance(part, dict | list) or not part or rng.random() < 0.1:
+        return ODD[rng.integers(len(ODD))]
+    keys = list(part) if isinstance(part, dict) else list(range(len(part)))
+    key = keys[rng.integers(len(keys))]
+    if rng.random() < 0.1:
+        kept = [other for other in keys if other != key]
+        return {k: part[k] for k in kept} if isinstance(part, dict) else [part[k] for k in kept]
+    changed = dict(part) if isinstance(part, dict) else list(part)
+    changed[key] = rewritten(rng, part[key])
+    return changed
+
+
+@pytest.mark.parametrize("count", [1000, pytest.param(50_000, marks=pytest.mark.slow)])
+def test_accidents_to_the_parts_of_a_gltf_document(tmp_path: Path, count: int) -> None:
+    (tmp_path / "wood.png").write_bytes(b"")
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        document, _ = gltf_parts()
+        for _ in range(rng.integers(1, 4)):
+            document = rewritten(rng, document)
+        (tmp_path / "a.glb").write_bytes(glb(document))
+        read_or_refused(tmp_path / "a.glb")

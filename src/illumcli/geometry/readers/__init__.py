@@ -16,6 +16,7 @@ from illumcli.errors import IllumError, InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 
 MOST_WORDS = 128  # of a line that names files, with the blanks between them
+LONGEST_PLY_HEADER = 1 << 20  # [bytes]
 OTHER_SUFFIXES = {".glb": "gltf"}  # read by the module of another name
 
 
@@ -85,20 +86,24 @@ def companions(path: Path) -> list[Path]:
         return [*libraries, *images]
     if suffix in (".gltf", ".glb"):
         return _named(path, _URI, path.parent)
+    if suffix == ".ply":
+        return _named(path, _TEXTURE, path.parent, LONGEST_PLY_HEADER)
     return []
 
 
 _LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
 _IMAGE = re.compile(rb"map_kd[ \t]([^\r\n]*)", re.IGNORECASE)
+_TEXTURE = re.compile(rb"comment[ \t]+texturefile[ \t]([^\r\n]*)", re.IGNORECASE)
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
 
-def _named(path: Path, pattern: re.Pattern[bytes], folder: Path) -> list[Path]:
-    """The paths inside `folder` that the text of `path` may mean where it names files."""
+def _named(path: Path, pattern: re.Pattern[bytes], folder: Path, most: int | None = None) -> list[Path]:
+    """The paths inside `folder` that the text of `path`, its first `most` bytes, may mean where it names
+    files."""
     from illumcli.geometry.readers._files import beside, content
 
     try:
-        data = content(path)
+        data = content(path, most)
     except IllumError:  # whoever reads the file says what is wrong with it
         return []
     if pattern is _LIBRARY and b"\\" in data:  # a line that goes on in the next

@@ -12,8 +12,8 @@ LARGEST_FILE = 4 << 30  # [bytes]
 LONGEST_NAME = 4096  # letters of a path
 
 
-def content(path: Path) -> bytes:
-    """The bytes of a regular file that is not empty and not larger than `LARGEST_FILE`."""
+def content(path: Path, most: int | None = None) -> bytes:
+    """The bytes of a regular file that is not empty and not larger than `LARGEST_FILE`; the first `most`."""
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
@@ -23,7 +23,8 @@ def content(path: Path) -> bytes:
         if status.st_size > LARGEST_FILE:
             size = f"{status.st_size / 2**30:.1f} GiB"
             raise LimitError(f"{path}: has {size}, the limit is {LARGEST_FILE >> 30} GiB; use a smaller mesh")
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(most)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except (OSError, ValueError) as error:

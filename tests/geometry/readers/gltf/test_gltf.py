@@ -13,6 +13,7 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import gltf, read_mesh
 from illumcli.geometry.readers.gltf import primitives
+from illumcli.geometry.readers.gltf.document import open_document
 from illumcli.geometry.repairs import HARMLESS
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "f4")
@@ -265,7 +266,7 @@ def test_a_drawing_of_points_is_counted_and_the_rest_read(tmp_path: Path, square
     assert mesh.polygon_count == 6
     assert counted(mesh) == {"primitives of points or lines left out": 2}
     assert mesh.repairs["primitives of points or lines left out"].first == ": meshes[0].primitives[2]"
-    assert gltf.primitives_of(path) == [(0, 0, 4), (0, 1, 4)] * 2
+    assert gltf.primitives_of(open_document(path)) == [(0, 0, 4), (0, 1, 4)] * 2
 
 
 def test_colours_with_and_without_alpha(tmp_path: Path, Scene: Any) -> None:

@@ -87,11 +87,11 @@ def _place(found: list[Part], vertices: list[int], faces: list[int], part: str, 
     return f": meshes[{found[k].mesh}].primitives[{found[k].primitive}], {part} {number - first[k] + 1}"
 
 
-def primitives_of(path: Path) -> list[tuple[int, int, int]]:
+def primitives_of(document: Document) -> list[tuple[int, int, int]]:
     """(mesh, number of the primitive in it, vertices) for each run of vertices, in the order of `read`."""
     return [
         (part.mesh, part.primitive, len(part.vertices) // part.copies)
-        for part in parts(open_document(path))
+        for part in parts(document)
         for _ in range(part.copies)
     ]
 

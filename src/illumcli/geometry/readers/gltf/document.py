@@ -199,7 +199,7 @@ def _name_extensions(document: Document) -> None:
     holds from being read, and where one alone holds the geometry, that is refused when it is asked for."""
     needed = document.json.get("extensionsRequired", [])
     for name in needed if isinstance(needed, list) else [needed]:
-        if name not in READ:
+        if not isinstance(name, str) or name not in READ:
             document.count(f"required extension {name!s:.60}, read in its core state")
 
 

@@ -35,6 +35,7 @@ from illumcli.geometry.readers.gltf.document import (
     extension,
     extensions,
     is_finite,
+    is_index,
     is_inline,
 )
 from illumcli.geometry.readers.gltf.primitives import Part
@@ -207,7 +208,8 @@ class Library:
         return found
 
     def _sampling(self, sampler: dict[str, Any], where: str) -> dict[str, str]:
-        wraps = [_WRAPS.get(sampler.get(key, _REPEAT), "repeat") for key in ("wrapS", "wrapT")]
+        said = [sampler.get(key, _REPEAT) for key in ("wrapS", "wrapT")]
+        wraps = [_WRAPS.get(code, "repeat") if is_index(code) else "repeat" for code in said]
         if wraps[0] != wraps[1]:
             self._count("textures that wrap in two ways, wrapped in the first", where)
         found = {} if wraps[0] == "repeat" else {"wrap": wraps[0]}

@@ -259,7 +259,7 @@ def _applied(linear: Floats, vectors: Floats) -> Floats:
 
 
 def _repeated(values: NDArray[Any], copies: int) -> NDArray[Any]:
-    return values if copies == 1 else np.concatenate([values] * copies)
+    return values if copies == 1 else np.concatenate([values[:0], *[values] * copies])
 
 
 def _cofactors(matrices: Floats) -> Floats:

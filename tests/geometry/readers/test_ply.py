@@ -327,18 +327,23 @@ def test_rows_may_go_on_in_the_next_line_if_all_values_are_there(tmp_path: Path)
 def test_the_header_may_be_written_in_many_ways(tmp_path: Path) -> None:
     plain = head()
     for header in (
-        plain.replace("\n", "\n \t")[:-2],
         plain.replace("\n", "  \n"),
         plain.replace("int", "INT").replace("float", "Float64"),
         plain.replace("ascii 1.0", "ascii"),
         plain.replace("format ascii 1.0\n", "").replace("element face", "format ascii 1.0\nelement face"),
         plain.replace("element vertex 4", "element vertex 4 points"),
         plain.replace("int", "int64").replace("uchar", "ulong"),
-        plain.replace("int", "float").replace("uchar", "double"),
     ):
         assert sheet(tmp_path, header + ROWS + FACE) == {}
     assert sheet(tmp_path, plain.replace("comment", "written by") + ROWS + FACE) == {
         "unknown lines of the header left out": Repair(1, ":3")
+    }
+    assert sheet(tmp_path, plain.replace("\n", "\n \t")[:-2] + ROWS + FACE) == {
+        "blanks before lines of the header": Repair(8, ":2")
+    }
+    assert sheet(tmp_path, plain.replace("int", "float").replace("uchar", "double") + ROWS + FACE) == {
+        "lengths of lists in floats": Repair(1, ":9"),
+        "indices in floats": Repair(1, ":9"),
     }
 
 

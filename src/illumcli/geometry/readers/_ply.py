@@ -97,6 +97,8 @@ def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
     for number, line in enumerate(data[: end.start()].splitlines()[1:], start=2):
         words = decoded(line).split()
         place = f"{path}:{number}"
+        if line[:1].isspace() and words:
+            note(repairs, "blanks before lines of the header", f":{number}")
         match words:
             case ["comment", word, _, *_] if word.lower() == "texturefile":
                 textures.append((decoded(line).split(None, 2)[2].rstrip(), number))
@@ -114,6 +116,8 @@ def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
                     note(repairs, "properties named twice, renamed", f":{number}")
                     found = replace(found, name=_unused(found.name, known))
                 elements[-1].properties.append(found)
+                if found.count_type is not None and found.count_type.kind == "f":
+                    note(repairs, "lengths of lists in floats", f":{number}")
             case ["format" | "element" | "property", *_]:
                 said = f"'{decoded(line).strip():.60}'"
                 raise InputError(f"{place}: {said} is no line of a PLY header; export the mesh again")

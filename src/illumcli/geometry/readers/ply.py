@@ -146,6 +146,8 @@ def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints
         note(file.repairs, "lists of another name taken for the corners of faces", file.line(element, name))
     found = table[name]
     assert isinstance(found, Lists)
+    if any(each.name == name and each.type.kind == "f" for each in file.element(element).properties):
+        note(file.repairs, "indices in floats", file.line(element, name))
 
     def row(position: int) -> str:
         number = int(np.searchsorted(np.cumsum(found.counts), position, side="right"))

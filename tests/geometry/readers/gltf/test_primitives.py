@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.readers import read_mesh
-
-TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-FACES = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
 
 
 def triangles(mesh: Mesh) -> list[list[int]]:
@@ -32,12 +30,18 @@ def test_a_primitive_without_positions_is_skipped_and_counted(tmp_path: Path, sq
 
 def test_primitives_without_normals_are_flat(tmp_path: Path, Scene: Any) -> None:
     scene = Scene()
-    scene.primitive(FACES)["attributes"]["POSITION"] = scene.table(TETRAHEDRON)
-    smooth = scene.primitive(FACES, NORMAL=scene.table([[0, 0, 1]] * 4))
-    smooth["attributes"]["POSITION"] = scene.table(TETRAHEDRON)
+    gutter, faces = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0.1], [0.5, -1, 0.1]], [0, 1, 2, 1, 0, 3]
+    scene.primitive(faces)["attributes"]["POSITION"] = scene.table(gutter)
+    smooth = scene.primitive(faces, NORMAL=scene.table([[0, 0, 1]] * 4))
+    smooth["attributes"]["POSITION"] = scene.table(gutter)
     mesh = read_mesh(scene.write(tmp_path / "a.glb"))
     assert mesh.polygon_smoothing is not None
-    assert mesh.polygon_smoothing.tolist() == [0] * 4 + [-1] * 4
+    assert mesh.polygon_smoothing.tolist() == [0, 0, -1, -1]
+    found = corner_normals(mesh)
+    own = found.normals[found.index].reshape(-1, 3, 3)
+    y, z = np.array([0.1, 1]) / np.hypot(0.1, 1)
+    for corner in range(3):
+        np.testing.assert_allclose(own[:, corner], [[0, -y, z], [0, y, z], [0, 0, 1], [0, 0, 1]], atol=1e-7)
 
 
 def test_triangles_of_vertices_that_are_not_there_are_left_out(tmp_path: Path, Scene: Any) -> None:

@@ -63,13 +63,16 @@ def check_unique(names: Sequence[str]) -> None:
         Every name that several images would have, and which images, counted from 1.
     """
     images = defaultdict(list)
-    for number, name in enumerate(names, 1):
-        images[unicodedata.normalize("NFC", os.path.normpath(name)).casefold()].append(number)
+    normal = [unicodedata.normalize("NFC", os.path.normpath(name)) for name in names]
+    for number, name in enumerate(normal, 1):
+        images[name.casefold()].append(number)
     problems = []
     for same in images.values():
         if len(same) > 1:
             listed = ", ".join(map(str, same[:5])) + (", ..." if len(same) > 5 else "")
             way = "put a field that tells them apart into the pattern"
+            if len({normal[number - 1] for number in same}) == len(same):
+                way = "they differ in case alone, which some file systems ignore; rename one of them"
             problems.append(f"{names[same[0] - 1]}: the name of {len(same)} images ({listed}); {way}")
     if problems:
         raise InputError(problems)

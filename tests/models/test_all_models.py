@@ -169,6 +169,35 @@ def test_lobes_are_finite_not_negative_and_keep_their_precision(Model, dtype, da
         assert values.min() >= 0, name
 
 
+@every_model
+@settings(max_examples=20, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_without_grain_turning_about_the_normal_changes_nothing(Model, data, seed):
+    model = data.draw(parameters(Model, gentle=True))
+    given = directions(seed, 20)
+    turned = {**given, "t": cross(given["n"], given["t"])}
+    if not model.has_grain():
+        np.testing.assert_allclose(response(model, turned), response(model, given), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "grain"),
+    [
+        ({"model": "ward"}, True),
+        ({"model": "ward", "alpha_x": 0.3}, False),
+        ({"model": "ward", "alpha_x": {"vertex": "a"}}, True),
+        ({"model": "lafortune", "cx": -1.0, "cy": -1.0}, False),
+        ({"model": "lafortune", "cx": -1.0, "cy": -0.5}, True),
+        ({"model": "ashikhmin_shirley"}, True),
+        ({"model": "ashikhmin_shirley", "exponent_v": 100}, False),
+        ({"model": "kajiya_kay"}, True),
+        ({"model": "phong"}, False),
+    ],
+)
+def test_parameters_say_whether_there_is_a_grain(keys, grain):
+    assert member("illumcli.models", keys["model"]).validated(keys).has_grain() is grain
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(
     ("keys", "expected"),

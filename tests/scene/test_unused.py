@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
+from illumcli.jobs.repairs import repairs
 from illumcli.plan.execute import Tally, bands, run_once
 from illumcli.plan.plan import plan
 from illumcli.scene.load import load, unused_lines
@@ -140,6 +142,31 @@ def test_an_override_of_materials_that_a_mesh_selects_is_told(scene):
         scene(["objects.o.material=null", "objects.o.mesh.materials=true", "objects.o.override.diffuse=0.1"])
     )
     assert "replaces all that the mesh file selects" in line
+
+
+@pytest.mark.parametrize(
+    ("overrides", "expected"),
+    [
+        (["objects.o.mesh.normals.crease=20"], {}),  # the file has no normals
+        (["objects.o.mesh={file: n.obj, normals: {crease: 20}}"], {NORMALS_OF_FILE: "n.obj"}),
+        (["objects.o.mesh={file: n.obj, normals: {crease: 20, source: computed}}"], {}),
+        (["objects.o.mesh={file: n.obj}"], {}),
+        (["objects.o.mesh={file: n.obj}", "objects.o.material={model: ward}"], {NO_GRAIN: "n.obj"}),
+        (["objects.o.mesh={shape: box}", "objects.o.material={model: ward}"], {}),  # it has uv
+        (
+            ["objects.o.mesh={file: n.obj}", "objects.o.material={model: ward}", "objects.o.grain=[1,0,0]"],
+            {},
+        ),
+        (["objects.o.mesh={file: n.obj}", "objects.o.material={model: ward, alpha_x: 0.3}"], {}),
+    ],
+)
+def test_what_only_the_mesh_can_tell_is_told_too(scene, overrides, expected):
+    loaded = scene(overrides)
+    (loaded.folder / "n.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
+    found = repairs(run_once(plan(loaded.scene, loaded), Tally()))
+    assert {
+        what: each.first for what, each in found.items() if what in (NORMALS_OF_FILE, NO_GRAIN)
+    } == expected
 
 
 def test_shipped_scenes_say_nothing_without_effect(root):

@@ -17,7 +17,9 @@ HARMLESS = frozenset(
 )
 """Classes that change nothing that is seen: in the report, told with -v alone, refused under --strict."""
 
-APPROXIMATED = frozenset({"metallic-roughness materials, drawn as cook_torrance"})
+NORMALS_OF_FILE = "objects whose normals' crease or weights are not used: the file has normals, see source"
+NO_GRAIN = "objects whose material has a grain that nothing directs: give the object a grain, or its mesh uv"
+APPROXIMATED = frozenset({"metallic-roughness materials, drawn as cook_torrance", NORMALS_OF_FILE, NO_GRAIN})
 """Classes that no file is to blame for: told, and not refused under --strict."""
 
 

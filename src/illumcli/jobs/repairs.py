@@ -40,6 +40,7 @@ def repairs(shared: Mapping[str, Any]) -> Repairs:
     return {
         what: each
         for name, made in shared.items()
-        if name in ("repairs", "materials", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
+        if name
+        in ("repairs", "undirected", "materials", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
         for what, each in made.repairs.items()
     }

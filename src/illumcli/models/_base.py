@@ -60,6 +60,10 @@ class IlluminationModel(Description):
         """k_a: the field `ambient`, or what the model reflects diffusely."""
         return self.diffuse_color() if self.ambient is None else self.ambient
 
+    def has_grain(self) -> bool:
+        """Does turning the surface about its normal change anything, with these parameters?"""
+        return not self.isotropic
+
     def diffuse_color(self) -> Any:
         """The diffuse albedo; a model whose parameter is not called `diffuse` says what it is."""
         return getattr(self, "diffuse", (0.0, 0.0, 0.0))

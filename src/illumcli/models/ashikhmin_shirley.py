@@ -43,6 +43,10 @@ class AshikhminShirley(IlluminationModel):
     isotropic: ClassVar[bool] = False
     physical: ClassVar[bool] = True
 
+    def has_grain(self) -> bool:
+        """Unless the exponents are equal along and across it."""
+        return self.exponent_u != self.exponent_v
+
     def diffuse_lobe(self, n_l: Lanes, n_v: Lanes) -> Vectors:
         """(N, 3) n_l * diffuse."""
         Rd, Rs = channels(n_l, self.diffuse), channels(n_l, self.specular)

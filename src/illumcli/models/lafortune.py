@@ -47,6 +47,10 @@ class Lafortune(IlluminationModel):
     isotropic: ClassVar[bool] = False
     physical: ClassVar[bool] = True
 
+    def has_grain(self) -> bool:
+        """Unless Cx and Cy are equal."""
+        return self.cx != self.cy
+
     def diffuse_lobe(self, n_l: Lanes) -> Vectors:
         """(N, 3) n_l * rho_d / pi."""
         return tint(self.diffuse, n_l / np.pi)

@@ -53,6 +53,10 @@ class Ward(IlluminationModel):
     isotropic: ClassVar[bool] = False
     physical: ClassVar[bool] = True
 
+    def has_grain(self) -> bool:
+        """Unless the slopes are equal along and across it."""
+        return self.alpha_x != self.alpha_y
+
     def diffuse_lobe(self, n_l: Lanes) -> Vectors:
         """(N, 3) n_l * rho_d / pi."""
         return tint(self.diffuse, n_l / np.pi)

@@ -37,7 +37,17 @@ about half as fast as measured."""
 MEMORY = 1 << 30
 """Bytes that the variants of a sweep keep in memory for each other."""
 
-ONCE = ("mesh", "standing", "camera", "implied_widths", "world", "repairs", "corner_normals", "numbering")
+ONCE = (
+    "mesh",
+    "standing",
+    "camera",
+    "implied_widths",
+    "world",
+    "repairs",
+    "undirected",
+    "corner_normals",
+    "numbering",
+)
 """Buffers of the whole scene that are kept, by name or by its part before the colon.
 
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.

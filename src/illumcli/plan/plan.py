@@ -209,7 +209,8 @@ def _steps(
     if any(view.is_adaptive for view in all_views):
         filled |= dict.fromkeys(SHAPE)
         coverage = ["alpha"]
-    steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", "repairs"], GIVEN)
+    told = [name for name in ("repairs", "undirected") if name in book]
+    steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", *told], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []
     for step in steps:

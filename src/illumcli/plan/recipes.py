@@ -19,7 +19,7 @@ from illumcli.plan import stages
 from illumcli.plan.doubled import error_recipes
 from illumcli.records import Value
 from illumcli.scene.load import resolve
-from illumcli.scene.spec import MeshFile, Obscurance, Scene, default_material
+from illumcli.scene.spec import MeshFile, Normals, Object, Obscurance, Scene, default_material
 from illumcli.shading.materials import DEFAULT, Choice, Token
 from illumcli.shading.rates import AT_SAMPLES
 from illumcli.shading.terms import words
@@ -319,6 +319,10 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         source.file if isinstance(source, MeshFile) else f"object {name}"
         for source, name in zip(sources, scene.object_names(), strict=True)
     )
+    computes = tuple(
+        own != "constant" and _computes_normals(source) for own, source in zip(rate, sources, strict=True)
+    )
+    wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
     left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
         *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
@@ -332,11 +336,26 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
         Recipe.of(partial(stages.world, by_file), "world"),
         Recipe.of(stages.frame),
-        Recipe.of(partial(stages.repairs, called), "repairs"),
+        Recipe.of(partial(stages.repairs, called, computes), "repairs"),
+        *([Recipe.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
         Recipe.of(stages.tracer_over, "tracer"),
         Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
         Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),
     ]
+
+
+def _computes_normals(source: Any) -> bool:
+    """Does the description of a mesh file say how normals are made, but not that all are?"""
+    if not isinstance(source, MeshFile) or source.normals.source != "file":
+        return False
+    own, usual = source.normals, Normals()
+    return (own.crease, own.weights) != (usual.crease, usual.weights)
+
+
+def _wants_direction(scene: Scene, thing: Object) -> bool:
+    """Has an object's own material a grain that only uv can direct?"""
+    model = scene.material_of(thing)
+    return thing.grain is None and model is not None and model.has_grain()
 
 
 def _source(scene: Scene, mesh: Any) -> Any:

@@ -20,7 +20,7 @@ from illumcli.geometry.assemble import CornerVectors, PolygonCentres, Standing, 
 from illumcli.geometry.faults import faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import PlanarPolygons
-from illumcli.geometry.repairs import Repair, Repairs, joined, located, note
+from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE, Repair, Repairs, joined, located, note
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
@@ -143,16 +143,32 @@ class MeshRepairs(Value):
     repairs: Repairs
 
 
-def repairs(names: tuple[str, ...], meshes: tuple[Mesh, ...]) -> MeshRepairs:
+def repairs(names: tuple[str, ...], computes: tuple[bool, ...], meshes: tuple[Mesh, ...]) -> MeshRepairs:
     """Of all meshes together, each counted once.
 
     Parameters
     ----------
     names : tuple of str
         What each object's mesh is called: its file as the scene names it, or the object.
+    computes : tuple of bool
+        Does the scene say how the object's normals are made where its file has none?
     """
     each = {id(mesh): located(mesh.repairs, name) for name, mesh in zip(names, meshes, strict=True)}
-    return MeshRepairs(joined(each.values()))
+    found = dict(joined(each.values()))
+    for name, says_how, mesh in zip(names, computes, meshes, strict=True):
+        index = mesh.corner_normals
+        if says_how and index is not None and len(index) and (index >= 0).all():
+            note(found, NORMALS_OF_FILE, name)
+    return MeshRepairs(found)
+
+
+def undirected(names: tuple[str, ...], wants: tuple[bool, ...], meshes: tuple[Mesh, ...]) -> MeshRepairs:
+    """Objects whose material has a grain that neither the scene nor uv direct; `wants` says which need uv."""
+    found: dict[str, Repair] = {}
+    for name, wants_uv, mesh in zip(names, wants, meshes, strict=True):
+        if wants_uv and mesh.uvs is None and mesh.polygon_count:
+            note(found, NO_GRAIN, name)
+    return MeshRepairs(found)
 
 
 def tracer_over(world: World) -> Tracer:

@@ -13,8 +13,8 @@ from illumcli.files.store import Store, default_folder
 from illumcli.jobs import plan as plan_job
 from illumcli.jobs.render import run
 from illumcli.jobs.sampled import subject
+from illumcli.jobs.sweep import Settings, variants_of
 from illumcli.jobs.sweep import run as sweep
-from illumcli.jobs.sweep import variants_of
 from illumcli.plan.artifacts import Artifacts
 from illumcli.plan.execute import Tally
 from illumcli.plan.framing import framed
@@ -95,7 +95,7 @@ def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
 
 def test_a_sweep_places_its_cameras(scene, tmp_path):
     variants = variants_of(["camera.fov=10,50"])
-    done = sweep(scene, variants, "{camera.fov}.exr", cache=False)
+    done = sweep(scene, variants, Settings(pattern="{camera.fov}.exr", cache=False))
     assert [outcome.error for outcome in done.outcomes] == [None, None]
     for name in ("10", "50"):
         rows, _ = rows_and_columns(tmp_path / f"{name}.exr")

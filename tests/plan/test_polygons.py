@@ -95,6 +95,17 @@ def test_faces_against_their_normals_are_lit_as_those_about_them(tmp_path, rate)
     assert before["beauty"].max() > 0.5
 
 
+def test_a_planar_polygon_has_one_geometric_normal(tmp_path):
+    """A square folded a little, as the digits of a file may leave it."""
+    square = np.array([[-1, 0, 1], [1, 0.002, 1], [1, 0, -1], [-1, 0, -1]])
+    text = ply(square, np.full((4, 3), 0.5), np.tile([0.1, 1, 0], (4, 1)), [[0, 1, 2, 3]])
+    ng = picture(tmp_path, text, "phong", "geometric_normal")["geometric_normal"]
+    seen = np.linalg.norm(ng, axis=-1) > 0.99
+    a, b = square[2] - square[0], square[3] - square[1]
+    wanted = np.cross(a, b) / np.linalg.norm(np.cross(a, b))
+    np.testing.assert_allclose(ng[seen], np.tile(wanted, (np.count_nonzero(seen), 1)), atol=1e-6)
+
+
 def test_the_winding_alone_says_where_computed_normals_point(tmp_path):
     vertices, colors, normals, faces = flat_shapes()
     text = ply(vertices, colors, normals, [face[::-1] for face in faces])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, moved
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
@@ -48,6 +48,7 @@ class PlanarPolygons(Record):
     u: NDArray[np.float32]  # (K,) of corner 1
     v: NDArray[np.float32]  # (K,) of corner 2
     vertex: NDArray[np.int32]  # (K,) vertex number of each corner
+    normal: NDArray[np.float32]  # (Q, 3) unit Newell normal, on the side from which the corners run left
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -113,7 +114,8 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
         2 ** np.ceil(np.log2(size)).astype(np.int64),
     )
     triangle, u, v = _places(world, row, first, starts, flat)
-    return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices)
+    normal = columns(normal[is_planar], F)
+    return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
 
 
 def _candidates(

@@ -219,7 +219,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.depth),
         Recipe.of(stages.world_position),
         Recipe.of(stages.normal),
-        Recipe.of(stages.geometric_normal),
+        Recipe.of(stages.geometric_normal, planar_polygons="planar_polygons"),
         Recipe.of(stages.uv),
         Recipe.of(stages.object_id),
         Recipe.of(stages.material_id),

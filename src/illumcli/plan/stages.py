@@ -782,9 +782,10 @@ def normal(points: Points) -> Vectors:
     return surface.unit(points.spread(points.n))
 
 
-def geometric_normal(facets: Facets) -> Vectors:
-    """(M, 3) unit facet normal on the side the eye sees."""
-    return facets.ng
+def geometric_normal(hits: Hits, facets: Facets, planar_polygons: PlanarPolygons | None = None) -> Vectors:
+    """(M, 3) unit normal of the polygon on the side the eye sees: Newell's of a planar one, else the
+    triangle's."""
+    return surface.polygon_facing(hits.triangle, facets, planar_polygons)
 
 
 def uv(world: World, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:

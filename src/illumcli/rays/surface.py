@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.assemble import CornerVectors, World, cofactors
+from illumcli.geometry.planar import PlanarPolygons
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
 from illumcli.rays.offsets import effective_edge
 from illumcli.rays.tracer import Closest
@@ -72,6 +73,21 @@ def corner_rows(world: World, triangle: Ids, table: CornerVectors) -> tuple[Ids,
     """Rows of `table` at the three corners of each hit triangle."""
     a, b, c = (table.index.take(world.corners[:, k].take(triangle)) for k in range(3))
     return a, b, c
+
+
+def polygon_facing(triangle: Ids, facet: Facets, planar: PlanarPolygons | None) -> Vectors:
+    """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
+
+    Of a planar polygon Newell's, of others the triangle's. Rays keep to the triangle's, which they leave.
+    """
+    row = np.zeros(0, np.int32) if planar is None else planar.row.take(triangle)
+    own = np.flatnonzero(row >= 0)
+    if planar is None or not own.size:
+        return facet.ng
+    normal, ng = rows(planar.normal, row.take(own)), rows(facet.ng, own)
+    out = facet.ng.copy(order="F")
+    out[own] = facing(normal, dot(normal, ng) < 0)
+    return out
 
 
 def interpolated(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:

@@ -343,7 +343,7 @@ class Outputs(Description):
     emit. `lights`: the light of every lamp by itself, a layer each. `shadows`: 1 where a lamp reaches, 0 in
     its shadow, a layer each. `obscurance`: w, 1 where open. `alpha`: the share of the pixel that is covered.
     `depth`: distance from the eye's plane [scene units]. `position`: of the surface [scene units]. `normal`:
-    the one that is shaded with. `geometric_normal`: the triangle's own. `uv`: texture coordinates.
+    the one that is shaded with. `geometric_normal`: the polygon's own. `uv`: texture coordinates.
     `object_id`: number of the object, from 1. `material_id`: number of the material, from 1. `triangle_id`:
     number of the triangle, from 1. `error`: one standard error of the pixel's luminance."""
     files: Annotated[tuple[str, ...], Many(least=1)] = ("{scene}.{camera}.png",)

@@ -241,7 +241,7 @@ def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangl
         assert planar_polygons(place([mesh], [np.eye(4)])) is None
 
 
-def test_polygons_over_which_normals_do_not_vary_are_left_out_where_nothing_else_is_asked():
+def test_polygons_that_are_flat_by_their_normals_are_left_out_where_nothing_else_is_asked():
     world = place([polygon(L_SHAPE), polygon(ARROW)], [np.eye(4)] * 2)
     up, lean = [0, 0, 1], [0.6, 0, 0.8]
     index = np.zeros(10, np.int32)
@@ -249,6 +249,9 @@ def test_polygons_over_which_normals_do_not_vary_are_left_out_where_nothing_else
     found = planar_polygons(world, CornerVectors(columns([up, lean], F), index))
     assert (found.row >= 0).tolist() == [False] * 4 + [True] * 2
     assert planar_polygons(world, CornerVectors(columns([up, lean], F), index * 0)) is None
+    assert planar_polygons(world, CornerVectors(-columns([up, lean], F), index * 0)) is None
+    leaning = planar_polygons(world, CornerVectors(columns([up, lean], F), index * 0 + 1))
+    assert (leaning.row >= 0).all()
 
 
 def test_triangles_keep_their_bits_beside_polygons():

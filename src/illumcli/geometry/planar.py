@@ -29,6 +29,8 @@ MOST_CORNERS = 128
 """Work and memory of a hit go with the corners of its polygon; larger ones are interpolated by triangles."""
 ALIKE = 1e-6
 """By components: unit normals nearer than this are one, rounded."""
+NEARLY_OWN = 1e-3
+"""[rad] A normal nearer than this to its polygon's own is that one, in the digits of a file."""
 SAME_AREA = 1e-6
 """Triangles of a simple polygon cover it once: their areas add up to its own but for this share."""
 
@@ -67,10 +69,10 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
     Parameters
     ----------
     normals : CornerVectors, optional
-        Given where nothing but these is interpolated: polygons whose corners all have one normal, as those of
-        a box, are left out too.
+        Given where nothing but these is interpolated: polygons whose corners all have the polygon's own
+        normal, as those of a box, are left out too.
     """
-    first, size, points, vertices = _candidates(world, normals)
+    first, size, points, vertices = _candidates(world)
     if not len(first):
         return None
 
@@ -98,6 +100,8 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
     a, b, c = (flat[world.corners[mine, k] - first[own] + starts[own]] for k in range(3))
     covered = np.bincount(own, np.abs(_turn(b - a, c - a)) / 2, len(size))
     is_planar &= np.abs(covered - area) <= SAME_AREA * area
+    if normals is not None:
+        is_planar &= ~_is_flat(normals, first, size, normal)
     if not is_planar.any():
         return None
 
@@ -118,9 +122,7 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
     return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
 
 
-def _candidates(
-    world: World, normals: CornerVectors | None
-) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
+def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
     """First corner and size of polygons that may be planar; place, in radii, and vertex of their corners."""
     firsts, sizes, places, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for placed in world.placed:
@@ -129,10 +131,6 @@ def _candidates(
             continue
         size = np.diff(mesh.starts)
         which = np.flatnonzero((size > 3) & (size <= MOST_CORNERS))
-        if normals is not None:
-            which = which[_is_uneven(normals, mesh.starts + placed.first_corner)[which]]
-        if not which.size:
-            continue
         size, first = size[which].astype(np.int64), mesh.starts[which].astype(np.int64)
         corner = np.repeat(first - np.cumsum(size) + size, size) + np.arange(size.sum())
         vertex = mesh.corners[corner]
@@ -150,12 +148,17 @@ def _candidates(
     )
 
 
-def _is_uneven(normals: CornerVectors, starts: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(P,) True for polygons whose corners differ in their normals by more than rounding."""
-    n = rows(normals.values, normals.index[starts[0] : starts[-1]])
-    first = np.repeat(starts[:-1] - starts[0], np.diff(starts))
-    apart = np.abs(n - rows(n, first)).max(axis=1)
-    return np.asarray(np.maximum.reduceat(apart, starts[:-1] - starts[0]) > ALIKE)
+def _is_flat(
+    normals: CornerVectors, first: NDArray[Any], size: NDArray[Any], normal: Vectors
+) -> NDArray[np.bool_]:
+    """(Q,) True for polygons whose corners all have one normal, the polygon's own."""
+    starts = np.cumsum(size) - size
+    corner = np.repeat(first - starts, size) + np.arange(size.sum())
+    n = rows(normals.values, normals.index.take(corner))
+    own = rows(n, starts)
+    apart = np.abs(n - rows(own, np.repeat(np.arange(len(size)), size))).max(axis=1)
+    upright = np.abs(dot(own, normal)) > 1 - NEARLY_OWN**2 / 2
+    return np.asarray((np.maximum.reduceat(apart, starts) <= ALIKE) & upright)
 
 
 def _across(normal: Vectors) -> Vectors:

@@ -179,7 +179,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
     flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
-    # where normals are interpolated linearly, and nothing else for the points, most polygons need no weights
+    # polygons that are flat by their normals need no weights where these alone are interpolated
     of_normals = {"corner_weights": "normal_weights" if set(rate) == {"phong"} else "corner_weights"}
     whole = {"planar_polygons": "planar_polygons"} if smooth or any(is_baked(scene)) else {}
     at_samples = AT_SAMPLES.issuperset(rate)
@@ -190,13 +190,13 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.uvs),
         Recipe.of(stages.polygon_centres),
         Recipe.of(stages.planar_polygons),
-        Recipe.of(stages.planar_polygons, "uneven_polygons", normals="corner_normals"),
+        Recipe.of(stages.planar_polygons, "curved_polygons", normals="corner_normals"),
         Recipe.of(partial(stages.samples, scene.seed), "samples"),
         Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
         Recipe.of(stages.hits),
         Recipe.of(stages.facets),
         Recipe.of(stages.corner_weights, **whole),
-        Recipe.of(stages.corner_weights, "normal_weights", planar_polygons="uneven_polygons"),
+        Recipe.of(stages.corner_weights, "normal_weights", planar_polygons="curved_polygons"),
         Recipe.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
         Recipe.of(stages.point_weights),
         Recipe.of(stages.material),
@@ -204,7 +204,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.uv_tangents),
         Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
         Recipe.of(stages.ray_origins),
-        *_terminator(smooth),
+        *_terminator(smooth, of_normals),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         Recipe.of(
             partial(stages.obscurance_normals, rate),
@@ -429,11 +429,11 @@ def _varying(scene: Scene, purpose: str) -> dict[str, str]:
     return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
 
 
-def _terminator(smooth: Mapping[str, str]) -> list[Recipe]:
+def _terminator(smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Recipe]:
     """The surface that normals imply, from which shadow rays start; none where every object is flat."""
     if not smooth:
         return []
-    return [Recipe.of(stages.smooth_parts, **smooth), Recipe.of(stages.smooth_surface, **smooth)]
+    return [Recipe.of(stages.smooth_parts, **smooth), Recipe.of(stages.smooth_surface, **smooth, **weights)]
 
 
 def _light(

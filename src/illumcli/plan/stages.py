@@ -256,8 +256,8 @@ def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
 
 
 def planar_polygons(world: World, normals: CornerVectors | None = None) -> PlanarPolygons | None:
-    """The planar polygons of more than three corners, where `normals` are given those over which these vary;
-    None where there are none."""
+    """The planar polygons of more than three corners, where `normals` are given those that are not flat by
+    them; None where there are none."""
     return planar.planar_polygons(world, normals)
 
 

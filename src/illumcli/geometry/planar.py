@@ -111,7 +111,7 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
     size = size[is_planar]
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
     row = np.append(number, -1)[triangle_row].astype(np.int32)
-    first, flat, vertices = first[is_planar].astype(np.int32), flat[kept], vertices[kept]
+    first, flat, vertices = first[is_planar].astype(np.int32), columns(flat[kept]), vertices[kept]
     padded = np.where(
         (size == 4) & (_smallest_corner(flat, starts, size) > CLEARLY_CONVEX * area[is_planar]),
         0,

@@ -22,6 +22,7 @@ from illumcli.files.store import Store
 from illumcli.frame import Frame
 from illumcli.geometry.assemble import CornerVectors, Placed, Standing, World
 from illumcli.geometry.mesh import Mesh, Substitute
+from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import Repair
 from illumcli.plan.keys import Keys, code
 from illumcli.plan.stages import MeshRepairs, Tile
@@ -40,6 +41,8 @@ MEMORY = 1 << 30
 ONCE = (
     "mesh",
     "standing",
+    "planar_polygons",
+    "curved_polygons",
     "camera",
     "implied_widths",
     "world",
@@ -59,6 +62,7 @@ CLASSES = {
     for cls in (
         Mesh,
         Standing,
+        PlanarPolygons,
         World,
         Placed,
         Frame,

@@ -286,8 +286,9 @@ def corner_weights(
     row = planar.row.take(triangle)
     alone = np.flatnonzero(row < 0).astype(np.int32)
     groups: list[Corners] = [TriangleCorners(alone, triangle.take(alone), u.take(alone), v.take(alone))]
-    padded = np.append(planar.padded, -1)[row]
-    for size in np.unique(planar.padded):
+    padded = planar.padded.take(row)
+    padded[alone] = -1
+    for size in np.flatnonzero(np.bincount(planar.padded)):
         lane = np.flatnonzero(padded == size).astype(np.int32)
         polygon = row.take(lane)
         start = planar.starts.take(polygon)
@@ -296,7 +297,7 @@ def corner_weights(
         if size:
             weights: NDArray[Any] = _mean_value(planar.flat, start, last, int(size), x, y)
         else:
-            weights = _bilinear([planar.flat.take(start + k, axis=0) for k in range(4)], x, y)
+            weights = _bilinear([rows(planar.flat, start + k) for k in range(4)], x, y)
         outside = np.any(weights < BELOW, axis=0)
         groups.append(PolygonCorners(lane, planar, polygon, last, weights, outside))
     some = tuple(group for group in groups if group.lane is not None and group.lane.size)

@@ -284,6 +284,24 @@ def test_vertices_that_no_face_uses_may_be_anything(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("wrong", ["3.1+e2 0 0", "0 1", "", "1,5 0 0"])
+def test_lines_of_vertices_that_no_face_uses_may_be_wrong(tmp_path: Path, wrong: str) -> None:
+    mesh = mesh_of(tmp_path, f"v {wrong}\n" + SQUARE + "f 2 3 4\n")
+    assert mesh.repairs["unused vertices that are not finite, made 0"] == Repair(1, ":1")
+    with pytest.raises(InputError, match=r"a\.obj:1: .* no number|a\.obj:1: has \d numbers, not 3"):
+        mesh_of(tmp_path, f"v {wrong}\n" + SQUARE + "f 1 3 4\n")
+
+
+@pytest.mark.parametrize("order", ["utf-16-le", "utf-16-be"])
+def test_a_text_may_be_in_utf_16(tmp_path: Path, order: str) -> None:
+    mesh = mesh_of(tmp_path, ("\ufeff" + SQUARE + "usemtl grün\r\nf 1 2 3 4\nl 1 2").encode(order))
+    assert mesh.material_names == ("grün",)
+    assert mesh.repairs == {
+        "texts in UTF-16": Repair(1, ":1"),
+        "lines left out": Repair(1, ":7"),
+    }
+
+
 def test_shapes_that_are_no_polygons_are_counted(tmp_path: Path) -> None:
     mesh = mesh_of(tmp_path, SQUARE + "l 1 2\np 1\np 2\ncurv 0 1 1 2\nf 1 2 3\n")
     assert counted(mesh) == {"lines left out": 1, "points left out": 2, "curves left out": 1}
@@ -314,8 +332,8 @@ def test_shapes_that_are_no_polygons_are_counted(tmp_path: Path) -> None:
         (SQUARE + "f 1 2 a\n", "a.obj:5: 'a' is no whole number"),
         ("v 0 0 0\nv 1,5 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2: '1,5' is no number; write a decimal point"),
         ("v 0 0 0\nv 1_0 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:2: '1_0' is no number"),
-        ("v 0 0 0\nv 1 0\nv 0 1 0 5\nf 1 2 3\n", "a.obj:2: has 2 numbers; write v x y z"),
-        ("v 0 0 0\nv\nv 0 1 0\nf 1 2 3\n", "a.obj:2: has 0 numbers"),
+        ("v 0 0 0\nv 1 0\nv 0 1 0 5\nf 1 2 3\n", "a.obj:2: has 2 numbers, not 3"),
+        ("v 0 0 0\nv\nv 0 1 0\nf 1 2 3\n", "a.obj:2: has 0 numbers, not 3"),
         (SQUARE + "v nan 0 0\nv 0 0 inf\nf 1 5 6\n", "a.obj: 2 of 6 vertices .* the first is number 5"),
         (SQUARE + "v 0 0 2e18\nf 1 2 5\n", "a.obj: 1 of 5 vertices .* beyond 1e"),
         (SQUARE + "v 0 0 1e999\nf 1 2 -1\n", "a.obj: 1 of 5 vertices"),

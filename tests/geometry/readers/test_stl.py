@@ -82,7 +82,7 @@ def test_text_may_be_in_capitals_and_hold_several_solids(tmp_path: Path) -> None
             text().replace("vertex 1.0 0.0", "vertex 1,0 0.0", 1),
             "a.stl:5: '1,0' is no number; write a decimal",
         ),
-        (text().replace("vertex 1.0 0.0", "vertex 1.0", 1), "a.stl:5: has 2 numbers; write vertex x y z"),
+        (text().replace("vertex 1.0 0.0", "vertex 1.0", 1), "a.stl:5: has 2 numbers, not 3"),
         (text().replace("vertex 1.0", "vertex nan", 1), "1 of 6 vertices .* the first is number 2"),
         (binary(np.where(TRIANGLES == 3, np.inf, TRIANGLES)), "1 of 6 vertices .* the first is number 5"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator
 from dataclasses import field
@@ -21,7 +22,7 @@ PIECE = 1 << 22  # bytes cut into words at a time: Python's words need ten times
 PADDING = 8  # bytes that may be read behind the start of the last line
 NEWLINE = b"\n"
 
-BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+BYTE_ORDER_MARK = codecs.BOM_UTF8
 
 _LONE_RETURN = re.compile(rb"\r(?!\n)")
 _CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
@@ -46,6 +47,9 @@ class Text(Value):
     def of(cls, path: Path, raw: bytes, *, comments: bool = False, continued: bool = False) -> Text:
         """The text `raw`; comments begin with #, a backslash at its end continues a line."""
         repairs: dict[str, Repair] = {}
+        if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            note(repairs, "texts in UTF-16", ":1")
+            raw = raw.decode("utf-16", "replace").encode()
         if raw.startswith(BYTE_ORDER_MARK):
             note(repairs, "byte order marks left out", ":1")
             raw = b"   " + raw[3:]
@@ -214,6 +218,17 @@ class Block(Value):
             (i, word) for i, words in enumerate(lines) for word in words if not _is_number(word, int)
         )
         return self._bad_word(i, bad, "whole number")
+
+    def refuse_words(self, line: int, needed: int) -> None:
+        """Refuse a line of fewer than `needed` numbers by the first of its words that is none."""
+        edges = [*self.starts.tolist(), len(self.data)]
+        words = self.data[edges[line] : edges[line + 1]].tobytes().split()[:needed]
+        for word in words:
+            if not _is_number(word, float):
+                raise self._bad_word(line, word, "number")
+        if len(words) < needed:
+            fact = f"has {len(words)} numbers, not {needed}"
+            raise InputError(f"{self.place(line)}: {fact}; export the mesh again")
 
     def _bad_word(self, line: int, word: bytes, kind: str) -> InputError:
         way = "write a decimal point, not a comma" if b"," in word else "export the mesh again"

@@ -64,7 +64,8 @@ def read(path: Path) -> Mesh:
     known = sum((words == keyword(word) for word in lines), np.zeros(len(words), bool))
     rest = _Statements.of(text, np.flatnonzero(~known))
     repairs = {**text.repairs, **rest.repairs}
-    vertices, attributes = _vertices(text.block(lines[b"v"], keyword=1), repairs)
+    positions = text.block(lines[b"v"], keyword=1)
+    vertices, attributes = _vertices(positions, repairs)
     uvs = _uvs(text.block(lines[b"vt"], keyword=2))
     normals = _normals(text.block(lines[b"vn"], keyword=2))
     faces = text.block(lines[b"f"], keyword=1)
@@ -74,6 +75,9 @@ def read(path: Path) -> Mesh:
         return _resolved(faces, references[slot], counts, _Rows(lines[of], size, name), repairs)
 
     corners = rows(0, b"v", len(vertices), "vertices")
+    unknown: NDArray[np.bool_] = np.any(np.isnan(vertices), axis=1)
+    for vertex in corners[unknown[corners]][:1].tolist():
+        positions.refuse_words(vertex, 3)
     corner_uvs = rows(1, b"vt", len(uvs), "texture coordinates") if 1 in references else None
     corner_normals = rows(2, b"vn", len(normals), "normals") if 2 in references else None
     library = _libraries(path, text, rest.libraries)
@@ -140,12 +144,9 @@ class _Statements(Value):
 def _vertices(
     block: Block, repairs: dict[str, Repair]
 ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float32]]]:
-    """(V, 3) positions, and `color` (V, 3), linear, where any vertex has one; `alpha` (V,) where any has."""
-    counts = block.counts
-    if (short := counts < 3).any():
-        bad = int(np.argmax(short))
-        raise InputError(f"{block.place(bad)}: has {counts[bad]} numbers; write v x y z, or v x y z r g b")
-    values = _table(block, 7, needed=3)
+    """(V, 3) positions, NaN where a line has none; `color` (V, 3), linear, and `alpha` (V,), where any vertex
+    has them."""
+    counts, values = block.counts, _table(block, 7)
     _note_lines(repairs, "numbers behind a vertex left out", (counts == 5) | (counts > 7), block)
     _note_lines(repairs, "weights of vertices left out", (counts == 4) & (values[:, 3] != 1), block)
     colored = (counts == 6) | (counts == 7)
@@ -186,20 +187,19 @@ def _note_lines(repairs: dict[str, Repair], what: str, wrong: NDArray[np.bool_],
 
 def _uvs(block: Block) -> NDArray[np.float64]:
     """(U, 2); a missing v is 0, a third coordinate is left out; NaN where there is no number."""
-    values = _table(block, 2, needed=0)
+    values = _table(block, 2)
     values[block.counts == 1, 1] = 0
     return values
 
 
 def _normals(block: Block) -> NDArray[np.float64]:
     """(K, 3), NaN where a number is missing."""
-    return _table(block, 3, needed=0)
+    return _table(block, 3)
 
 
-def _table(block: Block, size: int, needed: int) -> NDArray[np.float64]:
-    """(B, `size`) the first numbers of each line; NaN where it has fewer, or a word that is no number behind
-    the first `needed`."""
-    values, counts = block.floats(needed), block.counts
+def _table(block: Block, size: int) -> NDArray[np.float64]:
+    """(B, `size`) the first numbers of each line; NaN where it has fewer, or a word that is no number."""
+    values, counts = block.floats(needed=0), block.counts
     width = int(counts[0]) if len(counts) else size
     if (counts == width).all() and width >= size:
         return np.ascontiguousarray(values.reshape(-1, width)[:, :size])

@@ -108,8 +108,7 @@ def _text(path: Path, data: bytes) -> Mesh:
     # the numbers of each vertex
     block = text.block(lines[b"vertex"], keyword=len(b"vertex"))
     if (short := block.counts < 3).any():
-        bad = int(np.argmax(short))
-        raise InputError(f"{block.place(bad)}: has {block.counts[bad]} numbers; write vertex x y z")
+        block.refuse_words(int(np.argmax(short)), 3)
     values = block.floats(needed=3)
     if (longer := block.counts > 3).any():
         first = f":{text.number(int(block.lines[np.argmax(longer)]))}"

@@ -172,3 +172,36 @@ def test_what_only_the_mesh_can_tell_is_told_too(scene, overrides, expected):
 def test_shipped_scenes_say_nothing_without_effect(root):
     for path in sorted((root / "scenes").glob("*.yaml")):
         assert lines(load(path)) == [], path.name
+
+
+# what a picture lacks
+
+EMPTY = "version: 1\nfilm: {width: 8, height: 8, samples: 1}\n"
+NO_OBJECT = "objects: the scene has none, its pictures are empty; add objects: [{mesh: FILE}]"
+NO_LIGHT = (
+    "lights: the scene has none and no ambient light, its pictures are black; add lights, or ambient: 0.5"
+)
+BALL = EMPTY + "objects: [{mesh: {shape: sphere}}]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (EMPTY, ["s.yaml:1:1: " + NO_OBJECT]),
+        (EMPTY + "objects: []\n", ["s.yaml:3:1: " + NO_OBJECT]),
+        (BALL, ["s.yaml:1:1: " + NO_LIGHT]),
+        (BALL + "lights: []\n", ["s.yaml:4:1: " + NO_LIGHT]),
+        (BALL + "ambient: 0.1\n", []),
+        (BALL + "lights: [{light: point, position: [0, 9, 0], intensity: 0}]\n", []),
+        (BALL + "outputs: {layers: [depth]}\n", []),
+        (
+            BALL.replace("}]", "}, material: {model: lambert, emission: 1}}]").replace("sphere}}", "sphere}"),
+            [],
+        ),
+    ],
+)
+def test_a_scene_without_objects_or_lights_says_so(illum, tmp_path, text, said):
+    (tmp_path / "s.yaml").write_text(text)
+    for words in ("render s.yaml --force", "sweep s.yaml -D seed=1,2"):
+        done = illum(*words.split())
+        assert (done.returncode, done.stderr.splitlines()) == (0, said), words

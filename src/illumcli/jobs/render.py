@@ -23,6 +23,7 @@ from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.store import Store, default_folder, default_limit
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
+from illumcli.geometry.assemble import Standing
 from illumcli.geometry.repairs import Repairs
 from illumcli.jobs.limits import refuse_disk, refuse_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs, repairs_data
@@ -32,11 +33,12 @@ from illumcli.plan.execute import Planes, Tally, bands, run_once
 from illumcli.plan.framing import framed
 from illumcli.plan.keys import digest
 from illumcli.plan.plan import Plan, content_key, plan, read_by_others, reusing
+from illumcli.plan.proportions import disproportion
 from illumcli.plan.recipes import View
 from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
-from illumcli.scene.load import Loaded, load, unused_lines
+from illumcli.scene.load import Loaded, lacking_lines, load, told, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)
@@ -219,9 +221,11 @@ def prepared(
 
 
 def unused_keys(work: Work, pattern: str | None = None) -> list[str]:
-    """What the scene says and what changes nothing, a line each."""
+    """What the scene says and what changes nothing, and what its pictures lack, a line each."""
     files = () if pattern else work.scene.outputs.files
-    return unused_lines(work.loaded, work.scene, [layer.name for layer in work.plan.layers], files)
+    layers = [layer.name for layer in work.plan.layers]
+    lacking = lacking_lines(work.loaded, work.scene, layers)
+    return lacking + unused_lines(work.loaded, work.scene, layers, files)
 
 
 def rendered(
@@ -268,6 +272,7 @@ def rendered(
             report.skipped = dict(narrowed.skipped)
             shared = run_once(narrowed, tally, artifacts, threads)
             report.repairs = {**report.repairs, **repairs(shared)}
+            report.warnings = proportions(work, steps, shared.get("standing"))
             if strict:
                 refuse_repairs(report.scene, report.repairs)
             sums = ErrorSums()
@@ -283,6 +288,22 @@ def rendered(
         refresh(Path(path))
     report.total_seconds = time.perf_counter() - start
     return report
+
+
+def proportions(work: Work, steps: Plan, standing: Standing | None) -> list[str]:
+    """A line where rays that leave surfaces start visibly far off those around some object."""
+    if standing is None or all(step.makes != "ray_origins" for step in steps.tile):
+        return []
+    found = disproportion(standing, steps.views)
+    if found is None:
+        return []
+    small, ratio = work.scene.object_names()[found.small], float(f"{found.ratio:.1g}")
+    fact = (
+        f"reaches {ratio:,.0f} times as far as {small} is large: around {small}, rays start up to "
+        f"{found.offset:.1g} off surfaces, {100 * found.share:,.1f} % of its radius, and shadows lose touch; "
+        "make it smaller, or bring it nearer"
+    )
+    return [told(work.loaded, ("objects", found.large), fact)]
 
 
 def refuse_too_large(work: Work, due: Sequence[Target]) -> None:

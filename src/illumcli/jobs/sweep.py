@@ -134,6 +134,8 @@ def run(
         memory.retire()
     works = [outcome.work for outcome in sweep.outcomes if outcome.work]
     sweep.warnings += _in_all([unused_keys(work, settings.pattern) for work in works])
+    told = [line for outcome in sweep.outcomes if outcome.report for line in outcome.report.warnings]
+    sweep.warnings += dict.fromkeys(told)
     if store is not None:
         store.finish()
         sweep.warnings += [store.warning] if store.warning else []

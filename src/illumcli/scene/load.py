@@ -22,7 +22,7 @@ from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
 from illumcli.scene.spec import Scene
 from illumcli.scene.studio import SETTINGS, STUDIO, Settings, arranged
-from illumcli.scene.unused import unused
+from illumcli.scene.unused import lacking, unused
 from illumcli.variants import suggestion
 
 MAX_EXTENDS = 8  # files, one extending the next
@@ -129,6 +129,16 @@ def unused_lines(loaded: Loaded, scene: Scene, layers: Collection[str], files: C
     found = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
     said = ((node.at, path, fact) for path, fact, node in found if node is not None)
     return _lines([_problem(at, path, fact) for at, path, fact in said if at.source != str(STUDIO)])
+
+
+def lacking_lines(loaded: Loaded, scene: Scene, layers: Collection[str]) -> list[str]:
+    """What pictures of the scene lack, a line each; arguments as those of `lacking`."""
+    return [told(loaded, path, fact) for path, fact in lacking(scene, layers)]
+
+
+def told(loaded: Loaded, path: source.Path, fact: str) -> str:
+    """A line about a part of the scene, with its place."""
+    return str(_problem((loaded.tree.find(path) or loaded.tree).at, path, fact))
 
 
 @dataclass

@@ -38,6 +38,31 @@ def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Ite
         yield ("outputs", "colour"), "is not used, it is the precision of .exr; write one, or leave it out"
 
 
+def lacking(scene: Scene, layers: Collection[str]) -> Iterator[Fault]:
+    """The part that a picture lacks where there is nothing to see or no light to see it by, and the fact."""
+    if not scene.objects:
+        yield ("objects",), "the scene has none, its pictures are empty; add objects: [{mesh: FILE}]"
+    elif not scene.lights and not any(scene.ambient.color) and LIT & set(layers) and not _may_emit(scene):
+        fact = "the scene has none and no ambient light, its pictures are black; add lights, or ambient: 0.5"
+        yield ("lights",), fact
+
+
+LIT = {"beauty", "ambient", "diffuse", "specular"}
+"""Layers that are black without light."""
+
+
+def _may_emit(scene: Scene) -> bool:
+    """May some surface send light of its own?"""
+    for (_, source), thing in zip(_sources(scene), scene.objects, strict=True):
+        own = scene.material_of(thing)
+        if own is None and (thing.fallback is not None or getattr(source, "materials", False)):
+            return True
+        models = scene.materials.values() if own is None else [own]
+        if any(model.emission != (0.0, 0.0, 0.0) for model in models):
+            return True
+    return False
+
+
 def _views(scene: Scene) -> Iterator[Fault]:
     """Keys of cameras and of the film."""
     film, cameras = scene.film, scene.named_cameras()

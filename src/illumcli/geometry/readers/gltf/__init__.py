@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers._polygons import Ints, polygons, starts_of
-from illumcli.geometry.readers.gltf.document import Document, open_document
+from illumcli.geometry.readers.gltf.document import Document, open_document, printable
 from illumcli.geometry.readers.gltf.materials import Library
 from illumcli.geometry.readers.gltf.primitives import Part, parts
 
@@ -126,7 +126,8 @@ def _shared(document: Document, found: list[Part]) -> dict[str, NDArray[Any]]:
         known = [part.attributes.get(name) for part in found]
         shapes = {table.shape[1:] for table in known if table is not None}
         if len(shapes) > 1 or (name not in FILLED and any(table is None for table in known)):
-            document.count(f"attribute {name} that some primitives lack or have otherwise, left out")
+            what = f"attribute {printable(name)} that some primitives lack or have otherwise, left out"
+            document.count(what)
             continue
         (shape,) = shapes
         shared[name] = np.concatenate(

@@ -89,7 +89,9 @@ class Document:
         where = f"bufferViews[{index!r:.20}]"
         entry = self.item("bufferViews", index)
         number = entry.get("buffer")
-        if compressed := ", ".join(name for name, said in extensions(entry).items() if "buffer" in said):
+        if compressed := ", ".join(
+            printable(name) for name, said in extensions(entry).items() if "buffer" in said
+        ):
             buffer = self.item("buffers", number)
             if "uri" not in buffer and (number != 0 or self.chunk is None):
                 raise self.wrong(
@@ -200,7 +202,7 @@ def _name_extensions(document: Document) -> None:
     needed = document.json.get("extensionsRequired", [])
     for name in needed if isinstance(needed, list) else [needed]:
         if not isinstance(name, str) or name not in READ:
-            document.count(f"required extension {name!s:.60}, read in its core state")
+            document.count(f"required extension {printable(name)}, read in its core state")
 
 
 class _Chunks(Value):
@@ -250,6 +252,11 @@ def extensions(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def extension(entry: dict[str, Any], name: str) -> dict[str, Any]:
     """What one extension of a part of the JSON says; nothing where it has none of that name."""
     return extensions(entry).get(name, {})
+
+
+def printable(name: Any) -> str:
+    """A name as a message has it: up to 60 letters, none of which moves a terminal's cursor."""
+    return "".join(letter if letter.isprintable() else "?" for letter in f"{name!s:.60}")
 
 
 def is_inline(uri: str) -> bool:

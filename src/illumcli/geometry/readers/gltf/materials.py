@@ -37,6 +37,7 @@ from illumcli.geometry.readers.gltf.document import (
     is_finite,
     is_index,
     is_inline,
+    printable,
 )
 from illumcli.geometry.readers.gltf.primitives import Part
 from illumcli.geometry.repairs import Repair, note
@@ -153,7 +154,7 @@ class Library:
             count("transparent materials made opaque", where)
         for name in extensions(material):
             if name not in _USED:
-                count(f"extension {name:.60} of materials left out", where)
+                count(f"extension {printable(name)} of materials left out", where)
 
     def _specular_glossiness(self, gloss: dict[str, Any], base: Varying, emission: Varying) -> dict[str, Any]:
         textured = "specularGlossinessTexture" in gloss

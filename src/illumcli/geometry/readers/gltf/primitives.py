@@ -12,7 +12,7 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.readers._polygons import Ints, strip
 from illumcli.geometry.readers.gltf.accessors import has_data, table
 from illumcli.geometry.readers.gltf.deformation import morphed, skinned_or_placed, weights_of
-from illumcli.geometry.readers.gltf.document import Document, extensions, is_index
+from illumcli.geometry.readers.gltf.document import Document, extensions, is_index, printable
 from illumcli.geometry.readers.gltf.nodes import PlacedNode, placed_nodes
 from illumcli.records import Record
 
@@ -87,8 +87,7 @@ def _is_drawn(document: Document, primitive: dict[str, Any], where: str) -> bool
         document.count("primitives without POSITION, left out", where)
         return False
     needed += [primitive["indices"]] if "indices" in primitive else []
-    packed = {name: said for name, said in extensions(primitive).items() if "bufferView" in said}
-    names = ", ".join(packed)
+    names = ", ".join(printable(name) for name, said in extensions(primitive).items() if "bufferView" in said)
     if names and not all(has_data(document, each) for each in needed):
         raise document.wrong(
             f"{where} has its geometry in the extension {names:.80} alone, which is not read",
@@ -163,7 +162,7 @@ class _Tables(Record):
             if len(values) != self.size:
                 raise self.document.wrong(f"{name} has {len(values)} rows for {self.size} vertices")
         except InputError:
-            self.document.count(f"{name} that cannot be read, left out", self.where)
+            self.document.count(f"{printable(name)} that cannot be read, left out", self.where)
             return None
         return values
 

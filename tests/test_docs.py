@@ -51,6 +51,18 @@ def test_every_command_runs(page, folder):
         assert done.returncode in allowed, (line, done.stderr)
 
 
+def test_readmes_sample_of_mistakes_is_what_is_printed(folder):
+    scene = folder / "scenes" / "teapot.yaml"
+    right = scene.read_text()
+    scene.write_text(right.replace("blinn_phong", "blinn_fong").replace("specular: 0.45", "specular: -0.45"))
+    command = [sys.executable, "-m", "illumcli", "check", "scenes/teapot.yaml"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    scene.write_text(right)
+    assert done.returncode == 2
+    assert f"```text\n{done.stderr}```\n" in (ROOT / "README.md").read_text()
+    assert len(done.stderr.splitlines()) == 2
+
+
 def test_readme_names_every_command():
     text = (ROOT / "README.md").read_text()
     for name in COMMANDS:

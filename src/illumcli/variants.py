@@ -9,9 +9,15 @@ from __future__ import annotations
 import pkgutil
 from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import (
+    CoreSchema,
+    InitErrorDetails,
+    PydanticCustomError,
+    ValidationError,
+    core_schema,
+)
 
 from illumcli.description import Description
 from illumcli.records import Value
@@ -83,5 +89,46 @@ class Tagged(Value):
             chosen = member(self.package, name)
         except LookupError as error:
             facts = {"tag": self.tag, "name": name, "way": str(error)}
-            raise PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts) from None
+            unknown = PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts)
+            details = [InitErrorDetails(type=unknown, loc=(self.tag,), input=name)]
+            details += self._other_faults(value, name, info.context)
+            raise ValidationError.from_exception_data(self.tag, details) from None
         return chosen.validated(value, info.context)
+
+    def _other_faults(self, value: dict[Any, Any], name: str, context: Any) -> list[InitErrorDetails]:
+        """What else is wrong with a mapping whose tag is misspelt: by the member that is meant.
+
+        Where none is near, a key that every member that has it refuses.
+        """
+        import difflib
+
+        near = difflib.get_close_matches(name, tags(self.package), n=1)
+        if near:
+            meant = member(self.package, near[0])
+            if context is not None:
+                context[id(value)] = meant
+            return self._faults_as(near[0], value, context)
+        refused: dict[str, list[list[InitErrorDetails]]] = {key: [] for key in value if key != self.tag}
+        for tag, each in zip(tags(self.package), members(self.package), strict=True):
+            faults = self._faults_as(tag, value, None)
+            for key in refused.keys() & each.fields():
+                refused[key].append([fault for fault in faults if fault["loc"][:1] == (key,)])
+        return [
+            fault for by_member in refused.values() if by_member and all(by_member) for fault in by_member[0]
+        ]
+
+    def _faults_as(self, tag: str, value: dict[Any, Any], context: Any) -> list[InitErrorDetails]:
+        """What is wrong with a mapping as the member of this tag."""
+        try:
+            member(self.package, tag).validated({**value, self.tag: tag}, context)
+        except ValidationError as error:
+            return [_details(fault) for fault in error.errors(include_url=False)]
+        return []
+
+
+def _details(fault: Any) -> InitErrorDetails:
+    """A fault, to be raised again."""
+    kind: str | PydanticCustomError = fault["type"]
+    if kind not in get_args(core_schema.ErrorType):
+        kind = PydanticCustomError(fault["type"], fault["msg"], fault.get("ctx"))
+    return InitErrorDetails(type=kind, loc=fault["loc"], input=fault["input"], ctx=fault.get("ctx", {}))

@@ -104,7 +104,7 @@ def test_ten_mistakes_are_ten_lines_in_the_order_of_the_text(problems):
         "s.yaml:5:3: film.width: must be a whole number, is text '1:30'",
         "s.yaml:9:5: materials.clay.difuse: unknown key 'difuse'; did you mean 'diffuse'?",
         "s.yaml:10:5: materials.clay.exponent: must be at least 0, is -1",
-        "s.yaml:11:3: materials.wall: no model 'phng'; did you mean 'phong'?",
+        "s.yaml:11:10: materials.wall.model: no model 'phng'; did you mean 'phong'?",
         "s.yaml:13:5: objects.0.mesh: no mesh 'ball'; the scene has no meshes",
         "s.yaml:14:5: objects.0.material: no material 'caly'; did you mean 'clay'?",
         "s.yaml:16:5: lights.0: missing key 'position'",

@@ -16,7 +16,8 @@ from illumcli.description import Description
 from illumcli.errors import InputError
 from illumcli.records import Value
 from illumcli.scene import source
-from illumcli.scene.faults import Fault, faults, shown
+from illumcli.scene.blame import Applied, PlacedFault, blamed
+from illumcli.scene.faults import faults, shown
 from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
@@ -77,11 +78,13 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Loaded:
         tree = reading.file(path, ())
         way = f"{path} is no mesh without a scene; change its camera and the transforms of its objects"
         reading.problems += [Problem(change.value.place, (), way) for change in settings]
+    applied: list[Applied] = []
     if tree is not None:
         for change in changes:
-            if change not in settings:
-                tree = assign(tree, change, reading.problems) or tree
-    scene = None if tree is None else _validated(Scene, tree, reading.problems)
+            if change not in settings and (changed := assign(tree, change, reading.problems)):
+                applied.append(Applied(change, tree))
+                tree = changed
+    scene = None if tree is None else _validated(Scene, tree, reading.problems, applied)
     if scene is None or tree is None or reading.problems:
         raise InputError(_lines(reading.problems, overrides))
     values = {change.text: change.value.plain() for change in changes if change.text}
@@ -233,22 +236,31 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
     }
 
 
-def _validated(kind: type[D], tree: Node, problems: list[Problem]) -> D | None:
+def _validated(
+    kind: type[D], tree: Node, problems: list[Problem], applied: Sequence[Applied] = ()
+) -> D | None:
     """The description that a tree writes, or None after adding what is wrong with it to `problems`."""
+    made, found = _judged(kind, tree)
+    known = {problem.place for problem in problems}
+    problems += [
+        fault if isinstance(fault, Problem) else _problem(*fault)
+        for fault in blamed(found, tree, applied, lambda before: _judged(kind, before)[1])
+        if fault.place not in known
+    ]
+    return made
+
+
+def _judged(kind: type[D], tree: Node) -> tuple[D | None, list[PlacedFault]]:
+    """The description that a tree writes, or None and what is wrong with it."""
     plain = tree.plain()
     classes: dict[int, type[Description]] = {}
-    found: list[Fault] = []
-    made = None
     try:
-        made = kind.validated(plain, classes)
+        return kind.validated(plain, classes), []
     except ValidationError as error:
         found = [*faults(error, plain, classes), *(reference_faults(plain) if kind is Scene else ())]
-    known = {problem.place for problem in problems}
-    for path, fact in dict.fromkeys(found):
-        place = (tree.find(path) or tree).at
-        if place not in known:
-            problems.append(_problem(place, path, fact))
-    return made
+    return None, [
+        PlacedFault((tree.find(path) or tree).at, path, fact) for path, fact in dict.fromkeys(found)
+    ]
 
 
 def _problem(place: Place, path: source.Path, fact: str) -> Problem:

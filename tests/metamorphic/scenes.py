@@ -10,7 +10,7 @@ import copy
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -283,8 +283,8 @@ def transform(random: Random) -> dict[str, Any]:
     return made
 
 
-def objects(random: Random, case: Case) -> list[dict[str, Any]]:
-    """Two to five objects; some share a mesh, some a material."""
+def objects(random: Random, case: Case, rates: Sequence[str]) -> list[dict[str, Any]]:
+    """Two to five objects; some share a mesh, some a material, some have a rate of their own."""
     known = case.scene["meshes"] = {}
     for k in range(random.randint(1, 3)):
         known[f"m{k}"] = (
@@ -304,7 +304,7 @@ def objects(random: Random, case: Case) -> list[dict[str, Any]]:
         if k and random.random() < 0.2:
             thing["transform"] = beside(random, case.scene["lights"])
         if random.random() < 0.5:
-            thing["shading"] = random.choice(RATES)
+            thing["shading"] = random.choice(rates)
         if random.random() < 0.3:
             thing["grain"] = random.choice([[1, 0.2, 0], {"axis": [0, 1, 0.1], "centre": [0.1, 0, 0]}])
         made.append(thing)
@@ -459,7 +459,8 @@ def drawn(seed: int) -> Case:
     scene = case.scene
     scene["cameras"] = cameras(random)
     scene["film"] = film(random)
-    scene["shading"] = random.choice(RATES)
+    rates = random.sample(RATES, random.choice([2, 2, 4]))  # what goes wrong between two hides among all
+    scene["shading"] = random.choice(rates)
     if random.random() < 0.2:
         scene["terminator"] = "none"
     if random.random() < 0.8:
@@ -472,7 +473,7 @@ def drawn(seed: int) -> Case:
     if random.random() < 0.2:
         scene["depth_cue"] = {"near": 3, "far": number(random, 4, 8), "strength": 0.8, "color": color(random)}
     scene["lights"] = lights(random)
-    scene["objects"] = objects(random, case)
+    scene["objects"] = objects(random, case, rates)
     return case
 
 

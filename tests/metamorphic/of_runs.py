@@ -261,8 +261,8 @@ def a_sweep_is_as_many_renders(case: Case, random: Random, studio: Studio) -> No
     variants = [sweep.Variant(values, frame) for frame, values in enumerate(rows)]
     layers = (*ALL, "lights", "shadows")
     keep = random.random() < 0.5
-    made = sweep.run(path, variants, str(folder / "swept{frame}.exr"), layers, threads=1, cache=keep)
-    assert sweep.failed(made) is None, sweep.failed(made)
+    pattern = str(folder / "swept{frame}.exr")
+    made = sweep.run(path, variants, sweep.Settings(pattern=pattern, only=layers, threads=1, cache=keep))
     for variant, outcome in zip(variants, made.outcomes, strict=True):
         alone = folder / f"alone{variant.frame}.exr"
         render.run(path, variant.overrides, str(alone), layers, threads=1, cache=False)

@@ -10,10 +10,12 @@ from illumcli.errors import InputError
 from illumcli.files.images import read_image
 from illumcli.files.writer import ImageWriter
 from illumcli.jobs.render import run
+from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.camera import MARGIN
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 from illumcli.scene.studio import ROTATIONS
+from illumcli.shading.materials import as_meant
 
 SMALL = ["film={width: 80, height: 45, samples: 1}"]
 BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -274,6 +276,30 @@ def test_what_exporters_write_for_nothing_is_not_shown(tmp_path):
     np.testing.assert_allclose(color_at_centre(path), (0.5, 0, 0), rtol=1e-5)
     found, _ = layers(path, only=("specular",))
     assert not found["specular.R"].any()
+
+
+def test_the_lights_are_the_same_to_every_format(tmp_path):
+    """Kd of MTL, the studio's own diffuse colour and the albedo of a physical model look alike."""
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.5 0.5\n")
+    obj(tmp_path / "plain.obj", CORNERS, BOX)
+    path = obj(tmp_path / "m.obj", CORNERS, BOX, "mtllib m.mtl\nusemtl a\n")
+    own = ["materials.subject.diffuse=0.5", "materials.subject.specular=0"]
+    lambert = "objects.subject.material={model: lambert, diffuse: 0.5}"
+    found = [layers(path, only=("beauty",))[0], layers(tmp_path / "plain.obj", *own, only=("beauty",))[0]]
+    expected = layers(path, lambert, only=("beauty",))[0]
+    assert expected["R"][22, 40] > 0.2
+    for each in found:
+        np.testing.assert_allclose(each["G"], expected["G"], rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("exponent", [1, 30, 1000])
+def test_a_highlight_of_mtl_has_the_middle_it_says(exponent):
+    """Under the studio's lights, pi times as strong as those of the texts."""
+    mtl = BlinnPhong.validated({"model": "blinn_phong", "specular": [0.2, 0.5, 1], "exponent": exponent})
+    n_l, gap = np.ones(1), np.zeros(1)
+    np.testing.assert_allclose(
+        np.pi * as_meant(mtl).specular_lobe(n_l, gap), mtl.specular_lobe(n_l, gap), rtol=1e-12
+    )
 
 
 def test_a_scene_may_fall_back_too(tmp_path):

@@ -147,7 +147,8 @@ class Object(Description):
     selects by name, and light grey Lambert for what selects none."""
     fallback: NameOrMaterial | None = None
     """Where no `material` is given: show the materials, textures and vertex colours that the mesh file itself
-    describes, whatever the scene calls its own, and this material, by name or in place, where it has none."""
+    describes, whatever the scene calls its own, and this material, by name or in place, where it has none.
+    What MTL calls intensities are shares of the light then, and ambient light leaves by diffuse colours."""
     override: dict[str, Any] = NOTHING
     """Parameters of the material that this object has otherwise."""
     transform: Transform = NOTHING

@@ -172,13 +172,19 @@ def as_meant(model: IlluminationModel) -> IlluminationModel:
     """A material of a mesh's own library, without what exporters write that know nothing of it.
 
     Their ambient colour is most often all white or all black: light from everywhere leaves by the diffuse
-    colour instead, where there is one. An exponent of 0 stands for no highlight, not for one all over.
+    colour instead, where there is one. An exponent of 0 stands for no highlight, not for one all over. The
+    intensities of MTL are taken for shares of the light, as all other formats have them: over pi, and so the
+    middle of a highlight.
     """
     changes: dict[str, Any] = {}
     if model.ambient is not None and model.diffuse_color() != (0.0, 0.0, 0.0):
         changes["ambient"] = None
-    if getattr(model, "exponent", None) == 0 and "specular" in model.fields():
-        changes["specular"] = (0.0, 0.0, 0.0)
+    own = dict(model)
+    if own["model"] == "blinn_phong" and not own["normalised"]:
+        e, specular = own["exponent"], own["specular"]
+        middle = (e + 2) * (e + 4) / (8 * (e + 2.0 ** (-e / 2)))  # pi times models.blinn_phong's C
+        share = 1 / middle if e > 0 else 0.0
+        changes |= {"normalised": True, "specular": tuple(share * each for each in specular)}
     return model.replaced(**changes) if changes else model
 
 

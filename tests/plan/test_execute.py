@@ -312,6 +312,14 @@ def test_w_is_taken_about_the_normal_that_each_rate_interpolates(picture):
     assert not np.array_equal(phong, geometric)
 
 
+def test_the_plan_says_that_w_is_taken_about_geometric_normals(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE)
+    loaded = load(path, ("obscurance.about=geometric",))
+    said = plan(loaded.scene, loaded, ["obscurance"]).skipped["obscurance_normals"]
+    assert said == "the hemispheres of obscurance stand about the polygons' own normals"
+
+
 def test_a_coarse_smooth_ball_alone_is_open_exactly(picture):
     away = [f"objects.{k}.transform.translate=[{20 * k}, 0.5, 0]" for k in (2, 3, 4)]
     overrides = ("objects.0.mesh.size=[1e-3, 1e-3]", "camera.target=[0, 0.5, 0]", "camera.fov=15", *away)

@@ -20,7 +20,7 @@ from illumcli.rays.surface import facets, with_facet
 from illumcli.records import Record
 from illumcli.visibility.obscurance import Hemispheres
 
-STARTS = 32
+STARTS = 16
 """Places around a vertex from which its rays start."""
 INSIDE = 2.0**-8
 """How far inside its triangle a ray of a vertex starts, as a share of the shorter edge there."""

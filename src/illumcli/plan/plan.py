@@ -273,6 +273,8 @@ def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[s
             reasons[name] = "the obscurance is baked"
         elif kind in ("obscurance", "obscurance_draws") and scene.obscurance is None:
             reasons[name] = "the scene has no obscurance: w = 1"
+        elif kind == "obscurance_normals" and "obscurance_draws" in made:
+            reasons[name] = "the hemispheres of obscurance stand about the polygons' own normals"
         elif kind in ("ambient", "ambient_color", "obscurance", "obscurance_draws") and not is_ambient(scene):
             reasons[name] = "no ambient light leaves any surface"
         elif kind == "emission" and not is_emissive(scene):

@@ -29,7 +29,7 @@ MOST_SHEETS = 64
 """How many back faces in a row a ray passes through, when it does."""
 STRIDE = 13
 """From the start of one ray to that of the next: neither neighbours on a spiral nor rays of one ring share
-theirs, for 32 starts."""
+theirs, for 16 starts."""
 GRAZING = 2.0**-20
 """Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
 

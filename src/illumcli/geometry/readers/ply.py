@@ -217,7 +217,8 @@ def _attributes(file: _File) -> dict[str, NDArray[Any]]:
         if isinstance(values, Lists):
             note(file.repairs, "lists of vertices left out", file.line("vertex", name))
         elif name not in taken:
-            attributes[name] = _typed(file, name, values, types[name].newbyteorder("="))
+            label = f"{name}_" if name in attributes else name  # a scalar `color` beside red, green, blue
+            attributes[label] = _typed(file, name, values, types[name].newbyteorder("="))
     return attributes
 
 

@@ -238,9 +238,9 @@ def test_a_glb_that_is_written_oddly_keeps_all_it_has(text_mesh, tmp_path):
     document.json["buffers"][0]["uri"] = "data.bin"
     document.chunk = None
     bake(write(tmp_path / "apart.glb"), tmp_path / "anew.glb", samples=16)
-    anew = read_mesh(tmp_path / "anew.glb")
+    anew, odd = (read_mesh(tmp_path / f"{name}.glb").vertices for name in ("anew", "odd"))
     assert "extras" not in open_document(tmp_path / "anew.glb").json
-    np.testing.assert_allclose(anew.vertices, read_mesh(tmp_path / "odd.glb").vertices)
+    np.testing.assert_allclose(anew[: len(odd)], odd)  # copies for the edge, which is sharp, follow
 
 
 def test_copies_of_a_vertex_with_one_normal_get_the_same_value(tmp_path):

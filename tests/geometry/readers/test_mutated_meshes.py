@@ -348,3 +348,12 @@ def test_accidents_to_the_parts_of_a_gltf_document(tmp_path: Path, count: int) -
             document = rewritten(rng, document)
         (tmp_path / "a.glb").write_bytes(glb(document))
         read_or_refused(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("count", [200, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_no_library_refuses_a_mesh(tmp_path: Path, count: int) -> None:
+    path = tmp_path / "a.obj"
+    path.write_bytes(obj())
+    for seed in range(count):
+        (tmp_path / "a.mtl").write_bytes(mutated(np.random.default_rng(seed), mtl()))
+        assert_sound(read_mesh(path))

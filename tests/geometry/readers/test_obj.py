@@ -313,6 +313,7 @@ def test_shapes_that_are_no_polygons_are_counted(tmp_path: Path) -> None:
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "a.obj: has no faces"),
         ("# only\n# comments\n", "a.obj: has no faces"),
         ("some\nother file\n", "a.obj: has no faces"),
+        ("v\nv\nf 1 2 1\n", "a.obj:1: has 0 numbers, not 3"),
         (SQUARE + "f 1 2 3 x\n", "a.obj:5: 'x' is no whole number"),
         ("v 0 0 \x010\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj:1: '.0' is no number"),
         (SQUARE + "l 1 2\n", "a.obj: has no faces"),

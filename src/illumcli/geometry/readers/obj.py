@@ -205,7 +205,7 @@ def _table(block: Block, size: int) -> NDArray[np.float64]:
         return np.ascontiguousarray(values.reshape(-1, width)[:, :size])
     table = np.full((len(counts), size), np.nan)
     if (counts == width).all():
-        table[:, :width] = values.reshape(-1, width)
+        table[:, :width] = values.reshape(len(counts), width)
         return table
     column = np.arange(size)
     present = column < counts[:, None]

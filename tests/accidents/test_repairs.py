@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from illumcli.geometry.repairs import HARMLESS
+from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, NO_MATERIAL, NOT_ASKED
 from illumcli.jobs.render import run
 from illumcli.plan import artifacts
 
@@ -110,3 +110,37 @@ def test_strict_refuses_every_class_and_writes_nothing(illum, scene, words):
 def test_strict_takes_a_sound_mesh(illum, scene):
     (scene / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert illum("render", "s.yaml", "--strict").returncode == 0
+
+
+NAMED = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 2\n"
+RED = "materials: {red: {model: lambert}}\n"
+
+
+@pytest.mark.parametrize(
+    ("library", "more", "told"),
+    [
+        ("", "", (NO_MATERIAL, 2)),
+        ("", RED, (NO_MATERIAL, 1)),
+        ("", RED.replace("red", "red: {model: lambert}, blue"), None),
+        ("red blue", "", (NOT_ASKED, 2)),
+        ("red blue", RED, (NOT_ASKED, 1)),
+        ("red", "meshes: {m: {file: m.obj, materials: true}}\n", ("materials that no library has", 1)),
+        ("red blue", "meshes: {m: {file: m.obj, materials: true}}\n", None),
+        ("", "meshes: {m: {file: m.obj, materials: true}}\n", (NO_MATERIAL, 2)),
+    ],
+)
+def test_materials_that_a_mesh_names_in_vain_are_said_once(illum, tmp_path, library, more, told):
+    (tmp_path / "m.obj").write_text("mtllib m.mtl\n" * bool(library) + NAMED)
+    (tmp_path / "m.mtl").write_text("".join(f"newmtl {name}\n" for name in library.split()))
+    mesh = "m" if "meshes" in more else "m.obj"
+    small = "version: 1\nfilm: {width: 8, height: 8, samples: 1}\nambient: 1\n"
+    (tmp_path / "s.yaml").write_text(f"{small}{more}objects: [{{mesh: {mesh}}}]\n")
+    done = illum("render", "s.yaml")
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stderr.splitlines() if "materials" in line]
+    assert len(lines) == (told is not None)
+    assert told is None or f"{told[0]}: {told[1]}, the first is m.obj" in lines[0]
+    refused = illum("render", "s.yaml", "--strict", "--force").returncode
+    assert refused == (2 if told is not None and told[0] not in APPROXIMATED else 0)
+    bake = illum("ao-bake", "s.yaml", "-o", "b.npz", "--samples", "4")
+    assert not any(what in bake.stderr for what in (NO_MATERIAL, NOT_ASKED))

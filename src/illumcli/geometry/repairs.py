@@ -19,7 +19,17 @@ HARMLESS = frozenset(
 
 NORMALS_OF_FILE = "objects whose normals' crease or weights are not used: the file has normals, see source"
 NO_GRAIN = "objects whose material has a grain that nothing directs: give the object a grain, or its mesh uv"
-APPROXIMATED = frozenset({"metallic-roughness materials, drawn as cook_torrance", NORMALS_OF_FILE, NO_GRAIN})
+NO_MATERIAL = "materials that neither the scene nor a library has, drawn as the default"
+NOT_ASKED = "materials of mesh files that are not used: write materials: true, or give the object one"
+APPROXIMATED = frozenset(
+    {
+        "metallic-roughness materials, drawn as cook_torrance",
+        NORMALS_OF_FILE,
+        NO_GRAIN,
+        NO_MATERIAL,
+        NOT_ASKED,
+    }
+)
 """Classes that no file is to blame for: told, and not refused under --strict."""
 
 

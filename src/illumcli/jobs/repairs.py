@@ -9,6 +9,16 @@ from illumcli.errors import InputError
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, Repairs
 from illumcli.plan.recipes import PURPOSES
 
+_TELLING = (
+    "repairs",
+    "undirected",
+    "unnamed",
+    "materials",
+    "baked",
+    *(f"{purpose}_textures" for purpose in PURPOSES),
+)
+"""Buffers that say what was put right."""
+
 
 def told(repairs: Repairs, verbose: bool = True) -> list[str]:
     """A line per class; those of `HARMLESS` only if `verbose`."""
@@ -38,9 +48,5 @@ def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:
 def repairs(shared: Mapping[str, Any]) -> Repairs:
     """What was put right in meshes, their materials, baked values and textures."""
     return {
-        what: each
-        for name, made in shared.items()
-        if name
-        in ("repairs", "undirected", "materials", "baked", *(f"{purpose}_textures" for purpose in PURPOSES))
-        for what, each in made.repairs.items()
+        what: each for name, made in shared.items() if name in _TELLING for what, each in made.repairs.items()
     }

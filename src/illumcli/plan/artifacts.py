@@ -48,6 +48,7 @@ ONCE = (
     "world",
     "repairs",
     "undirected",
+    "unnamed",
     "corner_normals",
     "numbering",
 )

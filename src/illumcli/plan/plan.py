@@ -209,7 +209,7 @@ def _steps(
     if any(view.is_adaptive for view in all_views):
         filled |= dict.fromkeys(SHAPE)
         coverage = ["alpha"]
-    told = [name for name in ("repairs", "undirected") if name in book]
+    told = [name for name in ("repairs", "undirected", "unnamed") if name in book]
     steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", *told], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []

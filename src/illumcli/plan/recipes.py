@@ -322,6 +322,12 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
     computes = tuple(
         own != "constant" and _computes_normals(source) for own, source in zip(rate, sources, strict=True)
     )
+    selects = tuple(
+        None
+        if scene.material_of(thing) is not None
+        else (() if thing.fallback is not None else tuple(sorted(scene.materials)), imports(scene, thing))
+        for thing in scene.objects
+    )
     wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
     left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
@@ -338,6 +344,7 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         Recipe.of(stages.frame),
         Recipe.of(partial(stages.repairs, called, computes), "repairs"),
         *([Recipe.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
+        *([Recipe.of(partial(stages.unnamed, called, selects), "unnamed")] if any(selects) else []),
         Recipe.of(stages.tracer_over, "tracer"),
         Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
         Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),
@@ -401,7 +408,7 @@ def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
         models |= {("material", name): model for name, model in scene.materials.items()}
     files = {model.file for model in models.values() if hasattr(model, "file")}
     measured = {file: Content(partial(resolve, loaded, file)) for file in sorted(files)}
-    numbering = partial(stages.numbering, tuple(choices), tuple(scene.materials))
+    numbering = partial(stages.numbering, tuple(choices), tuple(sorted(scene.materials)))
     own = {"meshes": "meshes"} if any(imported) else {}
     book = [
         Recipe.of(numbering, "numbering"),

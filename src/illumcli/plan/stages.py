@@ -20,7 +20,17 @@ from illumcli.geometry.assemble import CornerVectors, PolygonCentres, Standing, 
 from illumcli.geometry.faults import faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import PlanarPolygons
-from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE, Repair, Repairs, joined, located, note
+from illumcli.geometry.repairs import (
+    NO_GRAIN,
+    NO_MATERIAL,
+    NORMALS_OF_FILE,
+    NOT_ASKED,
+    Repair,
+    Repairs,
+    joined,
+    located,
+    note,
+)
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import sampling, surface
@@ -168,6 +178,24 @@ def undirected(names: tuple[str, ...], wants: tuple[bool, ...], meshes: tuple[Me
     for name, wants_uv, mesh in zip(names, wants, meshes, strict=True):
         if wants_uv and mesh.uvs is None and mesh.polygon_count:
             note(found, NO_GRAIN, name)
+    return MeshRepairs(found)
+
+
+def unnamed(
+    names: tuple[str, ...], selects: tuple[tuple[tuple[str, ...], bool] | None, ...], meshes: tuple[Mesh, ...]
+) -> MeshRepairs:
+    """Materials that mesh files select by name and nobody has, or nobody asked for.
+
+    `selects` says of each object among which of the scene's materials its mesh selects, and whether it has
+    those of its file; None where the object has one material.
+    """
+    found: dict[str, Repair] = {}
+    for name, own, mesh in zip(names, selects, meshes, strict=True):
+        known, imports = own or ((), False)
+        missing = set(mesh.material_names) - set(known)
+        if own is None or not missing or (imports and mesh.materials):  # what a library lacks is told already
+            continue
+        note(found, NOT_ASKED if missing & mesh.materials.keys() else NO_MATERIAL, name, len(missing))
     return MeshRepairs(found)
 
 

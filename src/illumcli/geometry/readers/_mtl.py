@@ -57,6 +57,8 @@ class Library(Value):
     materials: dict[str, dict[str, Any]] = field(default_factory=dict)
     substitutes: dict[str, dict[str, Substitute]] = field(default_factory=dict)
     repairs: dict[str, Repair] = field(default_factory=dict)
+    looks: dict[str, Repair] = field(default_factory=dict)
+    """What has no counterpart here and changes how a material looks; told where the library is used."""
 
 
 def read(path: Path, folder: Path) -> Library:
@@ -84,7 +86,7 @@ def read(path: Path, folder: Path) -> Library:
             called = without_comment(rest).rstrip()
             if called in materials:
                 note(library.repairs, "materials that are defined twice, joined", place)
-            current = materials.setdefault(called, _Material(path, folder, library.repairs))
+            current = materials.setdefault(called, _Material(path, folder, library))
         elif current is None:
             note(library.repairs, "statements before any material left out", place)
         else:
@@ -106,8 +108,9 @@ def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
 class _Material:
     """The statements of one material."""
 
-    def __init__(self, path: Path, folder: Path, repairs: dict[str, Repair]) -> None:
-        self._path, self._folder, self._repairs = path, folder, repairs
+    def __init__(self, path: Path, folder: Path, library: Library) -> None:
+        self._path, self._folder = path, folder
+        self._repairs, self._looks = library.repairs, library.looks
         self._values: dict[str, Any] = {}
         self._places: dict[str, str] = {}
 
@@ -121,9 +124,9 @@ class _Material:
         elif word == "map_kd":
             self._set("map_Kd", self._texture(rest, place), place)
         elif word.startswith("map_") or word in ("bump", "disp", "decal", "refl", "norm"):
-            note(self._repairs, "images of materials other than map_Kd left out", place)
+            note(self._looks, "images of materials other than map_Kd left out", place)
         elif word not in _NOTHING:
-            note(self._repairs, "statements of materials that have no meaning here left out", place)
+            note(self._looks, "statements of materials that have no meaning here left out", place)
 
     def _set(self, key: str, value: Any, place: str) -> None:
         if value is not None:
@@ -131,7 +134,7 @@ class _Material:
 
     def _color(self, words: list[str], place: str) -> Color | None:
         if words[:1] and words[0].lower() in ("spectral", "xyz"):
-            note(self._repairs, "spectral and XYZ colours left out", place)
+            note(self._looks, "spectral and XYZ colours left out", place)
             return None
         values = self._numbers(words[:3], place)
         if len(values) == 2:
@@ -161,7 +164,7 @@ class _Material:
             else:
                 options = True
         if options:
-            note(self._repairs, "texture options left out", place)
+            note(self._looks, "texture options left out", place)
 
         # as it stands, else without a comment, else without quotes
         name = text[at:]
@@ -177,12 +180,12 @@ class _Material:
         found, places = self._values, self._places
         diffuse = found.get("map_Kd", found.get("Kd"))
         if "map_Kd" in found and found.get("Kd", WHITE) != WHITE:
-            note(self._repairs, "factors Kd of a texture left out", places["Kd"])
+            note(self._looks, "factors Kd of a texture left out", places["Kd"])
         if found.get("d", 1 - found.get("Tr", 0.0)) < 1:
             note(self._repairs, "transparent materials made opaque", places["d" if "d" in found else "Tr"])
         illum = found.get("illum", 2.0)
         if illum > 2:
-            note(self._repairs, "reflection of materials left out", places["illum"])
+            note(self._looks, "reflection of materials left out", places["illum"])
         if illum == 0:
             light = WHITE if diffuse is None else diffuse
             keys = {"diffuse": BLACK, "specular": BLACK, "ambient": BLACK, "emission": light}

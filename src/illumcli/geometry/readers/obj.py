@@ -101,6 +101,7 @@ def read(path: Path) -> Mesh:
         attributes=attributes,
         materials=library.materials,
         substitutes=library.substitutes,
+        material_repairs=library.looks,
         repairs=repairs,
         place=lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}",
     )
@@ -352,6 +353,7 @@ def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> _mt
             whole.materials.update({**found.materials, **whole.materials})
             whole.substitutes.update({**found.substitutes, **whole.substitutes})
             whole.repairs.update(joined([whole.repairs, found.repairs]))
+            whole.looks.update(joined([whole.looks, found.looks]))
     return whole
 
 

@@ -58,21 +58,26 @@ def order(book: Mapping[str, Recipe], outputs: Iterable[str], given: Iterable[st
     ValueError
         Recipes that need each other in a circle.
     """
-    done, path, steps = set(given), [], []  # type: set[str], list[str], list[Recipe]
-
-    def visit(name: str) -> None:
-        if name in done:
-            return
-        if name in path:
-            raise ValueError(" -> ".join([*path[path.index(name) :], name]))
-        path.append(name)
-        recipe = book[name]
-        for need in recipe.needs.values():
-            visit(need)
-        path.pop()
-        done.add(name)
-        steps.append(recipe)
-
+    done, steps = set(given), []  # type: set[str], list[Recipe]
     for name in outputs:
-        visit(name)
+        _visit(name, book, done, [], steps)
     return steps
+
+
+def _visit(
+    name: str, book: Mapping[str, Recipe], done: set[str], path: list[str], steps: list[Recipe]
+) -> None:
+    """Add the recipe of `name` behind all it needs; `path` led here.
+
+    Not a function inside `order`: one that calls itself there is a reference cycle, and keeps the book and
+    every array that its recipes hold until the garbage collector comes by.
+    """
+    if name in done:
+        return
+    if name in path:
+        raise ValueError(" -> ".join([*path[path.index(name) :], name]))
+    recipe = book[name]
+    for need in recipe.needs.values():
+        _visit(need, book, done, [*path, name], steps)
+    done.add(name)
+    steps.append(recipe)

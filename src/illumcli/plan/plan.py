@@ -108,15 +108,12 @@ class Plan(Value):
     def needed_for(self, name: str) -> frozenset[str]:
         """Every buffer that `name` is made from, itself included, those at hand left out."""
         needs: set[str] = set()
-
-        def visit(name: str) -> None:
-            if name in needs or name in self.reused or name in GIVEN:
-                return
-            needs.add(name)
-            for need in self.book[name].needs.values():
-                visit(need)
-
-        visit(name)
+        open_names = [name]
+        while open_names:
+            each = open_names.pop()
+            if each not in needs and each not in self.reused and each not in GIVEN:
+                needs.add(each)
+                open_names += self.book[each].needs.values()
         return frozenset(needs)
 
 

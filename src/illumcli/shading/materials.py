@@ -137,17 +137,7 @@ def materials(
         Mesh by name, those whose own library is used.
     """
 
-    def model_of(token: Token) -> IlluminationModel:
-        match token:
-            case "colors", *own:
-                return with_vertex_colors(model_of(tuple(own)), origin(token)[0] == "mesh")
-            case "meant", *own:
-                return as_meant(model_of(tuple(own)))
-            case "mesh", library, name:
-                return imported_model(libraries[library].materials[name], Path(library).parent)
-        return known[token]
-
-    models = tuple(map(model_of, numbering.tokens))
+    models = tuple(_model_of(token, known, libraries) for token in numbering.tokens)
     imported = [own if own[0] == "mesh" else None for own in map(origin, numbering.tokens)]
     substitutes = [None if own is None else _substitutes(libraries[own[1]], own) for own in imported]
     names = tuple(token[-1] for token in numbering.tokens)
@@ -155,6 +145,20 @@ def materials(
     used = dict.fromkeys(own[1] for own in imported if own is not None)
     repairs = joined(located(libraries[name].material_repairs, name) for name in used)
     return Materials(models, names, numbering, lobes, repairs, tuple(substitutes))
+
+
+def _model_of(
+    token: Token, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Mesh]
+) -> IlluminationModel:
+    """The material of a token."""
+    match token:
+        case "colors", *own:
+            return with_vertex_colors(_model_of(tuple(own), known, libraries), origin(token)[0] == "mesh")
+        case "meant", *own:
+            return as_meant(_model_of(tuple(own), known, libraries))
+        case "mesh", library, name:
+            return imported_model(libraries[library].materials[name], Path(library).parent)
+    return known[token]
 
 
 def _substitutes(mesh: Mesh, token: Token) -> dict[str, Substitute]:

@@ -61,8 +61,9 @@ def a_mesh_in_two_parts(case: Case, random: Random, studio: Studio) -> None:
 def a_flat_face_in_triangles(case: Case, random: Random, studio: Studio) -> None:
     """Flat faces cut into triangles in the file are the same picture. Premises: fixed samples; faces whose
     corners share their normal and materials that do not vary over them; rate `phong`, since triangles have
-    centres and sums of corners of their own; no obscurance, whose rays follow the last bits of normals."""
-    case = files_alone(without_rays(fixed_samples(case)), random, surfaces.FLAT)
+    centres and sums of corners of their own; a grain for every object, since tangents along u are means over
+    triangles; no obscurance, whose rays follow the last bits of normals."""
+    case = files_alone(grained(without_rays(fixed_samples(case))), random, surfaces.FLAT)
     for thing in case.scene["objects"]:
         plain_material(random, thing)
     case.scene["shading"] = "phong"

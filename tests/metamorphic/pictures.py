@@ -87,7 +87,7 @@ def close(
     b: Pictures,
     where: Mapping[str, NDArray[np.bool_]] | None = None,
     share: float = 1e-4,
-    outliers: float = 0.02,
+    outliers: int = 2,
 ) -> None:
     """Up to rounding: within `share` of the largest value, but for a few pixels at edges."""
     assert a.keys() == b.keys(), f"{sorted(a)} against {sorted(b)}"
@@ -98,8 +98,7 @@ def close(
         differ = (np.abs(values - other) > share * size).any(axis=-1)
         if where is not None:
             differ &= where[view]
-        allowed = max(2, outliers * differ.size)
-        assert differ.sum() <= allowed, _told(view, layer, values, other, differ, f"{allowed:.0f} may differ")
+        assert differ.sum() <= outliers, _told(view, layer, values, other, differ, f"{outliers} may differ")
 
 
 def _told(view: str, layer: str, a: NDArray, b: NDArray, differ: NDArray[np.bool_], rule: str) -> str:

@@ -130,6 +130,20 @@ def parts_of(*meshes: Mesh) -> SmoothParts:
     return SmoothParts(world, world_normals(world, [corner_normals(mesh) for mesh in meshes]))
 
 
+def test_shadows_at_the_constant_rate_do_not_depend_on_the_rates_of_others(picture):
+    corners = np.array([[-2, 0, -2], [-2, 0.4, 2], [2, 0, 2], [2, 0.4, -2]], float)
+    twisted = obj((corners, [[0, 1, 2, 3]], np.tile([0.0, 1.0, 0.0], (4, 1))))
+    away = {"mesh": "1.obj", "transform": {"translate": [0, 0, -50]}}
+    sun = [{"light": "directional", "name": "sun", "direction": [-1, -0.05, 0]}]
+    flat = {"mesh": "0.obj", "shading": "constant"}
+    shadows = [
+        picture(twisted, obj(ball([0, 0, 0])), objects=[flat, {**away, "shading": rate}], lights=sun)
+        for rate in ("constant", "phong")
+    ]
+    assert (shadows[0]["shadow.sun.Y"] == shadows[1]["shadow.sun.Y"]).all()
+    assert 0 < shadows[0]["shadow.sun.Y"][shadows[0]["objectId.Y"] == 1].mean() < 1
+
+
 def test_bodies_of_one_mesh_are_parts_of_their_own():
     one = icosphere(1)
     count = len(one.corners) // 3

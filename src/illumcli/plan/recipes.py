@@ -204,7 +204,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Recipe.of(stages.uv_tangents),
         Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
         Recipe.of(stages.ray_origins),
-        *_terminator(smooth, of_normals),
+        *_terminator(rate, smooth, of_normals),
         Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         Recipe.of(
             partial(stages.obscurance_normals, rate),
@@ -436,11 +436,15 @@ def _varying(scene: Scene, purpose: str) -> dict[str, str]:
     return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
 
 
-def _terminator(smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Recipe]:
+def _terminator(rate: Sequence[str], smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Recipe]:
     """The surface that normals imply, from which shadow rays start; none where every object is flat."""
     if not smooth:
         return []
-    return [Recipe.of(stages.smooth_parts, **smooth), Recipe.of(stages.smooth_surface, **smooth, **weights)]
+    surface = partial(stages.smooth_surface, tuple(own == "constant" for own in rate))
+    return [
+        Recipe.of(stages.smooth_parts, **smooth),
+        Recipe.of(surface, "smooth_surface", **smooth, **weights),
+    ]
 
 
 def _light(

@@ -591,14 +591,17 @@ def smooth_parts(world: World, normals: CornerVectors) -> SmoothParts:
 
 
 def smooth_surface(
+    flat: tuple[bool, ...],
     world: World,
     corner_weights: CornerWeights,
     facets: Facets,
     smooth_parts: SmoothParts,
     normals: CornerVectors,
 ) -> shadows.SmoothSurface:
-    """The samples on the surface that their normals imply."""
-    return shadows.SmoothSurface(world, normals, smooth_parts, corner_weights, facets)
+    """The samples on the surface that their normals imply; those of `flat` objects stay on their polygons."""
+    return shadows.SmoothSurface(
+        world, normals, smooth_parts, corner_weights, facets, np.array(flat, np.bool_)
+    )
 
 
 def shadow(

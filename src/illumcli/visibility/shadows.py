@@ -39,6 +39,7 @@ class SmoothSurface(Record):
     parts: SmoothParts
     weights: CornerWeights
     facets: Facets
+    flat: NDArray[np.bool_]  # (O,) objects whose shadow rays start on their polygons
 
 
 def ray_origins(facets: Facets) -> Vectors:
@@ -67,14 +68,15 @@ def _implied_reached(
     tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Lanes
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
-    # Where the implied surface lies above each sample; on flat polygons it is the polygon itself.
+    # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
     facets = smooth.facets
     weights = smooth.weights.take(sample)
     position = rows(facets.position, sample)
     width = _box_diagonals(smooth.world, weights)
     offset = _terminator_offset(smooth, weights, columns(position, F), facets.behind.take(sample))
     offset = bounded(offset, TERMINATOR_SHARE * width)
-    curved = np.flatnonzero(length(offset) > 0)
+    flat = smooth.flat.take(smooth.world.objects.take(weights.hits.triangle))
+    curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
     ng, edge = rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))

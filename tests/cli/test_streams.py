@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -13,7 +14,9 @@ import pytest
 CLOSED = [
     " ".join(some) for count in range(1, 4) for some in itertools.combinations(("<&-", ">&-", "2>&-"), count)
 ]
-SCENE = "version: 1\nfilm: {width: 8, height: 6, samples: 1}\nobjects: [{mesh: {shape: sphere}}]\n"
+SCENE = (
+    "version: 1\nambient: 0.5\nfilm: {width: 8, height: 6, samples: 1}\nobjects: [{mesh: {shape: sphere}}]\n"
+)
 PIECES = [
     ["schema"],
     ["render", "s.yaml", "-o", "s.exr", "--force"],
@@ -75,3 +78,28 @@ def test_only_paths_that_cannot_be_printed_are_an_error(folder):
     assert (folder / "f.exr").exists()
     assert shell(folder, [*words, "-v"], "2>/dev/full")[:2] == (0, "f.exr\n")
     assert shell(folder, ["render", "none.yaml"], ">/dev/full 2>/dev/full")[0] == 2
+
+
+def test_names_from_files_move_no_terminal(folder):
+    """Whatever a file calls its parts: an escape sequence, a NUL, a carriage return, text that runs back."""
+    evil = "\x1b]0;owned\x07\x1b[2J\0\r\u202ex"
+    (folder / "evil.obj").write_text(
+        f"usemtl {evil}\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{evil} 1\nf 1 2 3\nf 1 2 9\n"
+    )
+    (folder / "evil.yaml").write_text(
+        'version: 1\nobjects: [{mesh: evil.obj}, {mesh: "\\e[1m\\0.obj"}]\noutputs: {files: ["\\e[1m.png"]}\n'
+    )
+    (folder / f"{evil.replace(chr(0), '')}.yaml").write_text("version: 1\nfil: 1\n")
+    for words in (
+        ["render", "evil.obj", "-o", "evil.png", "-v"],
+        ["render", "evil.yaml"],
+        ["check", *(str(path.name) for path in folder.glob("*.yaml"))],
+        ["plan", "evil.yaml"],
+        ["ao-bake", "evil.obj", "-o", "evil.npz"],
+        ["render", "s.yaml", "-o", "x\x1b[1m.png"],
+        ["sweep", "s.yaml", "-D", "film.exposure=\x1b[1m,2"],
+    ):
+        code, out, said = shell(folder, words, "")
+        assert "Traceback" not in said, said
+        assert code in (0, 2), said
+        assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", out + said), (words, out, said)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 
 import pytest
 
-from illumcli.errors import InputError
+from illumcli.errors import InputError, LimitError
 from illumcli.files.images import read_image
 from illumcli.jobs.sweep import Settings, at_frame, axis_of, run, split, variants_of
 
@@ -50,6 +51,67 @@ def scene(tmp_path):
 )
 def test_values_of_an_axis(text, values):
     assert list(axis_of(text).values) == values
+
+
+NINES = "9" * 20
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"frames": f"0:{NINES}"}, "frames are counted up to"),
+        ({"frames": f"{NINES}:{NINES}"}, "frames are counted up to"),
+        ({"frames": f"0:{'9' * 5000}"}, "frames are counted up to"),
+        ({"frames": f"0:1:{NINES}"}, "frames are counted up to"),
+        ({"frames": "0:9007199254740993"}, "frames are counted up to"),
+        ({"frames": "0:9007199254740992"}, "9007199254740993 variants are more than 100000"),
+        ({"texts": [f"a=0:1:{'9' * 5000}"]}, "the count must be from 1 to 100000"),
+        ({"texts": ["a=0:1e999:3"]}, "both ends must be finite numbers"),
+        ({"texts": [f"{name}=0:1:90000" for name in "abcdef"]}, "variants are more than 100000"),
+        ({"texts": ["a=" + "[" * 9000 + "frame" + "]" * 9000], "frames": "0:1"}, "nested deeper than 32"),
+    ],
+)
+def test_more_than_any_sweep_has_is_refused_in_a_short_line(words, said):
+    with pytest.raises(InputError, match=re.escape(said)) as caught:
+        variants_of(**{"texts": [], **words})
+    assert len(str(caught.value)) < 200
+
+
+def test_tables_of_variants_have_limits(tmp_path, monkeypatch):
+    table = tmp_path / "rows.csv"
+    table.write_text("a\n" + "1" * 200_000 + "\n")
+    with pytest.raises(InputError, match=r"rows\.csv: cannot be read: field larger"):
+        variants_of([], rows=table)
+    monkeypatch.setattr("illumcli.jobs.sweep.MOST_BYTES", 10)
+    with pytest.raises(LimitError, match="larger than 10 bytes"):
+        variants_of([], rows=table)
+
+
+@pytest.mark.parametrize(
+    ("words", "pattern", "said"),
+    [
+        (
+            {"texts": ["film.exposure=" + ",".join("0" * 50_000)]},
+            None,
+            "50000 variants (1, 2, 3, ",
+        ),
+        ({"texts": ["film.exposure=1,2,1"]}, "{film.exposure}.png", "2 variants (1, 3); they are equal;"),
+        ({"texts": ["film.exposure=0:1:90000"]}, "{scene}.png", "put a field that tells them apart"),
+        ({"texts": ["seed=1,2"], "frames": "0:9"}, "{seed}.png", "the name of 10 variants"),
+        ({"texts": ["seed=1,2"]}, "{layer}.png", "the name of 2 variants"),
+    ],
+)
+def test_names_that_are_equal_by_their_pattern_are_told_without_reading_a_scene(
+    tmp_path, words, pattern, said
+):
+    with pytest.raises(InputError, match=re.escape(said)):
+        run(tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), Settings(pattern=pattern))
+
+
+def test_equal_values_that_go_with_others_are_variants(scene, tmp_path):
+    variants = variants_of(["film.exposure=0,0", "seed=1,2"], together=True)
+    done = run(scene, variants, Settings(pattern=str(tmp_path / "{seed}.png")))
+    assert len(done.outcomes) == 2
 
 
 @pytest.mark.parametrize("text", ["a", "=1", "a=1,,2", "a=0:1:3log", "a=0:1:0", "a=-1:1:4log"])
@@ -190,7 +252,7 @@ def test_faults_of_values_are_told_first_and_the_other_variants_are_done(illum, 
 def test_names_that_clash_are_told_before_anything_is_rendered(illum, scene, tmp_path):
     clash = illum("sweep", scene, "-D", "ambient=0.1,0.2", "-o", "same.png")
     assert clash.returncode == 2
-    assert "same.png: the name of 2 images" in clash.stderr
+    assert "same.png: the name of 2 variants" in clash.stderr
 
 
 def test_a_variant_that_fails_is_told_and_the_others_go_on(illum, scene, tmp_path):

@@ -12,13 +12,15 @@ def reporter(quiet: bool) -> Callable[[str, int, int], None]:
     every ten seconds."""
     start, last = time.monotonic(), time.monotonic()
     terminal = sys.stderr.isatty()
+    rewrite = getattr(sys.stderr, "obeyed", sys.stderr.write)
 
     def report(what: str, done: int, of: int) -> None:
         nonlocal start, last
         now = time.monotonic()
         if done >= of:
             if terminal:
-                print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+                rewrite("\r\x1b[K")
+                sys.stderr.flush()
             start = now
             return
         if now - last < (0.1 if terminal else 10):
@@ -26,9 +28,9 @@ def reporter(quiet: bool) -> Callable[[str, int, int], None]:
         last = now
         left = (now - start) * (of - done) / max(done, 1)
         text = f"{what}: {100 * done / of:.0f} %, {clock(left)} left"
-        print(
-            f"\r\x1b[K{text}" if terminal else text, end="" if terminal else "\n", file=sys.stderr, flush=True
-        )
+        if terminal:
+            rewrite("\r\x1b[K")
+        print(text, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
     return (lambda what, done, of: None) if quiet else report
 

@@ -6,14 +6,24 @@ import codecs
 import errno
 import io
 import os
+import re
 import sys
 from typing import TextIO
+
+_NOT_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""What terminals obey: control characters but tabs and line ends, and what turns the direction of writing."""
+
+
+def cleaned(text: str) -> str:
+    """`text` with every character that a terminal would obey written as `\\x1b`: names may hold any."""
+    return _NOT_TEXT.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 class StandardStream(io.TextIOWrapper):
     """A standard stream that is discarded from the first write on that the system refuses.
 
     `fault` is that refusal. A reader that left (`illum schema | head -1`) has what it wanted: that is none.
+    What it is given is text, whatever a file calls its parts; `obeyed` takes what a terminal is to obey.
     """
 
     def __init__(self, number: int, before: TextIO | None, errors: str) -> None:
@@ -29,12 +39,16 @@ class StandardStream(io.TextIOWrapper):
         self._is_discarded = False
 
     def write(self, text: str) -> int:
+        self.obeyed(cleaned(text))
+        return len(text)
+
+    def obeyed(self, text: str) -> None:
+        """Write `text` as it is."""
         if not self._is_discarded:
             try:
-                return super().write(text)
+                super().write(text)
             except OSError as error:
                 self._discard(error)
-        return len(text)
 
     def flush(self) -> None:
         if not self._is_discarded:

@@ -12,7 +12,10 @@ from typing import Any
 from illumcli.errors import InputError
 from illumcli.variants import suggestion
 
+LONGEST = 4096
+"""Letters of a path; no system takes more."""
 _FIELD = re.compile(r"\{\{|\}\}|\{(?P<name>[^{}:]*)(?::(?P<form>[^{}]*))?\}|[{}]")
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")
 
 
 def expand(pattern: str, values: Mapping[str, Any]) -> str:
@@ -27,9 +30,12 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
     ------
     InputError
         All that is wrong with the pattern: a lone brace, a field that is not among `values`, a form that does
-        not suit its value.
+        not suit its value or is wider than any name, a control character.
     """
     problems: list[str] = []
+    shown = pattern if len(pattern) <= 80 else f"{pattern[:80]}..."
+    if found := _CONTROL.search(pattern):
+        problems.append(f"{shown}: character U+{ord(found[0]):04X} is not text; take it out of the name")
 
     def value(field: re.Match[str]) -> str:
         if field[0] in ("{{", "}}"):
@@ -37,21 +43,30 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
         name = field["name"]
         if name is None:
             place = f"lone '{field[0]}' at character {field.start() + 1}"
-            problems.append(f"{pattern}: {place}; write '{field[0] * 2}' for a brace")
+            problems.append(f"{shown}: {place}; write '{field[0] * 2}' for a brace")
         elif name not in values:
-            problems.append(f"{pattern}: no field '{name}'; {suggestion(name, tuple(values))}")
+            problems.append(f"{shown}: no field '{name}'; {suggestion(name, tuple(values))}")
+        elif re.search(r"[1-9]\d{3}", form := field["form"] or ""):
+            problems.append(f"{shown}: '{form}' makes {name} longer than any name; use a form as 04d or .3f")
         else:
             try:
-                return _safe(format(values[name], field["form"] or ""))
+                return _safe(format(values[name], form))
             except (TypeError, ValueError):
-                fact = f"'{field['form']}' does not fit {name} = {values[name]!r}"
-                problems.append(f"{pattern}: {fact}; leave it out or use a form of its kind, as 04d or .3f")
+                fact = f"'{form}' does not fit {name} = {values[name]!r}"
+                problems.append(f"{shown}: {fact}; leave it out or use a form of its kind, as 04d or .3f")
         return ""
 
     name = _FIELD.sub(value, pattern)
+    if len(name) > LONGEST and not problems:
+        problems.append(f"{shown}: makes a name of {len(name)} letters; no system takes more than {LONGEST}")
     if problems:
         raise InputError(problems)
     return name
+
+
+def fields(pattern: str) -> set[str]:
+    """The names of the fields in `pattern`."""
+    return {found["name"] for found in _FIELD.finditer(pattern) if found["name"] is not None}
 
 
 def check_unique(names: Sequence[str]) -> None:

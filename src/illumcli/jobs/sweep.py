@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from illumcli.errors import IllumError, InputError
-from illumcli.files.names import check_unique
+from illumcli.errors import IllumError, InputError, LimitError
+from illumcli.files.names import check_unique, fields
 from illumcli.geometry.formula import parse as formula
 from illumcli.jobs.batch import Batch
 from illumcli.jobs.render import Progress, Report, Work, opened_store, prepared, rendered, unused_keys
@@ -25,9 +25,14 @@ from illumcli.jobs.sweep_files import Files, checked
 from illumcli.plan.artifacts import Memory
 from illumcli.records import Value
 from illumcli.scene.load import load
+from illumcli.scene.source import MAX_DEPTH, short
 
 MOST = 100_000
 """Variants of one sweep."""
+MOST_BYTES = 2**26
+"""Of a table of variants."""
+LAST_FRAME = 2**53
+"""Formulas of `frame` count in doubles."""
 
 
 class Axis(Value):
@@ -150,7 +155,9 @@ def _prepared(
     path: Path, sweep: Sweep, settings: Settings, batch: Batch, written: Callable[[Outcome], None]
 ) -> list[int]:
     """Plan every variant that has no fault; the indices of those that are due."""
-    pattern = settings.pattern or default_pattern([outcome.variant for outcome in sweep.outcomes])
+    variants = [outcome.variant for outcome in sweep.outcomes]
+    pattern = settings.pattern or default_pattern(variants)
+    refuse_equal_names(variants, pattern)
     due = []
     for index, outcome in enumerate(sweep.outcomes):
         with _noted(outcome, batch, written):
@@ -188,6 +195,30 @@ def default_pattern(variants: Sequence[Variant]) -> str:
     return "{scene}" + "".join(f"-{{{name}}}" for name in differ) + ".png"
 
 
+def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:
+    """Raise InputError where a pattern must give several variants one name; no scene is read for it.
+
+    A scene may still have equal names: those of values that are written differently, of cameras and layers.
+    """
+    named = fields(pattern)
+    if named & {"camera", "layer"} and any(
+        path.partition(".")[0] in ("camera", "cameras", "outputs") for path in variants[0].values
+    ):
+        return
+    same: dict[tuple[str | int | None, ...], list[int]] = {}
+    used = [path for path in variants[0].values if path in named]
+    for number, variant in enumerate(variants, 1):
+        values = [variant.values.get(path) for path in used]
+        same.setdefault((*values, variant.frame if "frame" in named else None), []).append(number)
+    for numbers in same.values():
+        if len(numbers) > 1:
+            listed = ", ".join(map(str, numbers[:5])) + (", ..." if len(numbers) > 5 else "")
+            way = "put a field that tells them apart into the pattern"
+            if variants[numbers[0] - 1] == variants[numbers[1] - 1]:
+                way = "they are equal; give each value once"
+            raise InputError(f"{pattern}: the name of {len(numbers)} variants ({listed}); {way}")
+
+
 # --- which variants -----------------------------------------------------------------------------------------
 
 
@@ -215,10 +246,12 @@ def variants_of(
     numbers = _frames(frames) if frames else None
     axes = [axis_of(text, numbers is not None) for text in texts]
     listed = _rows(rows) if rows else [{}]
-    grid = list(_together(axes) if together else _grid(axes))
-    count = len(listed) * len(grid) * len(numbers or (0,))
+    lengths = [len(axis.values) for axis in axes]
+    count = max(lengths, default=1) if together else math.prod(lengths)
+    count *= len(listed) * (1 if numbers is None else len(numbers))
     if count > MOST:
         raise InputError(f"{count} variants are more than {MOST}; sweep them in parts")
+    grid = list(_together(axes) if together else _grid(axes))
     found = []
     for row, own in itertools.product(listed, grid):
         values = {**row, **own}
@@ -251,9 +284,11 @@ _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)(log)?")
 
 def _range(text: str, span: re.Match[str]) -> tuple[str, ...]:
     """COUNT numbers from START to STOP, both included, with equal steps or, for `log`, equal ratios."""
+    if len(span[3]) > len(str(MOST)) or not 1 <= int(span[3]) <= MOST:
+        raise InputError(f"-D {short(text)}: the count must be from 1 to {MOST}")
     first, last, count = float(span[1]), float(span[2]), int(span[3])
-    if not 1 <= count <= MOST:
-        raise InputError(f"-D {text}: the count must be from 1 to {MOST}")
+    if not (math.isfinite(first) and math.isfinite(last)):
+        raise InputError(f"-D {short(text)}: both ends must be finite numbers")
     if span[4] and not (first > 0 and last > 0):
         raise InputError(f"-D {text}: a logarithmic range has both ends above 0")
     values = np.geomspace(first, last, count) if span[4] else np.linspace(first, last, count)
@@ -289,6 +324,8 @@ def at_frame(path: str, value: str, frame: int) -> str:
     inside = value.strip()
     if not re.search(r"\bframe\b", inside):
         return inside
+    if inside.startswith("[" * MAX_DEPTH):
+        raise InputError(f"-D {path}={short(value)}: nested deeper than {MAX_DEPTH} levels")
     if inside.startswith("[") and inside.endswith("]"):
         return f"[{', '.join(at_frame(path, part, frame) for part in split(inside[1:-1]))}]"
     try:
@@ -301,10 +338,15 @@ def at_frame(path: str, value: str, frame: int) -> str:
 
 
 def _frames(text: str) -> range:
-    span = re.fullmatch(r"(\d+):(\d+)(?::(\d+))?", text)
-    if not span or int(span[2]) < int(span[1]) or span[3] == "0":
-        raise InputError(f"--frames {text}: write FIRST:LAST or FIRST:LAST:STEP, as in 0:119")
-    return range(int(span[1]), int(span[2]) + 1, int(span[3] or 1))
+    span = re.fullmatch(r"(\d+):(\d+)(?::(\d+))?", text, re.ASCII)
+    if span and max(len(digits) for digits in span.groups("")) > len(str(LAST_FRAME)):
+        raise InputError(f"--frames {short(text)}: frames are counted up to {LAST_FRAME}")
+    first, last, step = (int(digits) for digits in span.groups("1")) if span else (0, -1, 1)
+    if last < first or step == 0:
+        raise InputError(f"--frames {short(text)}: write FIRST:LAST or FIRST:LAST:STEP, as in 0:119")
+    if last > LAST_FRAME:
+        raise InputError(f"--frames {text}: frames are counted up to {LAST_FRAME}")
+    return range(first, last + 1, step)
 
 
 def _grid(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
@@ -327,10 +369,14 @@ def _together(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
 def _rows(path: Path) -> list[dict[str, str]]:
     """The rows of a CSV of overrides."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        with path.open("rb") as file:
+            text = file.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise LimitError(f"{path}: larger than {MOST_BYTES} bytes; sweep its rows in parts")
+        cells = csv.reader(io.StringIO(text.decode("utf-8-sig"), newline=""))
+        lines = [line for line in cells if any(cell.strip() for cell in line)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    lines = [line for line in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in line)]
     if len(lines) < 2:
         raise InputError(f"{path}: has no rows; write the paths in its first line and values below")
     head = [cell.strip() for cell in lines[0]]

@@ -463,3 +463,33 @@ def test_a_glb_brings_the_images_within(tmp_path, picture, print_, image):
         (what,) = repairs
         assert what.startswith("textures that cannot be used left out (assets/sheet.glb: images[0]: cannot")
         assert repairs[what].first == "assets/sheet.glb: materials[0]"
+
+
+TEXTURED_PLY = """ply
+format ascii 1.0
+comment TextureFile print.png
+element vertex 4
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+property list uchar float texcoord
+end_header
+-1 0 1
+1 0 1
+1 0 -1
+-1 0 -1
+4 0 1 2 3 8 0 0 1 0 1 1 0 1
+"""
+
+
+def test_a_ply_brings_the_images_that_its_header_names(scene, tmp_path, picture, print_):
+    (tmp_path / "sheet.ply").write_text(TEXTURED_PLY)
+    said, _ = picture(scene("{model: lambert, diffuse: {texture: print.png}}", "sheet.ply"))
+    path = scene("{model: lambert}", "{file: sheet.ply, materials: true}")
+    path.write_text(path.read_text().replace(", material: printed", ""))
+    brought, repairs = picture(path)
+    np.testing.assert_array_equal(brought["beauty"], said["beauty"])
+    assert said["beauty"].std() > 0.05
+    assert repairs == {}

@@ -112,13 +112,69 @@ def copies_of_a_vertex_bake_alike(case: Case, random: Random, studio: Studio) ->
         "objects": [{"mesh": "globe.ply", "name": "globe", "transform": {"translate": [0, 1.2, 0]}}, other]
     }
     case.scene |= {"materials": {}, "meshes": {}}
-    path = case.write(studio.folder())
-    ao_bake.run(path, [path.with_suffix(".npz")], ao_bake.Settings(samples=512, sampler="random"), threads=1)
-    w = read_npz(path.with_suffix(".npz")).obscurance[: len(surface.vertices)].astype(np.float64)
+    w = baked(case, studio, ao_bake.Settings(samples=512, sampler="random"))[0]
+    w = w[: len(surface.vertices)].astype(np.float64)
     for place in np.unique(surface.vertices, axis=0):
         own = w[(surface.vertices == place).all(axis=1)]
         spread = math.sqrt(2 * max(own.mean() * (1 - own.mean()), 2 / 512) / 512)
         z = float(np.ptp(own)) / spread
         assert z < 6, (
             f"copies of the vertex at {place.tolist()} have w from {own.min():.4f} to {own.max():.4f}"
+        )
+
+
+def two_objects(case: Case, random: Random, file: str) -> Case:
+    """A case of one mesh of that file, still to be made, and another object."""
+    case = case.copy()
+    case.meshes.clear()
+    thing = {"mesh": file, "name": "receiver", "transform": scenes.transform(random)}
+    other = {"mesh": scenes.shape(random), "name": "other", "transform": scenes.transform(random)}
+    case.scene |= {"objects": [thing, other], "materials": {}, "meshes": {}}
+    return case
+
+
+def baked(case: Case, studio: Studio, settings: ao_bake.Settings, threads: int = 1) -> NDArray[np.float32]:
+    """(2, V) w and its stated error at all vertices of a case."""
+    path = case.write(studio.folder())
+    ao_bake.run(path, [path.with_suffix(".npz")], settings, threads=threads)
+    made = read_npz(path.with_suffix(".npz"))
+    return np.stack([made.obscurance, made.standard_error])
+
+
+@relation("exact")
+def a_bake_knows_neither_units_nor_threads(case: Case, random: Random, studio: Studio) -> None:
+    """Everything 2^k times as large, on any number of threads, bakes to the same values and errors."""
+    scale = 2.0 ** random.choice([-20, -3, 1, 20])
+    case = two_objects(case, random, "receiver.obj")
+    case.meshes["receiver.obj"] = random.choice(surfaces.SURFACES)(random)
+    larger = case.copy()
+    for thing in larger.scene["objects"]:
+        grow = np.diag([scale, scale, scale, 1.0])
+        thing["transform"]["matrix"] = (grow @ np.array(thing["transform"].get("matrix", np.eye(4)))).tolist()
+    falloff = random.choice([{"falloff": "step"}, {"falloff": "linear", "max_distance": 1.5}])
+    grown = {key: value * scale if key == "max_distance" else value for key, value in falloff.items()}
+    a = baked(case, studio, ao_bake.Settings(samples=32, falloff=falloff))
+    b = baked(larger, studio, ao_bake.Settings(samples=32, falloff=grown), threads=random.randint(1, 3))
+    differ = (a != b).any(axis=0)
+    assert not differ.any(), (
+        f"{int(differ.sum())} of {differ.size} vertices differ: {a[:, differ]} {b[:, differ]}"
+    )
+
+
+@relation("exact")
+def every_format_bakes_the_same(case: Case, random: Random, studio: Studio) -> None:
+    """The same triangles bake to the same values from every format that keeps the order of its vertices."""
+    surface = random.choice(surfaces.SURFACES)(random).triangles()
+    kinds, made = ("ply", "bin.ply", "gltf", "glb"), []
+    base = two_objects(case, random, "")
+    for kind in kinds:
+        own = base.copy()
+        own.meshes[f"same.{kind}"] = surface
+        own.scene["objects"][0]["mesh"] = f"same.{kind}"
+        made.append(baked(own, studio, ao_bake.Settings(samples=32)))
+    for kind, values in zip(kinds, made, strict=True):
+        assert values.shape == made[0].shape, f"{kind}: {values.shape} against {made[0].shape}"
+        differ = (values != made[0]).any(axis=0)
+        assert not differ.any(), (
+            f"{kind}: {int(differ.sum())} of {differ.size} vertices differ from those of PLY"
         )

@@ -202,7 +202,7 @@ def an_override_is_an_edit(case: Case, random: Random, studio: Studio) -> None:
     same(pictures(path, overrides, layers), studio(edited, layers))
 
 
-CHOICES = ("model", "shape", "falloff", "law", "file", "texture", "vertex")
+CHOICES = ("model", "shape", "falloff", "law", "D", "F", "file", "texture", "vertex")
 """Keys that say what a mapping is: over another one it replaces it."""
 
 
@@ -267,6 +267,24 @@ def a_sweep_is_as_many_renders(case: Case, random: Random, studio: Studio) -> No
         alone = folder / f"alone{variant.frame}.exr"
         render.run(path, variant.overrides, str(alone), layers, threads=1, cache=False)
         same(file_pictures(outcome.paths[0]), file_pictures(alone))
+
+
+@relation("exact")
+def a_file_holds_what_is_made(case: Case, random: Random, studio: Studio) -> None:
+    """The channels of an EXR file are the layers. Premises: one camera, single precision; no background,
+    which the file adds to the beauty."""
+    case = one_camera(case)
+    case.scene["outputs"] = {"colour": "float"}
+    case.scene["film"].pop("background", None)
+    folder = studio.folder()
+    path = case.write(folder)
+    layers = (*ALL, "triangle_id", *light_layers(case))
+    render.run(path, (), str(folder / "file.exr"), layers, threads=1, cache=False)
+    channels = [values.astype(np.float32) for values in read_image(folder / "file.exr").channels.values()]
+    made = [np.moveaxis(values, -1, 0) for values in pictures(path, layers=layers).values()]
+    told = sorted(values.tobytes() for values in channels)
+    known = sorted(plane.astype(np.float32).tobytes() for values in made for plane in values)
+    assert told == known, f"{len(set(known) - set(told))} of {len(known)} planes are not in the file"
 
 
 def file_pictures(path: Path) -> Pictures:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-SCENE = "version: 1\nfilm: {width: 8, height: 6, samples: 1}\nobjects: [{mesh: {shape: sphere}}]\n"
+SCENE = (
+    "version: 1\nfilm: {width: 8, height: 6, samples: 1}\nobjects: [{mesh: {shape: sphere}}]\nambient: 1\n"
+)
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0.2\nv 0.4 0.3 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from illumcli.frame import Frame
-from illumcli.rays.camera import MARGIN, axes, camera_rays, film_points, framing
+from illumcli.rays.camera import CLOSEST, MARGIN, axes, camera_rays, film_points, framing
 from illumcli.scene.spec import Filter, Orthographic, Perspective
 
 UNIT = Frame((0.0, 0.0, 0.0), 1.0)
@@ -100,7 +100,11 @@ def test_framed_points_are_inside_and_fill_the_picture(
     made = framing(camera, aspect, points)
     places, depth = in_picture(made, aspect, points)
     assert (depth > 0).all()
-    assert np.abs(places).max() == pytest.approx(1 - MARGIN, rel=1e-6)
+    radius = np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max()
+    if (
+        depth.min() > 1.001 * CLOSEST * radius
+    ):  # else the eye stands right before a point, as before a needle's tip
+        assert np.abs(places).max() == pytest.approx(1 - MARGIN, rel=1e-6)
     assert np.abs(places.min(axis=1) + places.max(axis=1)).max() < 1e-6  # as far to either side
     np.testing.assert_allclose(axes(made)[2], axes(camera)[2], atol=1e-9)
     assert made.fit is None

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Lanes, Vectors, columns
 from illumcli.frame import Frame
 
+PARALLEL = 1e-9
+"""Sine of the angle below which `up` is taken to point along the line of sight."""
+
 
 def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors right, up and forward, (3,) each; `up` along the line of sight is replaced."""
@@ -18,8 +21,9 @@ def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     forward /= np.linalg.norm(forward)
     up = np.asarray(camera.up, np.float64) / np.abs(camera.up).max()
     right = np.cross(forward, up / np.linalg.norm(up))
-    if np.linalg.norm(right) < 1e-9:
-        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
+    if np.linalg.norm(right) < PARALLEL:
+        # rounded, so that a camera moved along its line of sight keeps its axes
+        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward).round(9))])
     right /= np.linalg.norm(right)
     return right, np.cross(right, forward), forward
 

@@ -514,6 +514,18 @@ def test_a_picture_reads_the_values_of_corners(hard_cube, text_mesh, tmp_path):
     np.testing.assert_allclose(w, 1, atol=1e-6)  # the top, whose vertices have 0.7 in the mean
 
 
+def test_flat_normals_of_faces_that_are_turned_round_point_outwards(hard_cube, text_mesh, tmp_path):
+    lines = hard_cube.read_text().split("\n")
+    turned = ["f " + " ".join(reversed(line.split()[1:])) if line.startswith("f") else line for line in lines]
+    text_mesh("\n".join(turned[:-1]), "turned.obj")  # without the floor
+    objects = "objects: [{mesh: {file: turned.obj}}]\n"
+    scene = text_mesh("version: 1\nobscurance: {about: geometric}\n" + objects, "turned.yaml")
+    bake(scene, tmp_path / "out.npz", bent_normal=True)
+    baked, mesh = read_npz(tmp_path / "out.npz"), read_mesh(tmp_path / "turned.obj")
+    assert (baked.obscurance == 1).all()
+    np.testing.assert_allclose(baked.corner_bent_normal, mesh.normals[mesh.corner_normals], atol=1e-6)
+
+
 def test_a_mesh_that_is_turned_inside_out_is_told(text_mesh, tmp_path):
     _, report = bake(text_mesh(CUBE), tmp_path / "right.npz")
     assert report.warnings == []

@@ -131,6 +131,7 @@ def corner_normals(
     crease: float | None = None,
     use_file: bool = True,
     polygon_method: PolygonMethod = "newell",
+    turned: NDArray[np.bool_] | None = None,
 ) -> CornerNormals:
     """The normal of every corner: the file's own where it has one, or the mean of the polygons at the vertex.
 
@@ -147,6 +148,8 @@ def corner_normals(
         Take the file's normals. Those that are zero or not finite are computed instead, and counted.
     polygon_method : {"newell", "cross", "edge_average", "plane"}
         How the polygons' own normals are made.
+    turned : (P,) bool, optional
+        Polygons that are seen from their other side, where the file's normals are not taken.
 
     Returns
     -------
@@ -155,7 +158,7 @@ def corner_normals(
         counted.
     """
     if not use_file or mesh.normals is None or mesh.corner_normals is None:
-        return _computed(mesh, weights, crease, polygon_method)
+        return _computed(mesh, weights, crease, polygon_method, turned)
     own, good = _file_normals(mesh.normals)
     named = mesh.corner_normals >= 0
     kept = named & good[mesh.corner_normals]

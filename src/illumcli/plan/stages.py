@@ -258,13 +258,13 @@ def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World)
     """
     from illumcli.geometry.normals import corner_normals as of_mesh
 
-    known: dict[tuple[int, str], Any] = {}
+    known: dict[tuple[int, str, bool], Any] = {}
     own = []
-    for mesh, said in zip(meshes, how, strict=True):
-        key = (id(mesh), repr(said))
+    for mesh, said, placed in zip(meshes, how, world.placed, strict=True):
+        key = (id(mesh), repr(said), placed.reversed is None)
         if key not in known:
             if said == "flat":
-                known[key] = of_mesh(mesh, crease=0.0, use_file=False)
+                known[key] = of_mesh(mesh, crease=0.0, use_file=False, turned=placed.reversed)
             elif said is not None:
                 known[key] = of_mesh(mesh, said.weights, said.crease, said.source == "file", said.polygon)
             else:

@@ -7,9 +7,11 @@ A rename is atomic; the two fsyncs keep a crash of the machine from leaving an e
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import os
 import re
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -131,6 +133,12 @@ def refused(place: str, error: OSError) -> OutputError:
     return OutputError(f"{place}: cannot be written: {error.strerror or error}; {way}")
 
 
+def is_full(error: OutputError) -> bool:
+    """Was there no space left for what could not be written?"""
+    cause = error.__cause__
+    return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 @contextmanager
 def refusals(place: str) -> Iterator[None]:
     """What the operating system refuses within is an OutputError about `place`."""
@@ -138,6 +146,55 @@ def refusals(place: str) -> Iterator[None]:
         yield
     except OSError as error:
         raise refused(place, error) from error
+
+
+def claim(path: Path, create: bool = True) -> int | None:
+    """A descriptor for reading and writing of a file that is this process's until it closes it.
+
+    The file is locked, and no name is followed. None where the name is a link or no plain file, where the
+    file has another name, another owner or others who may write it, and where it is held already.
+
+    Raises
+    ------
+    OSError
+        The file cannot be opened for another reason.
+    """
+    flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | (os.O_CREAT if create else 0)
+    while True:
+        try:
+            handle = os.open(path, flags, 0o600)
+        except OSError as error:
+            if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
+                return None
+            raise
+        held = False
+        try:
+            about = os.fstat(handle)
+            own = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink < 2
+            if not own or not _lock(handle):
+                return None
+            about = os.fstat(handle)
+            if about.st_nlink == 0:  # removed before it was locked
+                if not create:
+                    return None
+                continue
+            if about.st_mode & 0o022:
+                os.unlink(path)
+                return None
+            held = True
+            return handle
+        finally:
+            if not held:
+                os.close(handle)
+
+
+def _lock(handle: int) -> bool:
+    """Lock an open file until it is closed; False where another holds it, or the file system has no locks."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _force(path: Path) -> None:

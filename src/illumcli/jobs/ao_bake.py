@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from numpy.typing import NDArray
 from illumcli import __version__
 from illumcli.arrays import F, columns, cross, rows, unit
 from illumcli.demand import order
-from illumcli.errors import InputError
-from illumcli.files.atomic import beside
+from illumcli.errors import InputError, OutputError
+from illumcli.files.atomic import is_full
+from illumcli.files.journal import Journal, place, tidy
 from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.vertex_data import (
     SUFFIXES,
@@ -32,13 +34,14 @@ from illumcli.files.vertex_data import (
 )
 from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.repairs import Repairs
-from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders, PartFile
+from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders
 from illumcli.jobs.ao_bake_points import Surfaces, Vertices, vertex_points
 from illumcli.jobs.ao_bake_shapes import shapes_of
 from illumcli.jobs.ao_bake_values import baked_values
 from illumcli.jobs.render import peak_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs_data
 from illumcli.plan import stages
+from illumcli.plan.keys import code, digest
 from illumcli.plan.recipes import recipes
 from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
@@ -102,6 +105,7 @@ class Report:
     rmse: float = 0.0  # root mean square error over all vertices
     target_error: float | None = None
     rays: dict[str, int] = field(default_factory=dict)
+    resumed: int = 0  # of these, those that an earlier run cast
     samples: dict[int, int] = field(default_factory=dict)  # rays a point -> points
     repairs: Repairs = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
@@ -201,30 +205,47 @@ def baked(
         refresh(Path(each))
     clock.lap(report, "read")
     if due:
-        part = beside(due[0], "unfinished")
-        values = bake(scene, work.surfaces, settings, threads, progress, report, part, clock)
-        names = scene.object_names()
-        about = {
-            "content": work.content,
-            "version": __version__,
-            "input": work.path.name,
-            "meshes": dict(zip(names, work.hashes, strict=True)),
-            "vertices": {
-                name: len(placed.mesh.vertices) for name, placed in zip(names, world.placed, strict=True)
-            },
-            "corners": {
-                name: len(placed.mesh.corners) for name, placed in zip(names, world.placed, strict=True)
-            },
-            "parameters": parameters(settings),
-            "seed": settings.seed,
-            "rmse": report.rmse,
-            "rays": sum(report.rays.values()),
-        }
-        write(work.path, due, scene, world, replace(values, about=about), settings, report)
-        part.unlink(missing_ok=True)
+        # a journal is of one computation, on processors with the same instructions
+        journal = Journal(place(work.outputs[0], work.content), digest((work.content, code())))
+        try:
+            values = bake(scene, work.surfaces, settings, threads, progress, report, journal, clock)
+            if journal.refusal is not None:
+                report.warnings.append(
+                    f"finished pieces are not kept beside {work.outputs[0]} for a next run: {journal.refusal}"
+                )
+            values = replace(values, about=_about(work, settings, report))
+            write_all = partial(write, work.path, due, scene, world, values, settings, report)
+            try:
+                write_all()
+            except OutputError as error:
+                if not is_full(error):
+                    raise
+                journal.remove()  # the journal fills the disk, too, and the values are at hand
+                write_all()
+            journal.remove()
+        finally:
+            journal.close()
         clock.lap(report, "write")
+    tidy(work.outputs[0])
     report.written = [str(each) for each in due]
     return list(work.outputs), report
+
+
+def _about(work: Work, settings: Settings, report: Report) -> dict[str, Any]:
+    """What the files of a bake say of themselves."""
+    names, placed = work.scene.object_names(), work.surfaces.world.placed
+    return {
+        "content": work.content,
+        "version": __version__,
+        "input": work.path.name,
+        "meshes": dict(zip(names, work.hashes, strict=True)),
+        "vertices": {name: len(each.mesh.vertices) for name, each in zip(names, placed, strict=True)},
+        "corners": {name: len(each.mesh.corners) for name, each in zip(names, placed, strict=True)},
+        "parameters": parameters(settings),
+        "seed": settings.seed,
+        "rmse": report.rmse,
+        "rays": sum(report.rays.values()),
+    }
 
 
 def surfaces_of(scene: Scene, loaded: Loaded) -> tuple[Surfaces, Repairs]:
@@ -283,7 +304,7 @@ def bake(
     threads: int,
     progress: Progress,
     report: Report,
-    part: Path,
+    journal: Journal,
     clock: _Clock,
 ) -> Baked:
     """Obscurance of every vertex of the world."""
@@ -318,8 +339,8 @@ def bake(
     else:
         samples = caster.samples_for(lanes, share, settings.target_error)
         clock.lap(report, "pilot")
-    kept = PartFile(part, report.content, len(is_open), settings.bent_normal)
-    found = caster.cast("values", lanes, samples, 0, settings.bent_normal, kept)
+    found = caster.cast("values", lanes, samples, 0, settings.bent_normal, journal)
+    report.resumed = caster.resumed
     clock.lap(report, "cast")
     errors = caster.errors(lanes, samples, 1 << 20)
     clock.lap(report, "errors")

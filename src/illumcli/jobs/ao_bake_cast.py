@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+import struct
 import threading
-import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, columns, cross, dot, rows
-from illumcli.files.atomic import refused
+from illumcli.files.journal import Journal
 from illumcli.geometry.order import compact
 from illumcli.jobs.ao_bake_points import Points
 from illumcli.rays.sampling import hashed, stream, unit_interval
@@ -74,6 +73,8 @@ class Caster:
     threads: int
     progress: Progress
     rays: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    resumed: int = 0
+    """Of the rays, those that an earlier run cast."""
     order: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -110,7 +111,7 @@ class Caster:
         samples: NDArray[np.int64],
         replicate: int,
         bent: bool = False,
-        kept: PartFile | None = None,
+        journal: Journal | None = None,
     ) -> Cast:
         """Estimates at some lanes with their own number of rays each.
 
@@ -135,17 +136,22 @@ class Caster:
             method = replace(self.method, samples=piece.samples, facets=around.facets)
             return estimates(tracer, over, draws[:2], method, bent=bent), tracer.rays
 
-        done = kept.read(pieces, out) if kept is not None else set()
-        waiting = [piece for number, piece in enumerate(pieces) if number not in done]
-        numbers = [number for number in range(len(pieces)) if number not in done]
-        for at, (found, rays) in self._run(purpose, waiting, ask):
-            piece = waiting[at]
+        waiting = []
+        for piece in pieces:
+            rays = None if journal is None else _kept(journal, piece, out)
+            if rays is None:
+                waiting.append(piece)
+            else:
+                self.rays[purpose] += rays
+                self.resumed += rays
+        for number, (found, rays) in self._run(purpose, waiting, ask):
+            piece = waiting[number]
             out.w[piece.lanes], out.unevenness[piece.lanes] = found.w, found.unevenness
             if out.bent is not None and found.bent is not None:
                 out.bent[piece.lanes] = found.bent
             self.rays[purpose] += rays
-            if kept is not None:
-                kept.write(numbers[at], piece, out)
+            if journal is not None:
+                _keep(journal, piece, out, rays)
         return Cast(out.w[lanes], out.unevenness[lanes], None if out.bent is None else out.bent[lanes])
 
     def errors(self, lanes: NDArray[np.int64], samples: NDArray[np.int64], replicate: int) -> Errors:
@@ -268,65 +274,28 @@ def _steps(samples: NDArray[np.float64]) -> NDArray[np.int64]:
     )
 
 
-class PartFile:
-    """Finished pieces of a bake in a file, for the run that takes it up again.
-
-    A header names the content that is baked; each piece is known to be whole by its checksum. The file stays
-    when a run is interrupted and goes when it is done.
-    """
-
-    def __init__(self, path: Path, content: str, points: int, bent: bool) -> None:
-        self.path = path
-        self._header = content.encode().ljust(64, b"\0")
-        self._width = 5 if bent else 2
-        self._points = points
-        self._sums: NDArray[np.uint32] | None = None
-        self._values: NDArray[np.float32] | None = None
-
-    def read(self, pieces: Sequence[Piece], out: Cast) -> set[int]:
-        """Open the file and copy what it has of these pieces to `out`; their numbers."""
-        size = 64 + 4 * len(pieces) + 4 * self._width * self._points
-        try:
-            old = self.path.exists() and self.path.stat().st_size == size
-            if old:
-                with self.path.open("rb") as file:
-                    old = file.read(64) == self._header
-            if not old:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                with self.path.open("wb") as file:
-                    file.write(self._header)
-                    file.truncate(size)
-            data = np.memmap(self.path, np.uint8, "r+", shape=(size,))
-        except OSError as error:
-            raise refused(str(self.path), error) from error
-        self._sums = data[64 : 64 + 4 * len(pieces)].view(np.uint32)
-        self._values = data[64 + 4 * len(pieces) :].view(F).reshape(self._points, self._width)
-        done = set()
-        for number, piece in enumerate(pieces):
-            rows = self._values[piece.lanes] if self._sums[number] else None
-            if rows is not None and _checksum(rows) == self._sums[number]:
-                out.w[piece.lanes], out.unevenness[piece.lanes] = rows[:, 0], rows[:, 1]
-                if out.bent is not None:
-                    out.bent[piece.lanes] = rows[:, 2:]
-                done.add(number)
-        return done
-
-    def write(self, number: int, piece: Piece, out: Cast) -> None:
-        """Keep a finished piece."""
-        assert self._values is not None
-        assert self._sums is not None
-        parts = [out.w[piece.lanes, None], out.unevenness[piece.lanes, None]]
-        rows = np.concatenate(parts if out.bent is None else [*parts, out.bent[piece.lanes]], axis=1)
-        self._values[piece.lanes] = rows
-        self._sums[number] = _checksum(rows)
-
-    def remove(self) -> None:
-        """The bake is done."""
-        self._sums = self._values = None
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
+def _key(piece: Piece) -> bytes:
+    """16 bytes that tell a piece from every other of its bake."""
+    digest = hashlib.blake2b(struct.pack("<qq", piece.samples, piece.thing), digest_size=16)
+    digest.update(np.ascontiguousarray(piece.lanes).data)
+    return digest.digest()
 
 
-def _checksum(rows: NDArray[np.float32]) -> int:
-    """CRC-32, never 0, which stands for a piece that is not there."""
-    return zlib.crc32(np.ascontiguousarray(rows).data) or 1
+def _kept(journal: Journal, piece: Piece, out: Cast) -> int | None:
+    """Copy what the journal has of a piece to `out`; the rays it took, None where it has nothing."""
+    width = 2 if out.bent is None else 5
+    found = journal.find(_key(piece))
+    if found is None or len(found) != 8 + 4 * width * len(piece.lanes):
+        return None
+    rows = np.frombuffer(found, F, offset=8).reshape(-1, width)
+    out.w[piece.lanes], out.unevenness[piece.lanes] = rows[:, 0], rows[:, 1]
+    if out.bent is not None:
+        out.bent[piece.lanes] = rows[:, 2:]
+    return int.from_bytes(found[:8], "little")
+
+
+def _keep(journal: Journal, piece: Piece, out: Cast, rays: int) -> None:
+    """Add a finished piece to the journal."""
+    parts = [out.w[piece.lanes, None], out.unevenness[piece.lanes, None]]
+    rows = np.concatenate(parts if out.bent is None else [*parts, out.bent[piece.lanes]], axis=1)
+    journal.append(_key(piece), rays.to_bytes(8, "little") + np.ascontiguousarray(rows).tobytes())

@@ -8,6 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# no test asserts a time: a machine may be slow
+settings.register_profile("any machine", settings.default, deadline=None)
+settings.load_profile("any machine")
 
 ROOT = Path(__file__).parents[1]
 MESHES = ROOT.parent / "shared" / "meshes"

@@ -103,3 +103,16 @@ def test_names_from_files_move_no_terminal(folder):
         assert "Traceback" not in said, said
         assert code in (0, 2), said
         assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", out + said), (words, out, said)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8", "utf-8:strict"])
+def test_paths_of_any_bytes_are_printed(folder, encoding):
+    names = [b"\xff.yaml", "é漢.yaml".encode()]
+    for name in names:
+        (folder / os.fsdecode(name)).write_text(SCENE)
+    command = [sys.executable, "-m", "illumcli", "check", *names]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    second = b"\xe9\\u6f22.yaml" if encoding == "latin-1" else names[1]
+    assert done.stdout == b"\xff.yaml: ok\n" + second + b": ok\n"

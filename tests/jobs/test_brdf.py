@@ -134,7 +134,7 @@ def test_what_a_model_needs_is_said():
 
 def test_the_table_holds_the_slices_to_the_last_digit(tmp_path):
     path = tmp_path / "slices.csv"
-    assert run(["lambert", "phong"], table=path, angles=(20.0, 60.0)) == [path]
+    assert run(["lambert", "phong"], table=path, angles=(20.0, 60.0)) == ([path], [])
     with path.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["model", "incidence", "view", "f.R", "f.G", "f.B"]
@@ -160,7 +160,7 @@ def test_an_svg_holds_every_view(tmp_path):
     assert text.startswith("<?xml")
     assert text.count("<image") == 2  # sphere and plane
     first = path.read_bytes()
-    assert run(["blinn_phong"], output=path, chosen=VIEWS) == [path]
+    assert run(["blinn_phong"], output=path, chosen=VIEWS) == ([path], [path])
     assert path.read_bytes() == first
 
 

@@ -32,7 +32,7 @@ class StandardStream(io.TextIOWrapper):
             io.BufferedWriter(io.FileIO(number, "w", closefd=False)),
             # names of files may hold any character
             encoding="utf-8" if codecs.lookup(encoding).name == "ascii" else encoding,
-            errors=getattr(before, "errors", None) or errors,
+            errors=errors,
             line_buffering=getattr(before, "line_buffering", False),
         )
         self.fault: OSError | None = None
@@ -62,6 +62,14 @@ class StandardStream(io.TextIOWrapper):
         self.fault = None if error.errno == errno.EPIPE else error
 
 
+def _as_bytes(error: UnicodeError) -> tuple[bytes, int]:
+    """What an encoding lacks: bytes of paths as they are, characters as `\\xNN`."""
+    assert isinstance(error, UnicodeEncodeError)
+    lacking = error.object[error.start : error.end]
+    paths = ("surrogateescape" if "\udc80" <= c <= "\udcff" else "backslashreplace" for c in lacking)
+    return b"".join(c.encode("ascii", how) for c, how in zip(lacking, paths, strict=True)), error.end
+
+
 def open_standard_streams() -> StandardStream:
     """Make stdin, stdout and stderr usable whatever they are; stdout."""
     # a closed one is the null device: else the next file to be opened takes its number, and what libraries
@@ -71,6 +79,7 @@ def open_standard_streams() -> StandardStream:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
-    sys.stdout = output = StandardStream(1, sys.stdout, "strict")
+    codecs.register_error("illum.path", _as_bytes)
+    sys.stdout = output = StandardStream(1, sys.stdout, "illum.path")
     sys.stderr = StandardStream(2, sys.stderr, "backslashreplace")
     return output

@@ -73,5 +73,8 @@ def brdf(
     if output is None and table is None:
         output = Path("brdf.png")
     views = VIEWS if "all" in chosen else [view for view in VIEWS if view in chosen]
-    for path in run(models, overrides, output, table, views, angles, log, times_cos, force):
+    paths, kept = run(models, overrides, output, table, views, angles, log, times_cos, force)
+    for path in paths:
         click.echo(path)
+    for path in kept:
+        click.echo(f"{path}: kept, its content is the same", err=True)

@@ -7,7 +7,6 @@ told to be the same without making it anew.
 
 from __future__ import annotations
 
-import csv
 import errno
 import json
 import os
@@ -51,7 +50,7 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
                 raise OutputError(
                     f"{path}: a different file is there; use --force to replace it, or another name"
                 )
-        _refuse_unwritable(Path(os.path.realpath(path)), str(path))
+    refuse_unwritable(path)
     return False
 
 
@@ -66,6 +65,8 @@ def stored_contents(path: Path) -> list[str]:
     try:
         match path.suffix.lower():
             case ".csv":
+                import csv  # what a render without a table need not wait for
+
                 with path.open(newline="", encoding="utf-8") as file:
                     return [row["content"] for row in csv.DictReader(file)]
             case ".json":
@@ -82,22 +83,24 @@ def stored_contents(path: Path) -> list[str]:
 
                 content = read_content(path)
                 return [] if content is None else [content]
-    except (InputError, KeyError, TypeError, ValueError, csv.Error):
+    except (InputError, KeyError, TypeError, ValueError):
         return []
 
 
-def _refuse_unwritable(target: Path, named: str) -> None:
-    """Raise what the operating system will have against writing `target`."""
-    if os.path.lexists(target) and not target.is_file():
-        raise OutputError(f"{named}: is a folder or a device; give the name of a file")
-    folder, names = target.parent, [target.name]
-    while not folder.exists():
-        names.append(folder.name)
-        folder = folder.parent
-    if not folder.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-    if max(len(os.fsencode(name)) for name in names) > os.pathconf(folder, "PC_NAME_MAX"):
-        raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
-    if not os.access(folder, os.W_OK | os.X_OK):
-        number = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.EACCES
-        raise OSError(number, os.strerror(number))
+def refuse_unwritable(path: Path) -> None:
+    """Raise OutputError where the operating system will not have `path` written; nothing is made."""
+    with refusals(str(path)):
+        target = Path(os.path.realpath(path))
+        if os.path.lexists(target) and not target.is_file():
+            raise OutputError(f"{path}: is a folder or a device; give the name of a file")
+        folder, names = target.parent, [target.name]
+        while not folder.exists():
+            names.append(folder.name)
+            folder = folder.parent
+        if not folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if max(len(os.fsencode(name)) for name in names) > os.pathconf(folder, "PC_NAME_MAX"):
+            raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+        if not os.access(folder, os.W_OK | os.X_OK):
+            number = errno.EROFS if os.statvfs(folder).f_flag & os.ST_RDONLY else errno.EACCES
+            raise OSError(number, os.strerror(number))

@@ -12,7 +12,7 @@ from pydantic_core import ValidationError
 
 from illumcli.description import Description
 from illumcli.errors import InputError, OutputError
-from illumcli.files.outputs import refresh, refuse_suffix
+from illumcli.files.outputs import refresh, refuse_suffix, refuse_unwritable
 from illumcli.jobs.brdf import views
 from illumcli.models._base import IlluminationModel
 from illumcli.scene.faults import faults
@@ -34,8 +34,8 @@ def run(
     log: bool = False,
     times_cos: bool = False,
     force: bool = False,
-) -> list[Path]:
-    """Draw the models `names` side by side; the paths written.
+) -> tuple[list[Path], list[Path]]:
+    """Draw the models `names` side by side; the paths written, and those of them that are kept.
 
     Parameters
     ----------
@@ -59,6 +59,9 @@ def run(
         refuse_suffix(output, "a picture of BRDFs", ".png", ".svg")
     if table is not None:
         refuse_suffix(table, "a table", ".csv")
+    for path in (table, output):
+        if path is not None:
+            refuse_unwritable(path)
     models = described(names, overrides)
     files: dict[Path, bytes] = {}
     if table is not None:
@@ -68,8 +71,7 @@ def run(
 
         kind = output.suffix.lower().removeprefix(".")
         files[output] = drawn(models, chosen, angles, log, times_cos, kind)
-    _write(files, force)
-    return list(files)
+    return list(files), _write(files, force)
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
@@ -160,8 +162,8 @@ def slices_table(models: Mapping[str, IlluminationModel], angles: Sequence[float
     return out.getvalue()
 
 
-def _write(files: Mapping[Path, bytes], force: bool) -> None:
-    """Write the files; one that holds the same bytes is kept."""
+def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
+    """Write the files but those that hold the same bytes already; these."""
     from illumcli.files.atomic import refusals, write_bytes
 
     kept = []
@@ -177,3 +179,4 @@ def _write(files: Mapping[Path, bytes], force: bool) -> None:
             refresh(path)
         else:
             write_bytes(path, data)
+    return kept

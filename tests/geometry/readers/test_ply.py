@@ -400,9 +400,9 @@ def test_a_list_of_another_name_may_hold_the_corners(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "value"), [("uchar", 188), ("int", 188), ("ushort", 188), ("ushort", 48316)]
+    ("kind", "value"), [("uchar", 188), ("int", 188), ("ushort", 188), ("ushort", 48316), ("float", 188)]
 )
-def test_colours_of_wide_integers_may_be_bytes(tmp_path: Path, kind: str, value: int) -> None:
+def test_colours_of_wide_types_may_be_bytes(tmp_path: Path, kind: str, value: int) -> None:
     more = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
     rows = "".join(f"{place} {value} 0 0\n" for place in ("0 0 0", "1 0 0", "0 1 0"))
     color = mesh_of(tmp_path, head(vertices=3, more=more) + rows + "3 0 1 2\n").attributes["color"]

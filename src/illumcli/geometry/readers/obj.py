@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import _mtl
-from illumcli.geometry.readers._color import linear
+from illumcli.geometry.readers._color import linear, unit_range
 from illumcli.geometry.readers._files import TAKEN, content, nearby
 from illumcli.geometry.readers._polygons import Ints, polygons
 from illumcli.geometry.readers._text import Block, Text, keyword
@@ -153,7 +153,7 @@ def _vertices(
     colored = (counts == 6) | (counts == 7)
     if not colored.any():
         return np.ascontiguousarray(values[:, :3]), {}
-    colors = _unit_range(np.where(colored[:, None], values[:, 3:], np.nan))
+    colors = unit_range(np.where(colored[:, None], values[:, 3:], np.nan))
     bare: NDArray[np.bool_] = np.any(np.isnan(colors[:, :3]), axis=1)
     _note_lines(repairs, "vertices without a colour, made white", bare, block)
     colors = np.where(np.isnan(colors), 1.0, colors)
@@ -164,19 +164,6 @@ def _vertices(
     if (counts == 7).any():
         attributes["alpha"] = inside[:, 3].astype(np.float32)
     return np.ascontiguousarray(values[:, :3]), attributes
-
-
-def _unit_range(colors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(V, 4) colours of full 1, NaN where there is none.
-
-    Of full 255 are those that are whole numbers, or most of which lie far beyond 1. A few that lie beyond 1,
-    by rounding or being very bright, do not make bytes of the others.
-    """
-    bright = colors[colors > 0]
-    if not (bright > 1).any():
-        return colors
-    whole = bool((bright == np.floor(bright)).all())
-    return colors / 255 if whole or np.median(bright) > 2 else colors
 
 
 def _note_lines(repairs: dict[str, Repair], what: str, wrong: NDArray[np.bool_], block: Block) -> None:

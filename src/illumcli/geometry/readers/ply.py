@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.readers import _ply
-from illumcli.geometry.readers._color import linear
+from illumcli.geometry.readers._color import linear, unit_range
 from illumcli.geometry.readers._files import TAKEN, content, nearby
 from illumcli.geometry.readers._ply import Element, Lists, Table
 from illumcli.geometry.readers._polygons import Ints, check_range, polygons, starts_of, strip
@@ -236,8 +236,9 @@ def _typed(file: _File, name: str, values: NDArray[Any], kind: np.dtype[Any]) ->
 
 def _color(values: NDArray[np.float64], kind: np.dtype[Any]) -> NDArray[np.float32]:
     """(V, 3) linear: integers are sRGB of their type's full range, or of a byte's if none is larger; floats
-    are linear."""
+    are linear, but sRGB where they are bytes."""
     if kind.kind == "f":
-        return values.astype(np.float32)
+        code = unit_range(values)
+        return values.astype(np.float32) if code is values else linear(np.clip(code, 0, 1))
     largest = 255 if values.max(initial=0) <= 255 else np.iinfo(kind).max
     return linear(np.clip(values / largest, 0, 1))

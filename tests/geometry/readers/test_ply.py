@@ -324,6 +324,22 @@ def test_rows_may_go_on_in_the_next_line_if_all_values_are_there(tmp_path: Path)
             mesh_of(tmp_path, head() + wrong)
 
 
+def test_words_among_the_numbers_matter_where_a_face_needs_them(tmp_path: Path) -> None:
+    more = "property float worn\nproperty uchar mark\n"
+    rows = "0 0 0 none 1\n1 0 0 1 x\n1 1 0 2 3\n0 1 0 3 4\n"
+    mesh = mesh_of(tmp_path, head(vertices=5, more=more) + rows + "x 0 0 0 1\n4 0 1 2 3\n")
+    assert mesh.attributes["worn"].tolist() == [0, 1, 2, 3, 0]
+    assert mesh.attributes["mark"].tolist() == [1, 0, 3, 4, 1]
+    assert mesh.repairs == {
+        "values that do not fit their type, rounded": Repair(1, ":14"),
+        "unused vertices that are not finite, made 0": Repair(1, ":17"),
+        "values of 'worn' not finite, made 0": Repair(1, ":13"),
+        "unused vertices": Repair(1, ":17"),
+    }
+    with pytest.raises(InputError, match=r"a\.ply:17: 'x' is no number"):
+        mesh_of(tmp_path, head(vertices=5, more=more) + rows + "x 0 0 0 1\n4 0 1 2 4\n")
+
+
 def test_the_header_may_be_written_in_many_ways(tmp_path: Path) -> None:
     plain = head()
     for header in (

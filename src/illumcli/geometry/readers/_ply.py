@@ -234,8 +234,8 @@ def _by_lines(
 
 
 def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Table:
-    """The table of one element, a row per line."""
-    values, ends = block.floats(), np.cumsum(block.counts)
+    """The table of one element, a row per line; NaN where a word is no number."""
+    values, ends = block.floats(needed=0), np.cumsum(block.counts)
     at = ends - block.counts
 
     def check(wrong: NDArray[np.bool_], fact: str) -> None:

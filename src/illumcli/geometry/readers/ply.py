@@ -62,13 +62,17 @@ class _File(Value):
         return f": {part} {index + 1}" if line is None else f":{line}"
 
     def row_line(self, name: str, row: int) -> int | None:
-        """The line of a row; None where rows are no lines."""
+        """The number of the line of a row; None where rows are no lines."""
+        index = self.row_index(name, row)
+        return None if index is None or self.text is None else self.text.number(index)
+
+    def row_index(self, name: str, row: int) -> int | None:
+        """Which of the text's lines a row is."""
         if self.text is None or row >= self.count(name):
             return None
         names = [element.name for element in self.head.elements]
         before = sum(element.count for element in self.head.elements[: names.index(name)])
-        first = int(np.searchsorted(self.text.starts, self.head.start))
-        return self.text.number(first + before + row)
+        return int(np.searchsorted(self.text.starts, self.head.start)) + before + row
 
 
 def read(path: Path) -> Mesh:
@@ -89,6 +93,7 @@ def read(path: Path) -> Mesh:
         raise InputError(f"{path}: has no vertices with x, y and z; export the mesh again")
     vertices = _stacked(vertex, ("x", "y", "z"))
     corners, counts, wedges = _polygons(file, len(vertices))
+    _refuse_words(file, vertices, corners)
     more: dict[str, Any] = {}
     if _has(vertex, _NORMAL):
         more.update(normals=_stacked(vertex, _NORMAL), corner_normals=corners)
@@ -102,6 +107,16 @@ def read(path: Path) -> Mesh:
     return polygons(
         path, vertices, corners, counts, attributes=attributes, repairs=repairs, place=file.place, **more
     )
+
+
+def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> None:
+    """Refuse the first line of a vertex in use that holds words in place of coordinates."""
+    unknown: NDArray[np.bool_] = np.any(np.isnan(vertices), axis=1)
+    for vertex in corners[unknown[corners]][:1].tolist():
+        index = file.row_index("vertex", vertex)
+        if file.text is not None and index is not None:
+            line = file.text.block(np.array([index]))
+            line.refuse_words(0, int(line.counts[0]))
 
 
 def _has(table: Table, names: tuple[str, ...]) -> bool:

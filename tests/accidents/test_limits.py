@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from illumcli.errors import LimitError
+from illumcli.errors import InputError, LimitError
 from illumcli.jobs import limits
 
 TOO_LARGE = {
@@ -142,3 +142,52 @@ def test_a_run_forks_and_calls_nobody(python, folder):
     (folder / "scene.yaml").rename(folder / "0.yaml")
     said = python(AUDITED, folder, 1, ILLUM_CACHE=str(folder / "cache"))
     assert said.splitlines() == ["0 rendered", "[]"]
+
+
+OUTSIDE = [
+    "../../x.png", "{top}/x.png", "out/x.png", "../../{{camera}}/x.exr", "link.png", "sub/../../../x.exr",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("pattern", OUTSIDE)
+def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pattern):
+    from illumcli.jobs.check import run as check
+    from illumcli.jobs.render import run
+    from illumcli.scene.load import load
+
+    monkeypatch.chdir(jail)
+    (jail / "link.png").symlink_to(tmp_path / "target.png")
+    written = pattern.format(top=tmp_path)
+    text = (
+        "version: 1\nambient: 1\nfilm: {width: 4, height: 4, samples: 1}\nobjects: [{mesh: {shape: box}}]\n"
+    )
+    scene = jail / "s.yaml"
+    scene.write_text(f"{text}outputs:\n  files: ['{written}']\n")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(
+        InputError, match=r"s\.yaml:6:11: outputs\.files\.0: .*lies outside .*--allow"
+    ) as told:
+        run(scene, cache=False, force=True)
+    assert check([scene])[2] == list(told.value.problems)
+    assert sorted(tmp_path.rglob("*")) == before
+
+    # the user's own word leads anywhere, and opens a folder to scenes
+    paths, _ = run(scene, pattern=str(tmp_path / "mine.png"), cache=False)
+    paths += run(scene, [f"outputs.files=[{tmp_path / 'over.png'}]"], cache=False)[0]
+    monkeypatch.setenv("ILLUM_ALLOW", str(tmp_path))
+    paths += run(scene, cache=False)[0]
+    assert all(os.path.exists(os.path.realpath(path)) for path in paths)
+    assert load(scene).scene.outputs.files == (written,)
+
+
+@pytest.mark.parametrize("pattern", ["x.png", "new/x.png", "../x.png", "../c/x.png", "{top}/a/b/x.png"])
+def test_a_scene_writes_beside_itself_and_where_the_user_stands(jail, tmp_path, monkeypatch, pattern):
+    from illumcli.jobs.render import run
+
+    monkeypatch.chdir(jail)
+    (jail / "s.yaml").write_text(
+        "version: 1\nambient: 1\nfilm: {width: 4, height: 4, samples: 1}\nobjects: [{mesh: {shape: box}}]\n"
+        f"outputs: {{files: ['{pattern.format(top=tmp_path)}']}}\n"
+    )
+    paths, _ = run(jail / "s.yaml", cache=False)
+    assert all(path.exists() for path in paths)

@@ -44,7 +44,7 @@ allow_option = click.option(
     callback=_allow,
     type=click.Path(exists=True, file_okay=False),
     metavar="DIR",
-    help="Let scenes read files below DIR too (also: ILLUM_ALLOW).",
+    help="Let scenes read files and write images below DIR too (also: ILLUM_ALLOW).",
 )
 
 

@@ -38,7 +38,7 @@ from illumcli.plan.recipes import View
 from illumcli.plan.stages import MOST, Tile
 from illumcli.plan.unseen import unseen_objects, without
 from illumcli.records import Value
-from illumcli.scene.load import Loaded, lacking_lines, load, told, unused_lines
+from illumcli.scene.load import Loaded, lacking_lines, load, refuse_outside, told, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)
@@ -331,10 +331,13 @@ def mesh_files(loaded: Loaded, scene: Scene) -> set[Path]:
 def image_set(
     loaded: Loaded, scene: Scene, steps: Plan, patterns: Sequence[str], more: Mapping[str, Any]
 ) -> list[Target]:
-    """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer."""
+    """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer.
+
+    Where `patterns` are the scene's own, they lead to where it may read; those of the command line anywhere.
+    """
     targets = []
     for view in steps.views:
-        for pattern in patterns:
+        for number, pattern in enumerate(patterns):
             suffix = Path(pattern).suffix.lower()
             if suffix not in (".exr", ".png"):
                 raise InputError(f"output pattern '{pattern}': no image format '{suffix}'; use .exr or .png")
@@ -343,6 +346,8 @@ def image_set(
                 name = "all" if suffix == ".exr" else layers[0].name
                 fields = {"scene": loaded.name, "camera": view.name, "layer": name, "frame": 0}
                 path = Path(expand(pattern, {**loaded.overrides, **fields, **more}))
+                if patterns is scene.outputs.files:
+                    refuse_outside(loaded, number, path)
                 targets.append(Target(path, view, tuple(layers), content(scene, steps, view, layers, suffix)))
     check_unique([str(target.path) for target in targets])
     return targets

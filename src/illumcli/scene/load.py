@@ -119,6 +119,22 @@ def resolve(loaded: Loaded, path: str) -> Path:
     raise InputError(str(_problem(node.at, at, found)))
 
 
+def refuse_outside(loaded: Loaded, number: int, path: Path) -> None:
+    """Raise InputError where the pattern of this number in `outputs.files` leads to `path`, outside the
+    folders that the scene may read from. Links are followed; a pattern that `-D` gives may lead anywhere."""
+    at = ("outputs", "files", number)
+    node = loaded.tree.find(at)
+    if node is None or node.place.source.startswith("-D "):
+        return
+    folder = Path(os.path.realpath(path)).parent
+    with suppress(OSError):  # a plain name is safe wherever the user stands, be it the top of the disk
+        if folder == Path.cwd().resolve():
+            return
+    if not any(folder.is_relative_to(root) for root in loaded.roots):
+        fact = f"{path} lies outside the folders a scene may write to"
+        raise InputError(told(loaded, at, f"{fact}; allow it with --allow {folder}, or name it with -o"))
+
+
 def file_problems(loaded: Loaded) -> list[str]:
     """What `resolve` has against each path in the scene."""
     found = [

@@ -57,7 +57,7 @@ def pixels_at_vertices_are_bakes(case: Case, random: Random, studio: Studio) -> 
     side = 1 if np.linalg.det(matrix[:3, :3]) > 0 else -1
     places = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     views, what = {}, []
-    for vertex in random.sample(range(len(places)), 4):
+    for vertex in random.sample(range(len(places)), 8):
         for polygon in np.unique(
             np.searchsorted(mesh.starts, np.flatnonzero(mesh.corners == vertex), "right") - 1
         ):

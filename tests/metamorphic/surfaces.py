@@ -51,6 +51,18 @@ class Surface:
         own = tuple(tuple(number[vertex] for vertex in face) for face in faces)
         return Surface(self.vertices[used], own, of(self.normals), of(self.uvs), of(self.colors))
 
+    def shuffled(self, random: Random) -> Surface:
+        """The same vertices and faces in another order."""
+        order = random.sample(range(len(self.vertices)), len(self.vertices))
+        number = {vertex: k for k, vertex in enumerate(order)}
+        faces = [tuple(number[vertex] for vertex in face) for face in self.faces]
+        random.shuffle(faces)
+
+        def of(values: NDArray | None) -> NDArray | None:
+            return None if values is None else values[order]
+
+        return Surface(self.vertices[order], tuple(faces), of(self.normals), of(self.uvs), of(self.colors))
+
     def moved(self, matrix: NDArray[np.float64]) -> Surface:
         """The surface under a (4, 4) matrix that keeps the orientation."""
         linear = matrix[:3, :3]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
-from illumcli.files.outputs import is_kept, refresh, refuse_suffix
+from illumcli.files.outputs import is_kept, refresh, refuse_suffix, refuse_unwritable
 from illumcli.jobs.converge import Convergence, Curve
 from illumcli.plan.keys import digest
 
@@ -126,12 +127,17 @@ class Outputs:
     ------
     InputError
         A suffix that is not written; matplotlib is not installed.
+    OutputError
+        A file that cannot be written.
     """
 
     def __init__(self, table: Path | None, picture: Path | None, force: bool) -> None:
         self.kept: list[Path] = []
         self._table, self._picture, self._force = table, picture, force
         self._content = ""
+        for path in (table, picture):
+            if path is not None and not os.path.isfile(path):
+                refuse_unwritable(path)
         if table is not None:
             refuse_suffix(table, "a table", ".csv")
         if picture is not None:

@@ -243,7 +243,7 @@ def _wedges(
     vertices = np.concatenate(turned) if len(sound) else np.zeros((0, 3), np.int32)
     owner = np.concatenate([corner[:, k] for k in range(3)]).astype(np.int64)
     of = np.tile(sound.astype(np.int32), 3)
-    angle = _angles(world, vertices, rows(ng, of))
+    angle = np.concatenate([_angles(world, each, rows(ng, sound)) for each in turned])
 
     # and at those that have none, between the nearest corners of their polygon that lie elsewhere
     alone = np.ones(len(vertex), bool)

@@ -1,4 +1,4 @@
-"""Memory asked of the system: kept while arrays come and go, and asked for before it cannot be refused."""
+"""Memory of the system: how much is free, freed memory kept, and memory asked for while it can be refused."""
 
 from __future__ import annotations
 
@@ -32,3 +32,13 @@ def refuse_little(size: int) -> None:
         mmap.mmap(-1, size).close()
     except OSError as error:
         raise MemoryError from error
+
+
+def free_memory() -> int | None:
+    """Bytes that are free for a program; None where the system does not say."""
+    try:
+        with open("/proc/meminfo") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        return int(lines["MemAvailable"].split()[0]) * 1024
+    except (OSError, KeyError, ValueError):
+        return None

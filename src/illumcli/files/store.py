@@ -3,7 +3,11 @@
 A file is a header of 64 bytes, a description as JSON and the arrays behind it, each at a multiple of 64. The
 checksum in the header covers every other byte, so that an entry that is damaged, short or another's is found
 out and costs the time to make it again, no more. Entries are never changed: they are written under another
-name and renamed, and taken away; processes may share a folder.
+name and renamed, and taken away; processes may share a folder. They are read, not mapped: a mapped file that
+somebody cuts short ends the process, and one that somebody changes is not what was checked.
+
+The checksum finds accidents. What keeps strangers out is who may write to the folder and to the entry: the
+user and root alone, else nothing of it is read and nothing kept in it.
 
 References
 ----------
@@ -12,14 +16,17 @@ Carter, J. L. and Wegman, M. N. (1979). Universal classes of hash functions. JCS
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
-import mmap
+import math
 import os
+import re
+import stat
 import struct
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -28,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.files import atomic
+from illumcli.memory import free_memory
 from illumcli.records import Record, Value
 
 SUFFIX = ".illum"
@@ -35,12 +43,17 @@ LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
 LARGEST_SHARE = 4
 """No entry takes more than this part of the limit."""
-MAPPED = 1 << 20  # [bytes] entries of this size are mapped, smaller ones read
+LONGEST = 1 << 24  # [bytes] of a description
+LARGE = 1 << 26
+"""An entry of so many bytes is read only where it takes no more than `MEMORY_SHARE` of the free memory."""
+MEMORY_SHARE = 0.5
 ABANDONED = 3600  # [s] a part file this old belongs to nobody
 
 _HEADER = struct.Struct("<8sIIQ32s8x")  # magic, format, length of the description, of the arrays, checksum
 _MAGIC, _FORMAT = b"illum\r\n\0", 1
 _WORDS = 8192  # words of 8 bytes that one sum covers
+_PIECE = 16 * 8 * _WORDS  # [bytes] read at a time: summed while the processor's cache still holds it
+_TYPE = re.compile("[<>|][biuf][1248]")
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
 
@@ -69,8 +82,9 @@ class Stored(Record):
 
 
 class Store:
-    """Entries by key in one folder. A folder that cannot be read or written costs time only: `warning` says
-    what happened first, and from the first refusal on nothing more is written."""
+    """Entries by key in one folder. A folder that cannot be read or written, or that others can write to,
+    costs time only: `warning` says what happened first; from the first refusal on nothing more is written.
+    """
 
     def __init__(self, folder: Path, limit: int = LIMIT) -> None:
         self.folder = folder
@@ -86,26 +100,33 @@ class Store:
 
     def has(self, key: str) -> bool:
         """Is there an entry of this key, sound or not?"""
-        return os.path.exists(self._path(key))
+        return self._is_trusted() and os.path.isfile(self._path(key))
 
     def read(self, key: str) -> Stored | None:
         """The entry of this key, as used just now; None where there is none or it is not sound."""
         path = self._path(key)
+        if not self._is_trusted():
+            return None
         try:
-            found = read_entry(path, key)
+            with suppress(OSError):
+                os.utime(path, follow_symlinks=False)
+            return read_entry(path, key, self.largest)
         except FileNotFoundError:
             return None
         except OSError as error:
             self._warn(f"{path}: cannot be read: {error.strerror or error}")
-            return None
+        except MemoryError:
+            self._warn(f"{path}: not read, it would take too much of the memory that is free")
         except Refused as fact:
-            self._warn(f"{path}: {fact}; it is made again")
-            with suppress(OSError):
-                path.unlink()
-            return None
+            self.reject(key, str(fact))
+        return None
+
+    def reject(self, key: str, fact: str) -> None:
+        """Take away an entry that is of no use; the fact says why."""
+        path = self._path(key)
+        self._warn(f"{path}: {fact}; it is made again")
         with suppress(OSError):
-            os.utime(path)
-        return found
+            path.unlink()
 
     def save(self, key: str, about: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> bool:
         """Keep the arrays under this key; False where they are too large or cannot be written."""
@@ -122,23 +143,28 @@ class Store:
     ) -> Writer | None:
         """Takes arrays of these shapes and types piece by piece; None where nothing can be written."""
         places, end = _places(shapes)
-        if not self._writes or end > self.largest:
+        if not self._writes or end > self.largest or not self._is_trusted():
             return None
         described = {"key": key, "about": about, "arrays": places}
         text = json.dumps(described, separators=(",", ":")).encode()
         text += b" " * (-(len(text) + _HEADER.size) % 64)
+        if len(text) > LONGEST:
+            return None
         part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}.part"
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not self._is_trusted():  # somebody else was faster
+                return None
             return Writer(self, part, self._path(key), text, [place["at"] for place in places], end)
         except OSError as error:
             self.refused(error)
             return None
 
-    def refused(self, error: OSError) -> None:
+    def refused(self, error: OSError | Refused) -> None:
         """Note that the operating system refuses to write; nothing more is tried."""
         self._writes = False
-        self._warn(f"{self.folder}: cannot be written: {error.strerror or error}; nothing more is kept there")
+        fact = getattr(error, "strerror", None) or error
+        self._warn(f"{self.folder}: cannot be written: {fact}; nothing more is kept there")
 
     def saved(self) -> None:
         """Note that an entry was added."""
@@ -182,6 +208,13 @@ class Store:
             gone.append(entry)
         return gone
 
+    def _is_trusted(self) -> bool:
+        """May nobody but the user and root write to the folder, or is it not there?"""
+        fact = distrust(self.folder)
+        if fact is not None:
+            self._warn(f"{self.folder}: {fact}; nothing is read or kept there")
+        return fact is None
+
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}{SUFFIX}"
 
@@ -214,7 +247,8 @@ class Writer:
         self._failed = False
         self._number = 0
         atomic.remember(part)
-        self._file: BinaryIO = part.open("w+b")
+        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+        self._file = os.fdopen(os.open(part, flags, 0o600), "r+b", buffering=0)
         self._try(lambda: self._file.truncate(self._start + end))
 
     def write(self, array: NDArray[Any]) -> None:
@@ -237,7 +271,8 @@ class Writer:
     def discard(self) -> None:
         """Leave no trace."""
         self._failed = True
-        self._file.close()
+        with suppress(OSError):
+            self._file.close()
         with suppress(OSError):
             self._part.unlink()
         atomic.forget(self._part)
@@ -245,12 +280,12 @@ class Writer:
     def _finish(self) -> None:
         head = _HEADER.pack(_MAGIC, _FORMAT, len(self._text), self._end, b"")[:24]
         _write_at(self._file, np.frombuffer(self._text, np.uint8), _HEADER.size)
-        payload = _payload(self._file, self._start, self._end)
-        sum_ = checksum(head + self._text, payload)
-        del payload
+        pieces = _pieces(self._file.fileno(), self._start, self._end)
+        sum_ = checksum(head + self._text, pieces)
         _write_at(self._file, np.frombuffer(head + sum_ + bytes(8), np.uint8), 0)
-        self._file.close()
-        os.replace(self._part, self._target)
+        os.replace(self._part, self._target)  # not forced to disk: whoever reads it checks it
+        with suppress(OSError):
+            self._file.close()
         atomic.forget(self._part)
         self._store.saved()
 
@@ -259,9 +294,28 @@ class Writer:
             return
         try:
             action()
-        except OSError as error:
+        except (OSError, Refused) as error:
             self._store.refused(error)
             self.discard()
+
+
+def distrust(folder: Path) -> str | None:
+    """Why nothing in this folder can be trusted, and the way out; None where only the user and root write to
+    it, or where there is none."""
+    try:
+        status = os.stat(folder)
+    except OSError:
+        return None
+    return _strangers(status, f"chmod go-w {folder}, or name another folder by ILLUM_CACHE")
+
+
+def _strangers(status: os.stat_result, way: str) -> str | None:
+    """Who but the user and root may write to a file or folder, and the way out; None for nobody."""
+    if status.st_uid not in (0, os.geteuid()):
+        return f"belongs to another user ({status.st_uid}); name a folder of your own by ILLUM_CACHE"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others can write to it; {way}"
+    return None
 
 
 def described(path: Path) -> dict[str, Any]:
@@ -272,56 +326,104 @@ def described(path: Path) -> dict[str, Any]:
     OSError
     Refused
     """
-    with path.open("rb") as file:
-        head = file.read(_HEADER.size)
-        if len(head) < _HEADER.size or head[:8] != _MAGIC:
-            raise Refused("not an entry of this program")
-        try:
-            said: dict[str, Any] = json.loads(file.read(min(_HEADER.unpack(head)[2], MAPPED)))
-        except (ValueError, RecursionError):
-            raise Refused("damaged: its description cannot be read") from None
-    return said
+    with _opened(path) as file:
+        return _said(_head(file)[2])
 
 
-def read_entry(path: Path, key: str) -> Stored:
-    """The entry at `path`, sound to the last bit and of this key.
+def read_entry(path: Path, key: str, largest: int = LIMIT) -> Stored:
+    """The entry at `path`, sound to the last bit, of this key and of `largest` bytes at most.
 
     Raises
     ------
     OSError
     Refused
+    MemoryError
     """
-    with path.open("rb") as file:
+    with _opened(path) as file:
+        head, end, text = _head(file)
         size = os.fstat(file.fileno()).st_size
-        head = file.read(_HEADER.size)
-        if len(head) < _HEADER.size:
-            raise Refused("too short for an entry")
-        magic, form, text_size, end, sum_ = _HEADER.unpack(head)
-        if magic != _MAGIC or form != _FORMAT or head[-8:] != bytes(8):
-            raise Refused("not an entry of this program")
-        start = _HEADER.size + text_size
-        if size != start + end:
-            raise Refused(f"has {size} bytes, not {start + end}")
-        text = file.read(text_size)
-        payload = _payload(file, start, end)
-    if checksum(head[:24] + text, payload) != sum_:
-        raise Refused("damaged: its checksum differs")
-    said = json.loads(text)
-    if said["key"] != key:
-        raise Refused("the entry of another key")
-    return Stored(said["about"], tuple(_array(payload, place) for place in said["arrays"]), size)
+        if end > largest:
+            raise Refused("larger than an entry may be")
+        free = free_memory() if size >= LARGE else None
+        if free is not None and size > MEMORY_SHARE * free:
+            raise MemoryError
+        start = _HEADER.size + len(text)
+        payload = _aligned(end)
+        if checksum(head[:24] + text, _pieces(file.fileno(), start, end, payload)) != head[24:56]:
+            raise Refused("damaged: its checksum differs")
+    payload.flags.writeable = False
+    said = _said(text)
+    try:
+        if said["key"] != key:
+            raise Refused("the entry of another key")
+        about, arrays = dict(said["about"]), tuple(_array(payload, place) for place in said["arrays"])
+    except (LookupError, TypeError, ValueError, OverflowError):
+        raise Refused("its description is none of an entry") from None
+    return Stored(about, arrays, size)
 
 
-def checksum(text: bytes, data: NDArray[np.uint8]) -> bytes:
-    """32 bytes that any change of a word of `data`, and any but one in 2^64 of larger damage, changes.
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    """The file of an entry: itself, not through a link, and nobody else's to write to."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise Refused("a link, not an entry") from None
+        raise
+    try:
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode):
+            raise Refused("not a file")
+        if fact := _strangers(status, "only the user may"):
+            raise Refused(fact)
+    except Refused:
+        os.close(handle)
+        raise
+    with open(handle, "rb", buffering=0) as file:
+        yield file
 
-    Blocks of 64 KiB are first summed up, word by word times fixed odd numbers modulo 2^64, ten times as fast
-    as a cryptographic hash: this is to find accidents, an attacker could write the whole entry.
+
+def _head(file: BinaryIO) -> tuple[bytes, int, bytes]:
+    """The header of an entry, how many bytes its arrays take, and its description as text."""
+    size = os.fstat(file.fileno()).st_size
+    head = os.pread(file.fileno(), _HEADER.size, 0)
+    magic, form, text_size, end, _ = _HEADER.unpack(head.ljust(_HEADER.size, b"\0"))
+    if magic != _MAGIC or form != _FORMAT or head[-8:] != bytes(8):
+        raise Refused("not an entry of this program")
+    if size != _HEADER.size + text_size + end:
+        raise Refused(f"has {size} bytes, not {_HEADER.size + text_size + end}")
+    if text_size > LONGEST:
+        raise Refused("its description is longer than any")
+    text = np.empty(text_size, np.uint8)
+    for _ in _pieces(file.fileno(), _HEADER.size, text_size, text):
+        pass
+    return head, end, text.tobytes()
+
+
+def _said(text: bytes) -> dict[str, Any]:
+    """The description of an entry."""
+    try:
+        said = json.loads(text)
+    except (ValueError, RecursionError):
+        raise Refused("damaged: its description cannot be read") from None
+    if not isinstance(said, dict):
+        raise Refused("its description is none of an entry")
+    return said
+
+
+def checksum(text: bytes, pieces: Iterable[NDArray[np.uint8]]) -> bytes:
+    """32 bytes that any change of a word of the data, and any but one in 2^64 of larger damage, changes.
+
+    The data comes in pieces of whole blocks of 64 KiB, but for the last. Blocks are first summed up, word by
+    word times fixed odd numbers modulo 2^64, ten times as fast as a cryptographic hash: this is to find
+    accidents, an attacker could write the whole entry.
     """
-    words = data[: len(data) // (8 * _WORDS) * (8 * _WORDS)].view(np.uint64).reshape(-1, _WORDS)
     digest = hashlib.blake2b(text, digest_size=32)
-    digest.update((words @ _odd_numbers()).tobytes())
-    digest.update(data[words.size * 8 :].data)
+    for data in pieces:
+        words = data[: len(data) // (8 * _WORDS) * (8 * _WORDS)].view(np.uint64).reshape(-1, _WORDS)
+        digest.update((words @ _odd_numbers()).tobytes())
+        digest.update(data[words.size * 8 :].data)
     return digest.digest()
 
 
@@ -345,18 +447,44 @@ def _places(shapes: Sequence[tuple[tuple[int, ...], Any]]) -> tuple[list[dict[st
 
 
 def _array(payload: NDArray[np.uint8], place: Mapping[str, Any]) -> NDArray[Any]:
-    count = int(np.prod(place["shape"], dtype=np.int64))
-    array = np.frombuffer(payload, np.dtype(place["dtype"]), count, place["at"]) if count else np.zeros(0)
-    return array.reshape(place["shape"]).astype(place["dtype"], copy=False)
+    """One of an entry's arrays; what cannot be one raises ValueError, TypeError or LookupError."""
+    if not _TYPE.fullmatch(place["dtype"]) or any(side < 0 for side in place["shape"]):
+        raise ValueError("not an array")
+    dtype, count = np.dtype(place["dtype"]), math.prod(place["shape"])
+    array = np.frombuffer(payload, dtype, count, place["at"]) if count else np.zeros(0, dtype)
+    return array.reshape(place["shape"])
 
 
-def _payload(file: BinaryIO, start: int, size: int) -> NDArray[np.uint8]:
-    """(size,) the bytes of `file` from `start` on, mapped where there are many."""
-    if size < MAPPED:
-        file.flush()
-        return np.frombuffer(os.pread(file.fileno(), size, start), np.uint8)
-    whole = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    return np.frombuffer(whole, np.uint8, size, start)
+def _aligned(size: int) -> NDArray[np.uint8]:
+    """(size,) bytes that begin at a multiple of 64, not set."""
+    whole = np.empty(size + 63, np.uint8)
+    first = -whole.ctypes.data % 64
+    return whole[first : first + size]
+
+
+def _pieces(
+    handle: int, start: int, size: int, into: NDArray[np.uint8] | None = None
+) -> Iterator[NDArray[np.uint8]]:
+    """The `size` bytes of a file from `start` on, piece by piece; each is forgotten for the next, or kept in
+    its place of `into`.
+
+    Raises
+    ------
+    OSError
+    Refused
+        The file ends before.
+    """
+    scratch = np.empty(min(size, _PIECE), np.uint8) if into is None else into
+    for first in range(0, size, _PIECE):
+        count = min(_PIECE, size - first)
+        piece = scratch[:count] if into is None else scratch[first : first + count]
+        at, view = start + first, piece.data
+        while view:
+            done = os.preadv(handle, [view], at)
+            if not done:
+                raise Refused("became shorter while it was read")
+            view, at = view[done:], at + done
+        yield piece
 
 
 def _write_at(file: BinaryIO, data: NDArray[np.uint8], at: int) -> None:

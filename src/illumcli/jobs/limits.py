@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from illumcli.errors import LimitError
+from illumcli.memory import free_memory
 
 MEMORY_SHARE = 0.8
 """Of the memory that is free."""
@@ -55,16 +56,6 @@ def refuse_disk(path: Path, pixel_bytes: int) -> None:
             f"{path}: holds {_size(pixel_bytes)} of pixels, {_size(free)} are free on the disk; "
             "free some space, choose another folder or a smaller film"
         )
-
-
-def free_memory() -> int | None:
-    """Bytes that are free for a program; None where the system does not say."""
-    try:
-        with open("/proc/meminfo") as file:
-            lines = dict(line.split(":", 1) for line in file)
-        return int(lines["MemAvailable"].split()[0]) * 1024
-    except (OSError, KeyError, ValueError):
-        return None
 
 
 def _size(count: float) -> str:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, some
 from illumcli.demand import Recipe
-from illumcli.files.store import Store
+from illumcli.files.store import Store, Stored
 from illumcli.frame import Frame
 from illumcli.geometry.assemble import CornerVectors, Placed, Standing, World
 from illumcli.geometry.mesh import Mesh, Substitute
@@ -38,21 +38,21 @@ about half as fast as measured."""
 MEMORY = 1 << 30
 """Bytes that the variants of a sweep keep in memory for each other."""
 
-ONCE = (
-    "mesh",
-    "standing",
-    "planar_polygons",
-    "curved_polygons",
-    "camera",
-    "implied_widths",
-    "world",
-    "repairs",
-    "undirected",
-    "unnamed",
-    "corner_normals",
-    "numbering",
-)
-"""Buffers of the whole scene that are kept, by name or by its part before the colon.
+ONCE: Mapping[str, type | tuple[type, ...]] = {
+    "mesh": Mesh,
+    "standing": Standing,
+    "planar_polygons": (PlanarPolygons, type(None)),
+    "curved_polygons": (PlanarPolygons, type(None)),
+    "camera": tuple,
+    "implied_widths": np.ndarray,
+    "world": World,
+    "repairs": MeshRepairs,
+    "undirected": MeshRepairs,
+    "unnamed": MeshRepairs,
+    "corner_normals": CornerVectors,
+    "numbering": Numbering,
+}
+"""Buffers of the whole scene that are kept, by name or by its part before the colon, and their types.
 
 Left out: the ray core, whose tree Embree does not give away, and what is made from these faster than loaded.
 """
@@ -288,16 +288,19 @@ class Artifacts:
         stored = self.store.read(key)
         if stored is None:
             return None
-        self.reused[name] = "store"
         kind = kind_of(name)
+        try:
+            value = kept_whole(name, stored) if kind is None else kept_picture(kind, stored, view)
+        except Misfit:
+            self.store.reject(key, f"holds something else than {name.partition(':')[0]}")
+            return None
+        self.reused[name] = "store"
         if kind is None:
-            value = decode(stored.about["value"], stored.arrays)
             if self.memory is not None:
                 self.memory.once[key] = value
             return Recipe(name, partial(_known, value), {})
-        picture = Picture(kind, stored.arrays[0], view.samples)
         load = load_hits if name == "hits" else load_tile
-        return Recipe(name, partial(load, picture), _needs(name))
+        return Recipe(name, partial(load, value), _needs(name))
 
     def keeps(self, name: str) -> bool:
         """May a buffer of this name be kept?"""
@@ -318,6 +321,38 @@ class Artifacts:
 def is_kept(name: str) -> bool:
     """Is a buffer of this name ever kept between runs?"""
     return kind_of(name) is not None or name.partition(":")[0] in ONCE
+
+
+class Misfit(Exception):
+    """A sound entry does not hold what its key stands for."""
+
+
+def kept_whole(name: str, stored: Stored) -> Any:
+    """A buffer of the whole scene, from its entry.
+
+    Raises
+    ------
+    Misfit
+    """
+    try:
+        value = decode(stored.about["value"], stored.arrays)
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
+        raise Misfit from None
+    if not isinstance(value, ONCE[name.partition(":")[0]]):
+        raise Misfit
+    return value
+
+
+def kept_picture(kind: Kind, stored: Stored, view: Any) -> Picture:
+    """A buffer of a view, from its entry.
+
+    Raises
+    ------
+    Misfit
+    """
+    if [(array.shape, array.dtype) for array in stored.arrays] != [Picture.shape(kind, view)]:
+        raise Misfit
+    return Picture(kind, stored.arrays[0], view.samples)
 
 
 def _needs(name: str) -> dict[str, str]:
@@ -450,5 +485,18 @@ def decode(said: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
         return tuple(decode(part, arrays) for part in said["tuple"])
     if "dict" in said:
         return {key: decode(part, arrays) for key, part in said["dict"]}
+    cls = CLASSES[said["class"]]
     parts = {name: decode(part, arrays) for name, part in said["fields"].items()}
-    return CLASSES[said["class"]](**parts)
+    for name, part in parts.items():
+        if not _fits(part, str(cls.__dataclass_fields__[name].type)):
+            raise TypeError(f"{name} of {cls.__name__}")
+    return cls(**parts)
+
+
+def _fits(part: Any, declared: str) -> bool:
+    """Is the part of a record, as decoded, what its declaration says, as far as arrays and None go?"""
+    if part is None:
+        return "None" in declared
+    if isinstance(part, np.ndarray):
+        return declared.startswith(f"NDArray[np.{part.dtype.name}")
+    return not declared.startswith("NDArray")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,18 +151,97 @@ def test_the_least_recently_used_go_first(store):
         os.utime(path_of(store, key), (1000 + number, 1000 + number))
     store.read(keys[0])
     size = path_of(store, keys[0]).stat().st_size
-    gone = store.prune(2 * size)
-    assert [entry.key for entry in gone] == keys[1:4]
+    done = store.prune(2 * size)
+    assert [entry.key for entry in done.gone] == keys[1:4]
+    assert done.stayed == {}
     assert [entry.key for entry in store.entries()] == [keys[4], keys[0]]
 
 
-def test_what_a_killed_process_left_goes_after_an_hour(store):
-    store.save(KEY, {}, arrays())
-    for name, age in ((".old.part", 7200), (".new.part", 60)):
-        (store.folder / name).write_text("")
-        os.utime(store.folder / name, (time.time() - age,) * 2)
-    store.prune(1 << 30)
-    assert sorted(p.name for p in store.folder.iterdir()) == [".new.part", f"{KEY}{SUFFIX}"]
+WRITER = """
+import sys
+from pathlib import Path
+import numpy as np
+from illumcli.files.store import Store
+writer = Store(Path(sys.argv[1])).writer("b" * 32, {}, [((1000,), np.float64)])
+writer.append(0, np.ones(500))
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_temporary_file_goes_once_its_process_is_gone(store):
+    store.save(KEY, {}, [np.zeros(1000)])
+    size = path_of(store).stat().st_size
+    command = [sys.executable, "-c", WRITER, store.folder]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writing:
+        assert writing.stdout.readline() == b"ready\n"
+        (part,) = store.folder.glob(".*.part")
+        Store(store.folder).finish()
+        assert part.exists()
+        # what is in the making counts
+        assert store.prune(2 * size).gone == ()
+        assert len(store.prune(2 * size - 1).gone) == 1
+        writing.kill()
+    assert part.exists()
+    Store(store.folder).finish()
+    assert list(store.folder.iterdir()) == []
+
+
+def test_a_close_that_fails_leaves_nothing(store):
+    writer = store.writer(KEY, {}, [((10,), np.float64)])
+    file = writer._file
+
+    class Failing:
+        def __getattr__(self, name):
+            return getattr(file, name)
+
+        def close(self):
+            file.close()
+            raise OSError(5, "Input/output error")
+
+    writer._file = Failing()
+    writer.discard()
+    assert list(store.folder.iterdir()) == []
+
+
+def test_what_cannot_be_removed_stays_and_the_rest_goes(store, monkeypatch):
+    keys = [f"{k:032x}" for k in range(3)]
+    for number, key in enumerate(keys):
+        store.save(key, {}, [np.zeros(1000)])
+        os.utime(path_of(store, key), (1000 + number, 1000 + number))
+    unlink = Path.unlink
+
+    def refused(path, missing_ok=False):
+        if path == path_of(store, keys[0]):
+            raise PermissionError(1, "Operation not permitted")
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    done = store.prune(0)
+    assert [entry.key for entry in done.gone] == keys[1:]
+    assert done.stayed == {path_of(store, keys[0]): "Operation not permitted"}
+    again = Store(store.folder, limit=10_000)
+    assert again.save(KEY, {}, [np.zeros(300)])
+    again.finish()
+    assert "cannot be removed: Operation not permitted" in again.warning
+
+
+def test_a_folder_in_the_place_of_an_entry_is_none(store):
+    (path_of(store) / "more").mkdir(parents=True)
+    assert store.entries() == []
+    assert not store.has(KEY)
+    assert not store.save(KEY, {}, arrays())
+    assert "cannot be written" in store.warning
+    store.finish()
+    assert [path.name for path in store.folder.iterdir()] == [path_of(store).name]
+
+
+def test_a_long_run_does_not_outgrow_the_limit(tmp_path):
+    store = Store(tmp_path, limit=100_000)
+    for number in range(60):
+        assert store.save(f"{number:032x}", {}, [np.zeros(1000)])
+        assert sum(entry.bytes for entry in store.entries()) < 100_000 + store.largest + 9000
+    assert store.read(f"{59:032x}") is not None
 
 
 def test_no_entry_takes_more_than_its_share(tmp_path):
@@ -185,7 +264,7 @@ def test_an_entry_that_another_process_took_away_is_no_fault(store, monkeypatch)
     path_of(store).unlink()
     monkeypatch.setattr(store, "entries", lambda: found)
     assert store.faults() == {}
-    assert store.prune(0) == found
+    assert store.prune(0).gone == tuple(found)
 
 
 @pytest.mark.parametrize("text", [b"{", b"\xff", b"[" * 60_000])

@@ -6,9 +6,12 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from illumcli.cli.cache import cache as cli
 from illumcli.errors import OutputError
 from illumcli.files.store import Store
 from illumcli.jobs import cache
@@ -85,21 +88,82 @@ def test_an_entry_that_another_process_took_away_is_not_listed(own, monkeypatch)
     path.unlink()
     monkeypatch.setattr(Store, "entries", lambda self: entries)
     assert cache.listing().entries == ()
-    assert cache.verify() == (1, {})
+    assert cache.verify() == cache.Verified(1, {}, {})
 
 
 def test_what_cannot_be_removed_is_an_error_of_the_output(own, monkeypatch):
-    path = entry(own, "a", b"{}", 1)
+    first, second = entry(own, "a", b"{}", 2), entry(own, "b", b"{}", 1)
+    unlink = Path.unlink
 
-    def refused(self, missing_ok=False):
-        raise PermissionError(13, "Permission denied")
+    def refused(path, missing_ok=False):
+        if path == first:
+            raise PermissionError(13, "Permission denied")
+        unlink(path, missing_ok)
 
-    monkeypatch.setattr(type(path), "unlink", refused)
-    for remove in (cache.verify, cache.clear, lambda: cache.prune("0")):
-        with pytest.raises(OutputError, match=r"kept.*: Permission denied; check its permissions"):
-            remove()
+    monkeypatch.setattr(Path, "unlink", refused)
+    for words in (["verify"], ["clear"], ["prune", "--size", "0"]):
+        with pytest.raises(OutputError, match=r"a\.illum: cannot be removed: Permission denied; check its"):
+            CliRunner().invoke(cli, words, catch_exceptions=False)
     monkeypatch.undo()
+    assert first.exists()
+    assert not second.exists()
+
+
+def test_a_verification_tells_what_it_could_not_remove(own, monkeypatch):
+    path = entry(own, "a", b"{}", 1)
+    monkeypatch.setattr(cache, "removed", lambda path: "Permission denied")
+    done = CliRunner().invoke(cli, ["verify"])
+    assert done.output.splitlines() == [
+        f"{path}: damaged: its checksum differs; not removed",
+        "0 sound, 0 removed",
+    ]
+    assert isinstance(done.exception, OutputError)
+
+
+def test_a_made_up_name_moves_no_cursor(own):
+    entry(own, "a", b'{"about": {"buffer": "\\u001b[2J"}}', 1)
+    entry(own, "b", b'{"about": {"buffer": ["x"]}}', 1)
+    assert [what for _, what in cache.listing().entries] == ["damaged", "damaged"]
+
+
+@pytest.mark.parametrize("words", [["list"], ["verify"], ["prune"], ["clear"]])
+def test_a_folder_that_others_can_write_to_is_refused_with_the_way_out(illum, own, words):
+    path = entry(own, "a", b"{}", 1)
+    (own / "kept").chmod(0o777)
+    done = illum("cache", *words)
+    assert done.returncode == 2
+    assert (
+        f"{own / 'kept'}: others can write to it; chmod go-w {own / 'kept'}, or name another" in done.stderr
+    )
     assert path.exists()
+
+
+UNREMOVABLE = """
+import sys
+from pathlib import Path
+unlink = Path.unlink
+
+def refused(path, missing_ok=False):
+    if path.suffix == ".illum":
+        raise PermissionError(1, "Operation not permitted")
+    unlink(path, missing_ok)
+
+Path.unlink = refused
+from illumcli.plan import artifacts
+artifacts.worth = lambda seconds, size: True
+from illumcli.cli import illum
+illum()
+"""
+
+
+def test_a_picture_is_done_where_no_entry_can_be_removed(own, monkeypatch):
+    monkeypatch.setenv("ILLUM_CACHE_SIZE", "600k")
+    command = [sys.executable, "-c", UNREMOVABLE, "render", "ring.yaml", "--force"]
+    for k in range(4):
+        change = ["-D", f"camera.position=[3,2,{4 + k}]"]
+        done = subprocess.run([*command, *change], cwd=own, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert done.stderr.count("cannot be removed: Operation not permitted") == 1, done.stderr
 
 
 def test_a_plan_says_what_is_at_hand(illum, own):

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
+
+if TYPE_CHECKING:
+    from illumcli.jobs.cache import Pruned
 
 
 @click.group()
@@ -26,12 +31,14 @@ def list_() -> None:
 @cache.command()
 def verify() -> None:
     """Read every entry and remove those that are damaged."""
+    from illumcli.jobs.cache import refuse_stayed
     from illumcli.jobs.cache import verify as run
 
-    sound, faults = run()
-    for path, fact in faults.items():
-        click.echo(f"{path}: {fact}; removed")
-    click.echo(f"{sound} sound, {len(faults)} removed")
+    done = run()
+    for path, fact in done.faults.items():
+        click.echo(f"{path}: {fact}; {'not removed' if path in done.stayed else 'removed'}")
+    click.echo(f"{done.sound} sound, {len(done.faults) - len(done.stayed)} removed")
+    refuse_stayed(done.stayed)
 
 
 @cache.command()
@@ -40,8 +47,7 @@ def prune(size: str | None) -> None:
     """Remove the least recently used entries until the rest fits."""
     from illumcli.jobs.cache import prune as run
 
-    gone = run(size)
-    click.echo(f"{len(gone)} removed, {sum(entry.bytes for entry in gone):,} bytes")
+    _tell(run(size))
 
 
 @cache.command()
@@ -49,5 +55,11 @@ def clear() -> None:
     """Remove every entry."""
     from illumcli.jobs.cache import clear as run
 
-    gone = run()
-    click.echo(f"{len(gone)} removed, {sum(entry.bytes for entry in gone):,} bytes")
+    _tell(run())
+
+
+def _tell(pruned: Pruned) -> None:
+    from illumcli.jobs.cache import refuse_stayed
+
+    click.echo(f"{len(pruned.gone)} removed, {sum(entry.bytes for entry in pruned.gone):,} bytes")
+    refuse_stayed(pruned.stayed)

@@ -188,6 +188,33 @@ def claim(path: Path, create: bool = True) -> int | None:
                 os.close(handle)
 
 
+def created(path: Path) -> int:
+    """A descriptor for reading and writing of a new file, locked until it is closed where there are locks.
+
+    Raises
+    ------
+    OSError
+        FileExistsError where there is something of this name, a link included.
+    """
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        if os.fstat(handle).st_nlink:
+            return handle
+        os.close(handle)  # another process took it for abandoned before it was locked
+
+
+def remove_abandoned(path: Path) -> None:
+    """Remove a file whose lock nobody holds, if it is this user's."""
+    with suppress(OSError):
+        handle = claim(path, create=False)
+        if handle is not None:
+            with suppress(OSError):
+                os.unlink(path)
+            os.close(handle)
+
+
 def _lock(handle: int) -> bool:
     """Lock an open file until it is closed; False where another holds it, or the file system has no locks."""
     try:

@@ -39,6 +39,8 @@ from illumcli.memory import free_memory
 from illumcli.records import Record, Value
 
 SUFFIX = ".illum"
+PART = ".part"
+ABANDONED = 86400  # [s] whoever has not written to a temporary file for so long is gone, locks or not
 LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
 LARGEST_SHARE = 4
@@ -47,7 +49,6 @@ LONGEST = 1 << 24  # [bytes] of a description
 LARGE = 1 << 26
 """An entry of so many bytes is read only where it takes no more than `MEMORY_SHARE` of the free memory."""
 MEMORY_SHARE = 0.5
-ABANDONED = 3600  # [s] a part file this old belongs to nobody
 
 _HEADER = struct.Struct("<8sIIQ32s8x")  # magic, format, length of the description, of the arrays, checksum
 _MAGIC, _FORMAT = b"illum\r\n\0", 1
@@ -73,6 +74,14 @@ class Entry(Value):
         return self.path.stem
 
 
+class Pruned(Value):
+    """What became of the entries that had to go."""
+
+    gone: tuple[Entry, ...]
+    stayed: Mapping[Path, str]
+    """Those that could not be removed, and why."""
+
+
 class Stored(Record):
     """An entry that was read and is sound. Arrays are read-only."""
 
@@ -91,7 +100,7 @@ class Store:
         self.limit = limit
         self.warning: str | None = None
         self._writes = True
-        self._saved = False
+        self._fresh: int | None = None  # bytes added since the last pruning
 
     @property
     def largest(self) -> int:
@@ -125,8 +134,7 @@ class Store:
         """Take away an entry that is of no use; the fact says why."""
         path = self._path(key)
         self._warn(f"{path}: {fact}; it is made again")
-        with suppress(OSError):
-            path.unlink()
+        removed(path)
 
     def save(self, key: str, about: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> bool:
         """Keep the arrays under this key; False where they are too large or cannot be written."""
@@ -150,7 +158,7 @@ class Store:
         text += b" " * (-(len(text) + _HEADER.size) % 64)
         if len(text) > LONGEST:
             return None
-        part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}.part"
+        part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}{PART}"
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if not self._is_trusted():  # somebody else was faster
@@ -166,14 +174,27 @@ class Store:
         fact = getattr(error, "strerror", None) or error
         self._warn(f"{self.folder}: cannot be written: {fact}; nothing more is kept there")
 
-    def saved(self) -> None:
-        """Note that an entry was added."""
-        self._saved = True
+    def saved(self, size: int) -> None:
+        """Note that an entry of so many bytes was added."""
+        self._fresh = (self._fresh or 0) + size
+        if (
+            self._fresh > self.largest
+        ):  # a long run does not outgrow the limit by more than one entry may take
+            self._prune()
 
     def finish(self) -> None:
-        """Prune, where this run added anything."""
-        if self._saved and self._writes:
-            self.prune(self.limit)
+        """Remove what killed runs left, and prune where this run added anything."""
+        if self._writes and self._is_trusted():
+            if self._fresh is None:
+                self._remove_left_over()
+            else:
+                self._prune()
+
+    def _prune(self) -> None:
+        """Prune; what cannot be removed is a warning."""
+        self._fresh = 0
+        for path, fact in self.prune(self.limit).stayed.items():
+            self._warn(f"{path}: cannot be removed: {fact}; the cache takes more than its limit")
 
     def entries(self) -> list[Entry]:
         """Every entry, the least recently used first."""
@@ -185,28 +206,36 @@ class Store:
         for entry in self.entries():
             try:
                 read_entry(entry.path, entry.key)
-            except FileNotFoundError:
-                continue  # another process was faster
+            except (FileNotFoundError, MemoryError):
+                continue  # another process was faster; too large to tell
             except (OSError, Refused) as error:
                 found[entry.path] = str(error)
         return found
 
-    def prune(self, limit: int) -> list[Entry]:
-        """Take the least recently used entries away until all fit into `limit` bytes; those taken."""
-        for part in self._files(".part"):
-            if time.time() - part.used > ABANDONED:
-                with suppress(OSError):
-                    part.path.unlink()
-        entries, gone = self.entries(), []
-        total = sum(entry.bytes for entry in entries)
+    def prune(self, limit: int) -> Pruned:
+        """Take the least recently used entries away until all fit into `limit` bytes, those in the making
+        included."""
+        self._remove_left_over()
+        entries, gone, stayed = self.entries(), [], {}
+        total = sum(entry.bytes for entry in [*entries, *self._files(PART)])
         for entry in entries:
             if total <= limit:
                 break
-            with suppress(FileNotFoundError):
-                entry.path.unlink()
-            total -= entry.bytes
-            gone.append(entry)
-        return gone
+            fact = removed(entry.path)
+            if fact is None:
+                total -= entry.bytes
+                gone.append(entry)
+            else:
+                stayed[entry.path] = fact
+        return Pruned(tuple(gone), stayed)
+
+    def _remove_left_over(self) -> None:
+        """Remove the temporary files of killed runs."""
+        for part in self._files(PART):
+            if time.time() - part.used > ABANDONED:
+                removed(part.path)
+            else:
+                atomic.remove_abandoned(part.path)
 
     def _is_trusted(self) -> bool:
         """May nobody but the user and root write to the folder, or is it not there?"""
@@ -227,7 +256,8 @@ class Store:
             if each.name.endswith(suffix):
                 with suppress(OSError):
                     status = each.stat(follow_symlinks=False)
-                    yield Entry(Path(each.path), status.st_size, status.st_mtime)
+                    if not stat.S_ISDIR(status.st_mode):
+                        yield Entry(Path(each.path), status.st_size, status.st_mtime)
 
     def _warn(self, text: str) -> None:
         self.warning = self.warning or f"cache: {text}"
@@ -247,8 +277,7 @@ class Writer:
         self._failed = False
         self._number = 0
         atomic.remember(part)
-        flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-        self._file = os.fdopen(os.open(part, flags, 0o600), "r+b", buffering=0)
+        self._file = os.fdopen(atomic.created(part), "r+b", buffering=0)
         self._try(lambda: self._file.truncate(self._start + end))
 
     def write(self, array: NDArray[Any]) -> None:
@@ -287,7 +316,7 @@ class Writer:
         with suppress(OSError):
             self._file.close()
         atomic.forget(self._part)
-        self._store.saved()
+        self._store.saved(self.bytes)
 
     def _try(self, action: Any) -> None:
         if self._failed:
@@ -315,6 +344,15 @@ def _strangers(status: os.stat_result, way: str) -> str | None:
         return f"belongs to another user ({status.st_uid}); name a folder of your own by ILLUM_CACHE"
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return f"others can write to it; {way}"
+    return None
+
+
+def removed(path: Path) -> str | None:
+    """Remove a file of the store; why it stays, None where it is gone."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        return error.strerror or str(error)
     return None
 
 

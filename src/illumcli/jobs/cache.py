@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.store import Entry, Refused, Store, described, size_of
+from illumcli.files.store import Entry, Pruned, Refused, Store, described, distrust, removed, size_of
 from illumcli.jobs.render import opened_store
 from illumcli.records import Value
 
@@ -31,11 +31,14 @@ def listing() -> Listing:
     found = []
     for entry in store.entries():
         try:
-            found.append((entry, str(described(entry.path)["about"]["buffer"])))
+            buffer = described(entry.path)["about"]["buffer"]
         except FileNotFoundError:
             continue
-        except (OSError, Refused, KeyError, TypeError):  # the last two: a description of something else
-            found.append((entry, "damaged"))
+        except (OSError, Refused, LookupError, TypeError):  # the last two: a description of something else
+            buffer = None
+        # a name is printed, and may have been made up to move the terminal's cursor
+        named = isinstance(buffer, str) and buffer.isprintable()
+        found.append((entry, str(buffer) if named else "damaged"))
     return Listing(store.folder, store.limit, tuple(found))
 
 
@@ -58,48 +61,50 @@ def ago(seconds: float) -> str:
     return f"{max(seconds, 0):.0f} s"
 
 
-def verify() -> tuple[int, dict[Path, str]]:
-    """The number of sound entries, and what is wrong with the others, which are removed."""
+class Verified(Value):
+    """What is sound, and what was wrong with the rest."""
+
+    sound: int
+    faults: Mapping[Path, str]
+    """By entry, those removed and those that stay."""
+    stayed: Mapping[Path, str]
+    """Of these, the ones that could not be removed, and why."""
+
+
+def verify() -> Verified:
+    """Read every entry and remove those that are not sound."""
     store = _opened()
     count = len(store.entries())
     faults = store.faults()
-    for path in faults:
-        _remove(path)
-    return count - len(faults), faults
+    stayed = {path: fact for path in faults if (fact := removed(path)) is not None}
+    return Verified(count - len(faults), faults, stayed)
 
 
-def prune(size: str | None = None) -> list[Entry]:
+def prune(size: str | None = None) -> Pruned:
     """Take the least recently used entries away until the rest has at most `size`, the limit by default."""
     store = _opened()
     try:
-        limit = store.limit if size is None else size_of(size)
+        return store.prune(store.limit if size is None else size_of(size))
     except ValueError:
         raise InputError(f"--size {size}: write it as 500M or 4G") from None
-    return _pruned(store, limit)
 
 
-def clear() -> list[Entry]:
+def clear() -> Pruned:
     """Take everything away."""
-    return _pruned(_opened(), 0)
+    return _opened().prune(0)
+
+
+def refuse_stayed(stayed: Mapping[Path, str]) -> None:
+    """Raise OutputError where entries could not be removed."""
+    if stayed:
+        lines = [f"{path}: cannot be removed: {fact}; check its permissions" for path, fact in stayed.items()]
+        raise OutputError("\n".join(lines))
 
 
 def _opened() -> Store:
     store = opened_store()
     if store is None:
         raise InputError("there is no home folder to keep anything in; name one by ILLUM_CACHE")
+    if (fact := distrust(store.folder)) is not None:
+        raise InputError(f"{store.folder}: {fact}")
     return store
-
-
-def _pruned(store: Store, limit: int) -> list[Entry]:
-    try:
-        return store.prune(limit)
-    except OSError as error:
-        raise OutputError(f"{store.folder}: {error.strerror or error}; check its permissions") from error
-
-
-def _remove(path: Path) -> None:
-    with contextlib.suppress(FileNotFoundError):
-        try:
-            path.unlink()
-        except OSError as error:
-            raise OutputError(f"{path}: {error.strerror or error}; check its permissions") from error

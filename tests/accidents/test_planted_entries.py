@@ -182,6 +182,27 @@ def test_a_folder_of_another_user_is_neither_read_nor_written(store):
     assert "belongs to another user (12345)" in store.warning
 
 
+@ROOT
+def test_a_link_of_another_user_to_a_folder_is_not_followed(tmp_path):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "kept").symlink_to(tmp_path / "own")
+    store = Store(tmp_path / "kept")
+    assert store.save(KEY, {}, [np.ones(3)])
+    os.chown(tmp_path / "kept", 12345, -1, follow_symlinks=False)
+    assert not store.save("f" * 32, {}, [np.ones(3)])
+    assert "belongs to another user" in store.warning
+
+
+def test_files_of_others_in_the_folder_are_neither_counted_nor_removed(store, path):
+    store.save(KEY, {}, [np.ones(3)])
+    names = ["film.part", "film.mkv.part", "notes.illum", ".0123.old.part", f"{KEY}.illum.bak"]
+    for name in names:
+        (store.folder / name).write_bytes(bytes(9))
+    assert len(store.prune(0).gone) == 1
+    store.finish()
+    assert sorted(each.name for each in store.folder.iterdir()) == sorted(names)
+
+
 CUT = """
 import os
 from pathlib import Path

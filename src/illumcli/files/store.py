@@ -39,7 +39,6 @@ from illumcli.memory import free_memory
 from illumcli.records import Record, Value
 
 SUFFIX = ".illum"
-PART = ".part"
 ABANDONED = 86400  # [s] whoever has not written to a temporary file for so long is gone, locks or not
 LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
@@ -55,6 +54,9 @@ _MAGIC, _FORMAT = b"illum\r\n\0", 1
 _WORDS = 8192  # words of 8 bytes that one sum covers
 _PIECE = 16 * 8 * _WORDS  # [bytes] read at a time: summed while the processor's cache still holds it
 _TYPE = re.compile("[<>|][biuf][1248]")
+_ENTRY = re.compile(r"[0-9a-f]+\.illum")
+_PART = re.compile(r"\.[0-9a-f]+\.[0-9]+\.[0-9a-f]{8}\.part")
+"""Names of what the store writes: nothing else in its folder is looked at or removed."""
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
 
@@ -158,7 +160,7 @@ class Store:
         text += b" " * (-(len(text) + _HEADER.size) % 64)
         if len(text) > LONGEST:
             return None
-        part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}{PART}"
+        part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}.part"
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if not self._is_trusted():  # somebody else was faster
@@ -198,7 +200,7 @@ class Store:
 
     def entries(self) -> list[Entry]:
         """Every entry, the least recently used first."""
-        return sorted(self._files(SUFFIX), key=lambda entry: (entry.used, entry.path))
+        return sorted(self._files(_ENTRY), key=lambda entry: (entry.used, entry.path))
 
     def faults(self) -> dict[Path, str]:
         """What is wrong with each entry that is not sound."""
@@ -217,7 +219,7 @@ class Store:
         included."""
         self._remove_left_over()
         entries, gone, stayed = self.entries(), [], {}
-        total = sum(entry.bytes for entry in [*entries, *self._files(PART)])
+        total = sum(entry.bytes for entry in [*entries, *self._files(_PART)])
         for entry in entries:
             if total <= limit:
                 break
@@ -231,7 +233,7 @@ class Store:
 
     def _remove_left_over(self) -> None:
         """Remove the temporary files of killed runs."""
-        for part in self._files(PART):
+        for part in self._files(_PART):
             if time.time() - part.used > ABANDONED:
                 removed(part.path)
             else:
@@ -247,13 +249,13 @@ class Store:
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}{SUFFIX}"
 
-    def _files(self, suffix: str) -> Iterator[Entry]:
+    def _files(self, names: re.Pattern[str]) -> Iterator[Entry]:
         try:
             found = list(os.scandir(self.folder))
         except OSError:
             return
         for each in found:
-            if each.name.endswith(suffix):
+            if names.fullmatch(each.name):
                 with suppress(OSError):
                     status = each.stat(follow_symlinks=False)
                     if not stat.S_ISDIR(status.st_mode):
@@ -332,17 +334,18 @@ def distrust(folder: Path) -> str | None:
     """Why nothing in this folder can be trusted, and the way out; None where only the user and root write to
     it, or where there is none."""
     try:
-        status = os.stat(folder)
+        link, status = os.lstat(folder), os.stat(folder)
     except OSError:
         return None
-    return _strangers(status, f"chmod go-w {folder}, or name another folder by ILLUM_CACHE")
+    way = f"chmod go-w {folder}, or name another folder by ILLUM_CACHE"
+    return _strangers(link, way) or _strangers(status, way)
 
 
 def _strangers(status: os.stat_result, way: str) -> str | None:
     """Who but the user and root may write to a file or folder, and the way out; None for nobody."""
     if status.st_uid not in (0, os.geteuid()):
         return f"belongs to another user ({status.st_uid}); name a folder of your own by ILLUM_CACHE"
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    if not stat.S_ISLNK(status.st_mode) and status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return f"others can write to it; {way}"
     return None
 

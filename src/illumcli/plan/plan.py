@@ -93,13 +93,13 @@ class Plan(Value):
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.layers) else side
 
     def expected_bytes(self) -> dict[str, int]:
-        """What the run takes beyond its meshes: a band of tiles, and each artifact that may be written, whose
-        pages the system may drop. Upper bounds."""
+        """What the run takes beyond its meshes: a band of tiles, each artifact that is read, each that may be
+        written, whose pages the system may drop. Upper bounds."""
         sizes = {}
         for view in self.views:
             lanes = min(view.height, self.tile_side(view)) * view.width * view.samples
             sizes["band"] = lanes * 4 * sum(len(layer.channels) for layer in self.layers) // view.samples
-            for name in self.keeps:
+            for name in [*self.keeps, *self.reused]:
                 if kind := kind_of(name):
                     shape, dtype = Picture.shape(kind, view)
                     sizes[name] = math.prod(shape) * np.dtype(dtype).itemsize

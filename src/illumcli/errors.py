@@ -45,6 +45,12 @@ class OutputError(IllumError):
 
 LITTLE_MEMORY = "out of memory; make the film, the meshes or the samples smaller"
 
+_LITTLE_MEMORY_TOO = ("start new thread", "allocate lock", "allocate read lock")
+"""What Python calls RuntimeError where it has no memory."""
+
+_NO_REASON = ("without exception set", "without setting an exception")
+"""What becomes of a function of numpy that gets no memory."""
+
 
 def known(error: BaseException) -> IllumError | None:
     """The same as one of ours, where its cause are the surroundings; None for a fault of the program."""
@@ -62,6 +68,8 @@ def known(error: BaseException) -> IllumError | None:
         case ImportError():  # most often too little memory to map a library
             said = str(error).strip().splitlines()[-1:] or ["no reason given"]
             return LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again")
-        case RuntimeError() if "start new thread" in str(error):  # it wants memory, too
+        case RuntimeError() if any(fact in str(error) for fact in _LITTLE_MEMORY_TOO):
+            return LimitError(LITTLE_MEMORY)
+        case SystemError() if any(fact in str(error) for fact in _NO_REASON):
             return LimitError(LITTLE_MEMORY)
     return None

@@ -6,7 +6,8 @@ a run what its scene uses. Nothing is registered and no list is kept.
 
 from __future__ import annotations
 
-import pkgutil
+import os
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from typing import Any, get_args
@@ -26,8 +27,26 @@ from illumcli.records import Value
 @cache
 def tags(package: str) -> tuple[str, ...]:
     """The tags of a family, sorted: its modules, without the helpers that begin with an underscore."""
-    found = pkgutil.iter_modules(import_module(package).__path__)
-    return tuple(sorted(module.name for module in found if not module.name.startswith("_")))
+    return modules(import_module(package).__path__)
+
+
+def modules(folders: Iterable[str]) -> tuple[str, ...]:
+    """The names of the modules and packages in folders, sorted, without those that begin with an underscore.
+
+    `pkgutil` would call a folder empty where the system refuses to list it.
+
+    Raises
+    ------
+    OSError
+        Such a refusal.
+    """
+    names = {
+        entry.name.partition(".")[0]
+        for folder in folders
+        for entry in os.scandir(folder)
+        if entry.name.endswith(".py") or entry.is_dir()
+    }
+    return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
 @cache

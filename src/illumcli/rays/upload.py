@@ -41,26 +41,40 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
         TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(triangles))
         return
     device = library.rtcGetSceneDevice(handle)
-    geometry = library.rtcNewGeometry(device, TRIANGLES)
-    # vertices lie 16 bytes apart: Embree reads each with one aligned load
-    for kind, form, width, array in ((VERTEX, FLOAT3, 4, vertices), (INDEX, UINT3, 3, triangles)):
-        place = library.rtcSetNewGeometryBuffer(geometry, kind, 0, form, 4 * width, len(array))
-        if not place:
-            raise MemoryError
-        room = (ctypes.c_uint32 * (width * len(array))).from_address(place)
-        np.frombuffer(memoryview(room), array.dtype).reshape(-1, width)[:, :3] = array
-    library.rtcCommitGeometry(geometry)
-    library.rtcAttachGeometry(handle, geometry)
-    library.rtcReleaseGeometry(geometry)
-    library.rtcSetDeviceErrorFunction(device, None, None)  # embreex's own wants the lock
-    library.rtcCommitScene(handle)
-    error = library.rtcGetDeviceError(device)
-    library.rtcReleaseDevice(device)
+    # embreex's own wants the interpreter's lock, which these calls do not hold
+    library.rtcSetDeviceErrorFunction(device, None, None)
+    try:
+        _commit(library, device, handle, vertices, triangles)
+        error = library.rtcGetDeviceError(device)
+    finally:
+        library.rtcReleaseDevice(device)
     if error == OUT_OF_MEMORY:
         raise MemoryError
     if error:
         raise IllumError(f"the ray core failed to build: error {error} of Embree")
     scene.is_committed = 1
+
+
+def _commit(
+    library: Any, device: int, handle: int, vertices: NDArray[np.float32], triangles: NDArray[np.int32]
+) -> None:
+    """Attach the triangles to Embree's scene and build it; MemoryError where a part of it cannot be made."""
+    geometry = library.rtcNewGeometry(device, TRIANGLES)
+    if not geometry:  # every call that is given none ends the process
+        raise MemoryError
+    try:
+        # vertices lie 16 bytes apart: Embree reads each with one aligned load
+        for kind, form, width, array in ((VERTEX, FLOAT3, 4, vertices), (INDEX, UINT3, 3, triangles)):
+            place = library.rtcSetNewGeometryBuffer(geometry, kind, 0, form, 4 * width, len(array))
+            if not place:
+                raise MemoryError
+            room = (ctypes.c_uint32 * (width * len(array))).from_address(place)
+            np.frombuffer(memoryview(room), array.dtype).reshape(-1, width)[:, :3] = array
+        library.rtcCommitGeometry(geometry)
+        library.rtcAttachGeometry(handle, geometry)
+    finally:
+        library.rtcReleaseGeometry(geometry)
+    library.rtcCommitScene(handle)
 
 
 def _handle(scene: Any) -> int | None:

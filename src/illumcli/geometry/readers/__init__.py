@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pkgutil
 import re
 from collections.abc import Iterator
 from contextlib import suppress
@@ -14,6 +13,7 @@ import numpy as np
 
 from illumcli.errors import IllumError, InputError, LimitError
 from illumcli.geometry.mesh import Mesh
+from illumcli.variants import modules
 
 MOST_WORDS = 128  # of a line that names files, with the blanks between them
 LONGEST_PLY_HEADER = 1 << 20  # [bytes]
@@ -46,8 +46,7 @@ def read_mesh(path: Path) -> Mesh:
 
 def _readers() -> dict[str, str]:
     """Suffix -> module."""
-    names = [module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")]
-    return {f".{name}": name for name in names} | OTHER_SUFFIXES
+    return {f".{name}": name for name in modules(__path__)} | OTHER_SUFFIXES
 
 
 def image_within(texture: str) -> tuple[str, int] | None:

@@ -8,11 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from illumcli.errors import OutputError
 from illumcli.files import atomic
 from illumcli.files.atomic import Part, write_bytes, write_text
+from illumcli.files.writer import ImageWriter
 
 
 def parts(folder: Path) -> list[str]:
@@ -38,7 +40,7 @@ def test_old_file_stays_until_the_new_one_is_whole(tmp_path):
     with Part(target) as part:
         part.path.write_text("new")
         assert target.read_text() == "old"
-        assert part.path.parent == tmp_path
+        assert len(parts(tmp_path)) == 1
     assert target.read_text() == "new"
 
 
@@ -103,7 +105,7 @@ def test_the_longest_name_that_the_system_takes_is_written_and_no_longer_one(tmp
     assert parts(tmp_path) == []
 
 
-@pytest.mark.parametrize("call", ["open", "fsync", "replace", "close", "scandir"])
+@pytest.mark.parametrize("call", ["open", "fsync", "replace", "scandir", "fstat", "lstat"])
 @pytest.mark.parametrize(
     ("number", "way"),
     [
@@ -123,7 +125,7 @@ def test_refused_system_calls_are_output_errors(tmp_path, monkeypatch, call, num
     monkeypatch.undo()
     assert caught.value.exit_code == 5
     assert not (tmp_path / "a.txt").exists()
-    assert parts(tmp_path) == [] or call == "close"  # a refused close leaves it for the next run
+    assert parts(tmp_path) == [] or call == "fstat"  # of the file that was just made: left for the next run
 
 
 def test_full_disk_while_writing_is_an_output_error(tmp_path):
@@ -143,26 +145,127 @@ def test_error_of_another_file_stays_what_it_is(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_parts_of_dead_processes_are_removed_and_no_others(tmp_path, monkeypatch):
-    died = subprocess.run(
-        [sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True
-    )
-    target, host = tmp_path / "a.txt", atomic._host()
-    dead = atomic.beside(target, f"{host}.{int(died.stdout)}.0123abcd.part")
-    kept = [
-        atomic.beside(target, f"{host}.{os.getpid()}.0123abcd.part"),  # of a live process
-        atomic.beside(tmp_path / "b.txt", f"{host}.{int(died.stdout)}.0123abcd.part"),  # of another file
-        tmp_path / ".a.txt.part",
-    ]
-    monkeypatch.setattr(atomic.os, "uname", lambda: os.uname_result(("", "elsewhere", "", "", "")))
-    elsewhere = atomic._host()
-    kept.append(atomic.beside(target, f"{elsewhere}.{int(died.stdout)}.0123abcd.part"))
-    monkeypatch.undo()
-    for path in (dead, *kept):
+def test_parts_that_nobody_holds_are_removed_and_no_others(tmp_path):
+    target, other = tmp_path / "a.txt", Part(tmp_path / "b.txt")
+    (live,) = parts(tmp_path)
+    dead = [atomic.beside(tmp_path / name, "0123abcd.part") for name in ("a.txt", "c.txt")]
+    mine = tmp_path / ".a.txt.part"
+    for path in (*dead, mine):
         path.write_text("half")
+    atomic._tidied.clear()
+    write_text(target, "whole")
+    assert sorted(os.listdir(tmp_path)) == sorted([live, "a.txt", mine.name])
+    other.path.write_text("whole")
+    other.commit()
+    assert (tmp_path / "b.txt").read_text() == "whole"
+
+
+LIVE = """
+import sys, time
+from illumcli.files.atomic import Part
+with Part(sys.argv[1]) as part:
+    part.path.write_text("theirs")
+    print("there", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_the_part_of_a_live_process_is_kept_whatever_its_host_and_number_seem(tmp_path):
+    target = tmp_path / "a.txt"
+    with subprocess.Popen(
+        [sys.executable, "-c", LIVE, target], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.readline()
+        write_text(target, "ours")
+        assert len(parts(tmp_path)) == 1
+        process.communicate("")
+    assert process.returncode == 0
+    assert target.read_text() == "theirs"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o644, 0o444, 0o755, 0o4755])
+def test_the_mode_of_a_replaced_file_is_kept(tmp_path, mode):
+    (tmp_path / "a.txt").write_text("old")
+    (tmp_path / "a.txt").chmod(mode)
+    with Part(tmp_path / "a.txt") as part:
+        (name,) = parts(tmp_path)
+        assert (tmp_path / name).stat().st_mode & 0o077 == 0
+        part.path.write_text("new")
+    assert (tmp_path / "a.txt").stat().st_mode & 0o7777 == mode & 0o777
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+def test_the_owner_of_a_replaced_file_is_kept(tmp_path):
+    (tmp_path / "a.txt").write_text("old")
+    os.chown(tmp_path / "a.txt", 12345, 23456)
+    write_text(tmp_path / "a.txt", "new")
+    status = (tmp_path / "a.txt").stat()
+    assert (status.st_uid, status.st_gid) == (12345, 23456)
+
+
+@pytest.mark.parametrize("name", ["a.txt", "a.png", "a.exr"])
+def test_a_link_that_takes_the_place_of_a_part_is_not_followed(tmp_path, name):
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+
+    def swap():
+        (planted,) = parts(tmp_path)
+        (tmp_path / planted).unlink()
+        (tmp_path / planted).symlink_to(victim)
+
+    def write():
+        if name == "a.txt":
+            with Part(tmp_path / name) as part:
+                swap()
+                part.path.write_text("new")
+            return
+        kind = {"a.png": "uint8", "a.exr": "half"}[name]
+        with ImageWriter(tmp_path / name, 4, 4, dict.fromkeys("RGB", kind)) as image:
+            swap()
+            image.write_band(0, np.zeros((4, 4, 3), np.uint8 if kind == "uint8" else np.float32))
+
+    with pytest.raises(OutputError, match="another file took its place"):
+        write()
+    assert victim.read_text() == "precious"
+    assert sorted(os.listdir(tmp_path)) == ["victim"]
+
+
+@pytest.mark.parametrize("kind", ["symbolic link", "hard link", "pipe", "folder", "held"])
+def test_planted_parts_are_neither_opened_nor_waited_for(tmp_path, kind):
+    victim, planted = tmp_path / "victim", atomic.beside(tmp_path / "a.txt", "0123abcd.part")
+    victim.write_text("precious")
+    match kind:
+        case "symbolic link":
+            planted.symlink_to(victim)
+        case "hard link":
+            os.link(victim, planted)
+        case "pipe":
+            os.mkfifo(planted)
+        case "folder":
+            planted.mkdir()
+        case "held":
+            planted.write_text("")
+    held = atomic.claim(planted) if kind == "held" else None
     write_text(tmp_path / "a.txt", "whole")
-    assert not dead.exists()
-    assert all(path.exists() for path in kept)
+    assert victim.read_text() == "precious"
+    assert (tmp_path / "a.txt").read_text() == "whole"
+    assert os.path.lexists(planted)
+    if held is not None:
+        os.close(held)
+
+
+def test_a_system_without_names_for_open_files_or_without_locks_writes_too(tmp_path, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(atomic.fcntl, "flock", refuse)
+    monkeypatch.setattr(atomic, "_OPEN_FILES", "/proc/none")
+    left = atomic.beside(tmp_path / "a.txt", "0123abcd.part")
+    left.write_text("perhaps alive")
+    write_text(tmp_path / "a.txt", "whole")
+    assert (tmp_path / "a.txt").read_text() == "whole"
+    assert left.exists()
 
 
 def test_killed_process_leaves_no_file_and_the_next_run_tidies_up(tmp_path):
@@ -196,19 +299,8 @@ def test_a_signal_that_falls_before_the_block_leaves_no_file_either(tmp_path, mo
     assert os.listdir(tmp_path) == []
 
 
-def test_a_part_of_somebody_elses_process_is_kept(tmp_path, monkeypatch):
-    def theirs(pid: int, number: int) -> None:
-        raise PermissionError(errno.EPERM, "Operation not permitted")
-
-    monkeypatch.setattr(atomic.os, "kill", theirs)
-    part = atomic.beside(tmp_path / "a.txt", f"{atomic._host()}.1.0123abcd.part")
-    part.write_text("half")
-    write_text(tmp_path / "a.txt", "whole")
-    assert part.exists()
-
-
 def test_a_part_that_is_gone_already_is_discarded_too(tmp_path):
     part = Part(tmp_path / "a.txt")
-    part.path.unlink()
+    (tmp_path / parts(tmp_path)[0]).unlink()
     part.discard()
     assert not [path for path in atomic._open if path.parent == tmp_path]

@@ -9,9 +9,9 @@ import re
 
 import pytest
 
-from illumcli.errors import InputError, LimitError
+from illumcli.errors import InputError, LimitError, OutputError
 from illumcli.files.images import read_image
-from illumcli.jobs.sweep import Settings, at_frame, axis_of, run, split, variants_of
+from illumcli.jobs.sweep import Files, Settings, at_frame, axis_of, run, split, variants_of
 
 SCENE = """
 version: 1
@@ -206,6 +206,36 @@ def test_a_sweep_goes_on_where_it_stopped(illum, scene, tmp_path):
     assert [line.split(",")[5] for line in (tmp_path / "t.csv").read_text().split()] == [
         "state", "kept", "rendered", "kept"
     ]  # fmt: skip
+
+
+def test_a_failed_sweep_leaves_a_whole_sheet_as_it_is(illum, scene, tmp_path):
+    axis = "materials.clay.specular=0.1,0.2"
+    assert illum("sweep", scene, "-D", axis, "--sheet", "s.png").returncode == 0
+    whole = (tmp_path / "s.png").read_bytes()
+    (tmp_path / "ball-0.4.png").mkdir()
+    more = "materials.clay.specular=0.3,0.4"
+    done = illum("sweep", scene, "-D", more, "--sheet", "s.png", "--force")
+    assert done.returncode == 5
+    assert (tmp_path / "s.png").read_bytes() == whole
+    assert "s.png: stays as it is" in done.stderr
+    # one that lacks pictures is replaced by a better one
+    assert illum("sweep", scene, "-D", more, "--sheet", "half.png").returncode == 5
+    half = (tmp_path / "half.png").read_bytes()
+    (tmp_path / "ball-0.4.png").rmdir()
+    assert illum("sweep", scene, "-D", more, "--sheet", "half.png").returncode == 0
+    assert (tmp_path / "half.png").read_bytes() != half
+
+
+def test_pictures_that_vanish_before_the_table_is_written_are_exit_5(scene, tmp_path):
+    def gone(outcome):
+        for path in outcome.paths:
+            path.unlink()
+
+    variants = variants_of(["materials.clay.specular=0.1,0.2"])
+    files = Files(table=tmp_path / "t.csv")
+    settings = Settings(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
+    with pytest.raises(OutputError, match="others took it away"):
+        run(scene, variants, settings, files, written=gone)
 
 
 def test_a_moving_light_casts_its_own_rays_alone(illum, scene, tmp_path):

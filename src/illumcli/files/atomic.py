@@ -2,6 +2,9 @@
 
 A rename is atomic; the two fsyncs keep a crash of the machine from leaving an empty file behind the new name
 (Pillai et al. 2014, All file systems are not created equal, OSDI '14).
+
+Every file in the making is created anew, never opened through a link, and locked (flock) by the process that
+writes it. A file without a lock was left behind: process numbers and host names tell nothing to a container.
 """
 
 from __future__ import annotations
@@ -33,16 +36,21 @@ _WAYS_OUT = {
 }
 
 
+_LEFT_OVER = re.compile(r"\.[0-9a-f]{12}\.[0-9a-f]{8}\.part")
+_OPEN_FILES = "/proc/self/fd"
+
 _open: set[Path] = set()
 """Parts of this process that are neither committed nor discarded."""
+_tidied: set[Path] = set()
+"""Folders in which this process has looked for parts that others left behind."""
 
 
 class Part:
     """A file in the making: write to `path`, then `commit`; `discard` leaves no trace.
 
     As a context manager it commits at the end of the block and discards on any exception, interrupts
-    included. Missing parent folders are made. Parts that killed processes of this machine left behind for the
-    same target are removed first.
+    included. Missing parent folders are made. Parts that killed processes left behind in the folder are
+    removed first. The mode of a file that is replaced is kept, and meanwhile nobody else reads the part.
 
     Raises
     ------
@@ -50,40 +58,64 @@ class Part:
         What the operating system refuses, here, in `commit`, or in the block while it writes to `path`.
     """
 
-    path: Path  # to write to; exists and is empty
-    target: Path  # what `path` will be called
+    path: Path
+    """To write to: the empty file itself, whatever others do to its name, where the system can say so."""
+    target: Path
+    """What the file will be called."""
 
     def __init__(self, target: str | os.PathLike[str]) -> None:
         self._named = os.fspath(target)
         self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
         folder = self.target.parent
-        self.path = beside(self.target, f"{_host()}.{os.getpid()}.{os.urandom(4).hex()}.part")
         with refusals(self._named):
-            if self.target.exists() and not self.target.is_file():
+            self._replaced = _status(self.target)
+            if self._replaced is not None and not stat.S_ISREG(self._replaced.st_mode):
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
             folder.mkdir(parents=True, exist_ok=True)
-            _remove_left_over(self.target)
-            _open.add(self.path)  # before it exists: a signal may end this call anywhere
-            os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            remove_left_over(folder)
+            self._name = beside(self.target, f"{os.urandom(4).hex()}.part")
+            _open.add(self._name)  # before it exists: a signal may end this call anywhere
+            try:
+                self._handle = created(self._name, 0o666 if self._replaced is None else 0o600)
+            except OSError:
+                _open.discard(self._name)
+                raise
+        itself = Path(_OPEN_FILES, str(self._handle))
+        self.path = itself if itself.exists() else self._name
 
     def commit(self) -> None:
         """Force the part to disk and give it its name; the name's old file is replaced."""
         try:
             with refusals(self._named):
-                _force(self.path)
-                os.replace(self.path, self.target)
-            _open.discard(self.path)
+                os.fsync(self._handle)
+                if self._replaced is not None:
+                    _make_like(self._handle, self._replaced)
+                if not os.path.samestat(os.fstat(self._handle), os.lstat(self._name)):
+                    raise OutputError(
+                        f"{self._named}: another file took its place; choose a folder of your own"
+                    )
+                os.replace(self._name, self.target)
+            _open.discard(self._name)
         except BaseException:
             self.discard()
             raise
+        self._unlock()
         with suppress(OSError):  # some file systems cannot; the file is whole by now
             _force(self.target.parent)
 
     def discard(self) -> None:
         """Remove what was written so far; nothing happens after `commit`."""
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
-            _open.discard(self.path)
+        if self._name in _open:
+            with suppress(OSError):
+                self._name.unlink(missing_ok=True)
+                _open.discard(self._name)
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self._handle >= 0:
+            with suppress(OSError):  # what matters is on disk
+                os.close(self._handle)
+            self._handle = -1
 
     def __enter__(self) -> Self:
         return self
@@ -171,7 +203,7 @@ def claim(path: Path, create: bool = True) -> int | None:
         try:
             about = os.fstat(handle)
             own = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink < 2
-            if not own or not _lock(handle):
+            if not own or _lock(handle) != 0:
                 return None
             about = os.fstat(handle)
             if about.st_nlink == 0:  # removed before it was locked
@@ -188,7 +220,7 @@ def claim(path: Path, create: bool = True) -> int | None:
                 os.close(handle)
 
 
-def created(path: Path) -> int:
+def created(path: Path, mode: int = 0o600) -> int:
     """A descriptor for reading and writing of a new file, locked until it is closed where there are locks.
 
     Raises
@@ -197,12 +229,12 @@ def created(path: Path) -> int:
         FileExistsError where there is something of this name, a link included.
     """
     while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        with suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        if os.fstat(handle).st_nlink:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
+        if _lock(handle) != errno.EWOULDBLOCK and os.fstat(handle).st_nlink:
             return handle
-        os.close(handle)  # another process took it for abandoned before it was locked
+        # another process took it for abandoned before it was locked
+        os.close(handle)
+        path.unlink(missing_ok=True)
 
 
 def remove_abandoned(path: Path) -> None:
@@ -215,13 +247,35 @@ def remove_abandoned(path: Path) -> None:
             os.close(handle)
 
 
-def _lock(handle: int) -> bool:
-    """Lock an open file until it is closed; False where another holds it, or the file system has no locks."""
+def _lock(handle: int) -> int:
+    """Lock an open file until it is closed; 0, or the number of what stands against it: EWOULDBLOCK where
+    another holds it, others where the file system has no locks."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+    except OSError as error:
+        return error.errno or errno.EIO
+    return 0
+
+
+def _status(path: Path) -> os.stat_result | None:
+    """What the system says of a file; None where there is none."""
+    try:
+        return path.stat()
+    except FileNotFoundError:
+        return None
+
+
+def _make_like(handle: int, old: os.stat_result) -> None:
+    """Give an open file the owner, where that is allowed, and the mode of the one that it replaces."""
+    mode = stat.S_IMODE(old.st_mode) & 0o777
+    new = os.fstat(handle)
+    if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+        try:
+            os.fchown(handle, old.st_uid, old.st_gid)
+        except OSError:
+            mode &= 0o707 if new.st_gid != old.st_gid else 0o777  # its group is another
+    with suppress(PermissionError):  # some file systems have no modes
+        os.fchmod(handle, mode)
 
 
 def _force(path: Path) -> None:
@@ -237,30 +291,21 @@ def beside(target: Path, ending: str) -> Path:
     return target.with_name(f".{_digest(os.fsencode(target.name))}.{ending}")
 
 
-def _host() -> str:
-    """The machine's name as part of a file name: a process number means nothing on another machine."""
-    return _digest(os.uname().nodename.encode())
-
-
 def _digest(name: bytes) -> str:
     return hashlib.blake2b(name, digest_size=6).hexdigest()
 
 
-def _remove_left_over(target: Path) -> None:
-    """Remove parts of `target` whose process on this machine is gone."""
-    ours = re.compile(re.escape(beside(target, _host()).name) + r"\.(\d+)\.[0-9a-f]{8}\.part")
-    for entry in os.scandir(target.parent):
-        match = ours.fullmatch(entry.name)
-        if match and not _alive(int(match[1])):
-            with suppress(FileNotFoundError):  # another process was faster
-                os.unlink(entry.path)
+def remove_left_over(folder: Path) -> None:
+    """Remove the parts in a folder that no process holds; once per folder and process.
 
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # somebody else's
-        pass
-    return True
+    Raises
+    ------
+    OSError
+        The folder cannot be read.
+    """
+    if folder in _tidied:
+        return
+    for entry in os.scandir(folder):
+        if _LEFT_OVER.fullmatch(entry.name):
+            remove_abandoned(Path(entry.path))
+    _tidied.add(folder)

@@ -54,6 +54,11 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
     return False
 
 
+def is_whole(path: Path) -> bool:
+    """Is there a file that nothing failed of?"""
+    return path.is_file() and INCOMPLETE not in stored_contents(path)
+
+
 def refresh(path: Path) -> None:
     """Date a file that is kept now, so that `make` takes it for made."""
     with suppress(OSError):  # somebody else's file, a folder that is read-only

@@ -42,9 +42,10 @@ class Batch:
             self.failures[number] = failure
             self._tell(f"{label}: {failure}" if label else str(failure))
 
-    def finish(self) -> None:
-        """Raise how many pieces failed, with the exit code of the first."""
+    def finish(self, *also: str) -> None:
+        """Raise how many pieces failed and what is `also` to be told, with the exit code of the first."""
         if self.failures:
-            whole = IllumError(f"{len(self.failures)} of {self._count} {self._what} failed")
+            failed = f"{len(self.failures)} of {self._count} {self._what} failed"
+            whole = IllumError("\n".join([failed, *also]))
             whole.exit_code = self.failures[min(self.failures)].exit_code
             raise whole

@@ -145,9 +145,11 @@ def run(
         store.finish()
         sweep.warnings += [store.warning] if store.warning else []
     sweep.seconds = time.perf_counter() - start
+    spared: list[str] = []
     if any(outcome.report for outcome in sweep.outcomes):
-        sweep.kept = to_write.write(sweep.outcomes)
-    batch.finish()
+        spared = to_write.write(sweep.outcomes)
+        sweep.kept = list(to_write.kept)
+    batch.finish(*spared)
     return sweep
 
 

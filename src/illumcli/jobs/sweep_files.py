@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.errors import InputError
+from illumcli.errors import InputError, OutputError
 from illumcli.files.content import file_digest
-from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
+from illumcli.files.outputs import INCOMPLETE, is_kept, is_whole, refresh, refuse_suffix
 from illumcli.jobs.render import channels
 from illumcli.plan.keys import digest
 from illumcli.records import Record, Value
@@ -52,21 +52,25 @@ class ToWrite(Value):
     """By the variants' numbers; those that failed have none."""
     kept: tuple[Path, ...]
 
-    def write(self, outcomes: Sequence[Outcome]) -> list[Path]:
-        """Write all but those that are kept, which these are."""
+    def write(self, outcomes: Sequence[Outcome]) -> list[str]:
+        """Write all but those that are kept; what is to be told of those that failures spare."""
         from illumcli.files.atomic import write_text
 
-        files = self.files
+        files, spared = self.files, []
         if files.table is not None and files.table not in self.kept:
             write_text(files.table, table(outcomes, self._contents(outcomes), self.reference))
         if files.sheet is not None and files.sheet not in self.kept:
-            sheet(outcomes, files.sheet, _of_all(self._contents(outcomes)))
+            content = _of_all(self._contents(outcomes))
+            if content == INCOMPLETE and is_whole(files.sheet):
+                spared.append(f"{files.sheet}: stays as it is; a new one would lack pictures")
+            else:
+                sheet(outcomes, files.sheet, content)
         if files.report is not None and files.report not in self.kept:
             entries = report_data(outcomes, self._contents(outcomes))
             write_text(files.report, json.dumps(entries, indent=1) + "\n")
         for path in self.kept:
             refresh(path)
-        return list(self.kept)
+        return spared
 
     def _contents(self, outcomes: Sequence[Outcome]) -> list[str]:
         return [
@@ -169,6 +173,20 @@ def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
     return np.stack([found[name] for name in names], axis=-1), image.encoded
 
 
+def written_colors(path: Path) -> tuple[NDArray[np.float32], bool]:
+    """`colors` of a picture that this sweep wrote.
+
+    Raises
+    ------
+    OutputError
+        It is there no more.
+    """
+    try:
+        return colors(path)
+    except InputError as error:
+        raise OutputError(f"{path}: was written, and others took it away; run the sweep again") from error
+
+
 def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Reference | None) -> str:
     """CSV: a line per variant with its values, file, content, seconds, rays, mean light and, against
     `reference`, RMSE and largest difference of its first file."""
@@ -178,7 +196,7 @@ def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Refer
     against = None
     if reference is not None:
         own = [outcome.paths[0] for outcome in outcomes if outcome.number == reference.number]
-        against = colors(own[0])[0] if own else reference.pixels
+        against = written_colors(own[0])[0] if own else reference.pixels
     measures = ["mean"] + (["rmse", "largest"] if reference is not None else [])
     out = io.StringIO()
     lines = csv.writer(out, lineterminator="\n")
@@ -196,7 +214,7 @@ def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Refer
             sum(report.rays.values()) if report else "", reused,
         ]  # fmt: skip
         if report is not None:
-            picture, _ = colors(outcome.paths[0])
+            picture, _ = written_colors(outcome.paths[0])
             row.append(f"{picture.mean(dtype=np.float64):.9g}")
             if against is not None:
                 apart = difference(against, picture)
@@ -212,7 +230,7 @@ def sheet(outcomes: Sequence[Outcome], path: Path, content: str) -> None:
 
     def shown(outcome: Outcome) -> NDArray[Any]:
         assert outcome.work is not None
-        light, encoded = colors(outcome.paths[0])
+        light, encoded = written_colors(outcome.paths[0])
         if encoded:
             return np.rint(light * 255).astype(np.uint8)
         return picture(light, outcome.work.scene.film.exposure, 8, str(outcome.paths[0]))

@@ -33,6 +33,7 @@ WRITERS = {
     "new/compare.png": ("compare 1.png 2.png --no-flip --heat", "compare 1.png 3.png --no-flip --heat"),
     "new/converge.csv": (f"{CONVERGE} --csv", f"{CONVERGE} --seed 3 --csv"),
     "new/converge.svg": (f"{CONVERGE} -o", f"{CONVERGE} --seed 3 -o"),
+    "new/converge.png": (f"{CONVERGE} -o", f"{CONVERGE} --seed 3 -o"),
     "new/brdf.csv": ("brdf phong --csv", "brdf phong -D exponent=3 --csv"),
     "new/render.exr": ("render s.yaml -o", "render s.yaml -D ambient=0.3 -o"),
     "new/bake.ply": ("ao-bake m.obj --samples 4 -o", "ao-bake m.obj --samples 8 -o"),

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, OutputError
+from illumcli.files.seal import BLANK, seal
 from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, bits_of, no_utf8, numbers_of, shown
 from illumcli.memory import refuse_little
 from illumcli.pixels import from_srgb
@@ -90,7 +91,7 @@ class ExrFile:
         spec.channelnames = self._names
         if len(set(map(str, kinds))) > 1:
             spec.channelformats = tuple(kinds)
-        for name, value in {**_HINTS, **metadata}.items():
+        for name, value in {**_HINTS, **metadata, "illum:body": BLANK}.items():
             _set(spec, name, value)
         self._rows = 0
         self._check(self._output.open(os.fspath(path), spec))
@@ -108,6 +109,7 @@ class ExrFile:
         self._check(self._output.close())
         if self._numbers:
             _call_numbers(self._path, self._numbers)
+        seal(self._path)
 
     def is_as_written(self) -> bool:
         """Does the closed file hold the pixels it was given? It is read back in bands."""

@@ -17,9 +17,12 @@ from pathlib import Path
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import refusals
+from illumcli.files.seal import is_sealed
 
 INCOMPLETE = "incomplete"
 """The content of what failed: a file that holds it may be replaced."""
+_SEALED = (".png", ".exr", ".npz", ".ply", ".glb")
+_OR_CHANGED = ", or one that was changed or damaged since it was written"
 _SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
 
 
@@ -47,9 +50,8 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
                 return True
             pairs = zip(stored, contents, strict=False)
             if len(stored) != len(contents) or any(a not in (b, INCOMPLETE) for a, b in pairs):
-                raise OutputError(
-                    f"{path}: a different file is there; use --force to replace it, or another name"
-                )
+                fact = "a different file is there" if stored else f"a different file is there{_OR_CHANGED}"
+                raise OutputError(f"{path}: {fact}; use --force to replace it, or another name")
     refuse_unwritable(path)
     return False
 
@@ -66,8 +68,10 @@ def refresh(path: Path) -> None:
 
 
 def stored_contents(path: Path) -> list[str]:
-    """The contents that a file of ours names; empty where it is none."""
+    """The contents that a file of ours names; empty where it is none, or is not what was written."""
     try:
+        if path.suffix.lower() in _SEALED and not is_sealed(path):
+            return []
         match path.suffix.lower():
             case ".csv":
                 import csv  # what a render without a table need not wait for

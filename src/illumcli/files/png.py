@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.files.seal import png_digest, png_end
+
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOUR_TYPES = {("Y",): 0, ("R", "G", "B"): 2, ("Y", "A"): 4, ("R", "G", "B", "A"): 6}
 _LEVEL = 1  # of 9; renders become a fifth smaller at 6, in five times the time
@@ -59,7 +61,7 @@ class PngFile:
         self._line = width * self._pixel
         self._deflate = zlib.compressobj(_LEVEL)
         self._waiting = bytearray()
-        self._hash = hashlib.blake2b(digest_size=32)
+        self._hash = png_digest()
         self._file = path.open("wb")
         self._put(_SIGNATURE)
         bits = 8 * self._dtype.itemsize
@@ -91,13 +93,13 @@ class PngFile:
     def close(self) -> None:
         """The end of the file."""
         self._image(self._deflate.compress(self._waiting) + self._deflate.flush())
-        self._chunk(b"IEND", b"")
+        self._put(png_end(self._hash))
         self._file.close()
 
     def is_as_written(self) -> bool:
         """Does the closed file hold the bytes it was given?"""
         with self._path.open("rb") as file:
-            found = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=32))
+            found = hashlib.file_digest(file, png_digest)
         return found.digest() == self._hash.digest()
 
     def abandon(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import struct
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import field, fields
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.files.atomic import Part
+from illumcli.files.seal import BLANK, seal
 from illumcli.records import Record
 
 SUFFIXES = (".npz", ".ply", ".glb")
@@ -101,8 +103,17 @@ def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts:
 def write_npz(path: Path, baked: Baked) -> None:
     """The arrays of `Baked.columns` and `Baked.corner_columns`, and `about`, JSON as text."""
     arrays: dict[str, Any] = {**baked.columns(), **baked.corner_columns()}
-    with Part(path) as part, part.path.open("wb") as file:
-        np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
+    with Part(path) as part:
+        with part.path.open("wb") as file:
+            np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
+            file.seek(-2, os.SEEK_END)  # the length of the archive's comment, which is its end
+            file.write(struct.pack("<H", len(BLANK)) + BLANK.encode())
+        seal(part.path)
+
+
+def _sealed(baked: Baked) -> dict[str, Any]:
+    """What a PLY or GLB says of itself, with a place for its hash."""
+    return {**baked.about, "body": BLANK}
 
 
 def read_npz(path: Path) -> Baked:
@@ -165,7 +176,7 @@ def write_ply(
     """
     from plyfile import PlyData, PlyElement
 
-    line = "illum " + json.dumps(baked.about)
+    line = "illum " + json.dumps(_sealed(baked))
     added = _ply_columns(baked)
     if source is not None:
         old = PlyData.read(source)
@@ -184,6 +195,7 @@ def write_ply(
         made = PlyData([vertex, _faces(shapes, first)], False, "<", [line])
     with Part(path) as part:
         made.write(str(part.path))
+        seal(part.path)
 
 
 def _ply_columns(baked: Baked) -> dict[str, NDArray[np.float32]]:
@@ -339,10 +351,12 @@ class _Buffer:
         self.document["buffers"] = [{"byteLength": len(data)}, *self.document.get("buffers", [])[1:]]
         text = json.dumps(self.document, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
-        with Part(path) as part, part.path.open("wb") as file:
-            file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)))
-            file.write(struct.pack("<II", len(text), _JSON) + text)
-            file.write(struct.pack("<II", len(data), _BIN) + data)
+        with Part(path) as part:
+            with part.path.open("wb") as file:
+                file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)))
+                file.write(struct.pack("<II", len(text), _JSON) + text)
+                file.write(struct.pack("<II", len(data), _BIN) + data)
+            seal(part.path)
 
 
 def write_glb(path: Path, shapes: Sequence[Shape], baked: Baked, channel: str | None) -> None:
@@ -353,7 +367,7 @@ def write_glb(path: Path, shapes: Sequence[Shape], baked: Baked, channel: str | 
     all light by it, not the ambient light alone.
     """
     document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "illum", "extras": {"illum": dict(baked.about)}},
+        "asset": {"version": "2.0", "generator": "illum", "extras": {"illum": _sealed(baked)}},
         "scene": 0,
         "scenes": [{"nodes": list(range(len(shapes)))}],
         "nodes": [],
@@ -413,7 +427,7 @@ def add_to_glb(
     document, data = source
     buffer = _Buffer(document, data)
     extras = document["asset"].get("extras")
-    about = {"illum": dict(baked.about)}
+    about = {"illum": _sealed(baked)}
     document["asset"]["extras"] = {**extras, **about} if isinstance(extras, dict) else about
     first = 0
     for mesh, primitive, count in counts:

@@ -12,6 +12,7 @@ from pathlib import Path
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix, refuse_unwritable
+from illumcli.files.seal import sealed_png
 from illumcli.jobs.converge import Convergence, Curve
 from illumcli.plan.keys import digest
 
@@ -200,4 +201,4 @@ def write_picture(path: Path, found: Convergence, content: str) -> None:
         out = io.BytesIO()
         about = {"Date": None, "Identifier": content} if kind == "svg" else {"illum:content": content}
         figure.savefig(out, format=kind, dpi=150, metadata=about)
-    write_bytes(path, out.getvalue())
+    write_bytes(path, sealed_png(out.getvalue()) if kind == "png" else out.getvalue())

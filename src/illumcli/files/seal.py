@@ -1,0 +1,94 @@
+"""A file's own hash in the file: what was changed or damaged since it was written is told.
+
+The metadata of every image and baked mesh hold `illum-body:` and 32 hexadecimal digits, the BLAKE2b-128 of
+the file with these digits 0. A PNG, whose pieces have checksums, has them in its last piece before the end,
+over all that stands before. The hash finds accidents and edits; whoever wants to can compute it anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import struct
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+_MARK, _DIGITS = b"illum-body:", 32
+BLANK = (_MARK + b"0" * _DIGITS).decode()
+"""What the metadata hold until the file is sealed."""
+_SEAL = re.compile(re.escape(_MARK) + rb"([0-9a-f]{%d})" % _DIGITS)
+_PIECE = 1 << 20
+_PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+
+
+def seal(path: Path) -> None:
+    """Put the hash in the place of `BLANK`, which the file holds.
+
+    Raises
+    ------
+    OSError
+    """
+    with path.open("r+b") as file:
+        found = _body(file)
+        if found is None:
+            raise ValueError(f"{path}: has no place for its hash")
+        place, _, body = found
+        file.seek(place)
+        file.write(body)
+
+
+def is_sealed(path: Path) -> bool:
+    """Does the file hold what was written, to the last bit?
+
+    Raises
+    ------
+    OSError
+    """
+    with path.open("rb") as file:
+        if path.suffix.lower() != ".png":
+            found = _body(file)
+            return found is not None and found[1] == found[2]
+        digest = png_digest()
+        left = path.stat().st_size - len(png_end(digest))
+        while left > 0 and (piece := file.read(min(left, _PIECE))):
+            digest.update(piece)
+            left -= len(piece)
+        return file.read() == png_end(digest)
+
+
+def sealed_png(data: bytes) -> bytes:
+    """A whole PNG with its hash."""
+    data = data.removesuffix(_PNG_END)
+    digest = png_digest()
+    digest.update(data)
+    return data + png_end(digest)
+
+
+def png_digest() -> hashlib.blake2b:
+    """Takes the bytes of a PNG up to its end."""
+    return hashlib.blake2b(digest_size=_DIGITS // 2)
+
+
+def png_end(digest: hashlib.blake2b) -> bytes:
+    """The last two pieces of a PNG, with the hash of all before them."""
+    said = b"tEXtillum:body\0" + _MARK + digest.hexdigest().encode()
+    return struct.pack(">I", len(said) - 4) + said + struct.pack(">I", zlib.crc32(said)) + _PNG_END
+
+
+def _body(file: BinaryIO) -> tuple[int, bytes, bytes] | None:
+    """Where the digits stand, the digits, and the hash of the file with these 0; None where it has none."""
+    digest = hashlib.blake2b(digest_size=_DIGITS // 2)
+    found: tuple[int, bytes] | None = None
+    at, rest = 0, b""
+    while piece := file.read(_PIECE):
+        data = rest + piece
+        seal = _SEAL.search(data) if found is None else None
+        if seal is not None:
+            found = at + seal.start(1), seal[1]
+            data = data[: seal.start(1)] + b"0" * _DIGITS + data[seal.end(1) :]
+        # the mark may go on in the next piece
+        done = len(data) if found else max(0, len(data) - len(BLANK) + 1)
+        digest.update(data[:done])
+        at, rest = at + done, data[done:]
+    return None if found is None else (*found, digest.hexdigest().encode())

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import lzma
 import os
+import re
+import struct
 import sys
 from types import SimpleNamespace
 
 import pytest
 
+from illumcli import memory
 from illumcli.errors import InputError, LimitError
 from illumcli.jobs import limits
 
@@ -41,7 +45,7 @@ def test_too_large_is_exit_4_in_one_line_with_little_memory(python, tmp_path, wh
 def test_little_memory_and_little_disk_are_refused_before_anything_is_made(folder, monkeypatch):
     from illumcli.jobs.render import run
 
-    monkeypatch.setattr(limits, "free_memory", lambda: 100_000)
+    monkeypatch.setattr(memory, "free_memory", lambda: 100_000)
     with pytest.raises(LimitError, match="memory"):
         run(folder / "scene.yaml", pattern=str(folder / "x.exr"), cache=False)
     monkeypatch.undo()
@@ -52,10 +56,76 @@ def test_little_memory_and_little_disk_are_refused_before_anything_is_made(folde
     assert not list(folder.glob("*.exr"))
 
 
-def test_what_the_machine_does_not_say_is_no_limit(monkeypatch, tmp_path):
-    monkeypatch.setattr(limits, "free_memory", lambda: None)
-    limits.refuse_memory(10**9, 10**9, 10**9, [tmp_path / "none.ply"], "here")
-    assert limits._size(1500 * 2**40) == "1.5e+03 TiB"
+def test_what_the_machine_does_not_say_is_no_limit(monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: None)
+    limits.refuse_memory(10**9, 10**9, 10**9, {"meshes": 10**18}, "here")
+    assert memory.in_words(1500 * 2**40) == "1.5e+03 TiB"
+
+
+def bombs(folder):
+    """Small files that stand for more memory than machines have; the words of the commands that read them."""
+    import zlib
+
+    from illumcli.memory import free_memory
+
+    # a PNG of 65,535 x 65,535 black pixels, one bit each: 64 times the same packed rows
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    side, row = 65535, bytes(1 + 65535 // 8 + 1)
+    packer = zlib.compressobj(9, wbits=-15)
+    many = packer.compress(row * 1024) + packer.flush(zlib.Z_FULL_FLUSH)
+    last = packer.compress(row * 1023) + packer.flush()
+    packed = b"\x78\x9c" + 63 * many + last + struct.pack(">I", len(row) * side % 65521 << 16 | 1)
+    header = struct.pack(">IIBBBBB", side, side, 1, 0, 0, 0, 0)
+    parts = chunk(b"IHDR", header) + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
+    (folder / "bomb.png").write_bytes(b"\x89PNG\r\n\x1a\n" + parts)
+    # meshes by the count of their triangles: so many spheres as the machine cannot hold
+    count = 3 + (free_memory() or 0) // (640 * 2 * 4096 * 2048)
+    sphere = "{mesh: {shape: sphere, segments: 4096, rings: 2048}}"
+    start = "version: 1\nambient: 1\nfilm: {width: 8, height: 8, samples: 1}\n"
+    texture = "{model: lambert, diffuse: {texture: bomb.png}}"
+    (folder / "spheres.yaml").write_text(f"{start}objects: [{', '.join([sphere] * count)}]\n")
+    (folder / "texture.yaml").write_text(
+        f"{start}objects: [{{mesh: {{shape: sphere}}, material: {texture}}}]\n"
+    )
+    phong = "{mesh: {shape: box}, material: {model: phong}}"
+    (folder / "unused.yaml").write_text(f"{start}materials: {{m: {texture}}}\nobjects: [{phong}]\n")
+    (folder / "bomb.mtl").write_text("newmtl a\nmap_Kd bomb.png\n")
+    (folder / "mesh.obj").write_text(
+        "mtllib bomb.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n"
+    )
+    with lzma.open(folder / "bomb.json.xz", "wb") as file:
+        for _ in range(257):
+            file.write(b" " * (1 << 20))
+    return [
+        ["render", "texture.yaml"], ["render", "spheres.yaml"], ["render", "mesh.obj"],
+        ["check", "texture.yaml"], ["check", "spheres.yaml"], ["plan", "texture.yaml"],
+        ["plan", "spheres.yaml"], ["sweep", "spheres.yaml", "-D", "seed=1,2"],
+        ["ao-bake", "spheres.yaml", "-o", "x.npz"], ["compare", "bomb.png", "bomb.png"],
+        ["verify", "bomb.json.xz"],
+    ]  # fmt: skip
+
+
+def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(python, tmp_path):
+    words = bombs(tmp_path)
+    script = MEASURED.replace('"render", "s.yaml"]', "*sys.argv[2:]]").replace(
+        "text=True)", "text=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (9 << 30,) * 2))"
+    )
+    for each in words:
+        code, kilobytes, *said = python(script, sys.executable, *each, cwd=tmp_path).splitlines()
+        assert code == "4", (each, said)
+        assert re.search("takes about|MiB of text", " ".join(said)), (each, said)
+        assert int(kilobytes) < 500 * 1024, each
+
+
+def test_plans_show_what_shapes_and_textures_take(tmp_path):
+    from illumcli.jobs.plan import run
+
+    bombs(tmp_path)
+    assert "shapes " in run(tmp_path / "spheres.yaml", cache=False)
+    assert "textures 49,1" in run(tmp_path / "texture.yaml", cache=False)
+    assert "textures" not in run(tmp_path / "unused.yaml", cache=False)
 
 
 @pytest.fixture
@@ -178,6 +248,16 @@ def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pat
     paths += run(scene, cache=False)[0]
     assert all(os.path.exists(os.path.realpath(path)) for path in paths)
     assert load(scene).scene.outputs.files == (written,)
+
+
+def test_names_of_a_scene_hold_no_control_characters(folder):
+    from illumcli.jobs.render import run
+
+    for said in ("\\e[31mx.png", "a\\0.png", "a\\nb.png", "\\x9b.png"):
+        text = (folder / "scene.yaml").read_text().partition("outputs:")[0]
+        (folder / "s.yaml").write_text(f'{text}outputs: {{files: ["{said}"]}}\n')
+        with pytest.raises(InputError, match=r"character U\+00(1B|00|0A|9B)"):
+            run(folder / "s.yaml", cache=False)
 
 
 @pytest.mark.parametrize("pattern", ["x.png", "new/x.png", "../x.png", "../c/x.png", "{top}/a/b/x.png"])

@@ -66,7 +66,7 @@ def test_any_pattern_gives_a_name_or_an_input_error(pattern):
         name = expand(pattern, VALUES)
     except InputError as error:
         name = str(error)
-    assert name == pattern or re.search(r"[{}\x00-\x1f\x7f-\x9f]", pattern)
+    assert name == pattern or re.search(r"[{}\0]", pattern)
 
 
 @given(
@@ -99,8 +99,7 @@ def test_wrong_patterns_name_fault_and_way_out(pattern, problem):
         ("{frame:0300000000d}.png", "'0300000000d' makes frame longer than any name; use a form"),
         ("{materials.clay.sigma:.9999999f}", "makes materials.clay.sigma longer than any name"),
         ("{scene:>100000}", "makes scene longer than any name"),
-        ("a\0b.png", "a\0b.png: character U+0000 is not text; take it out of the name"),
-        ("\x1b[31m{scene}.png", "character U+001B is not text"),
+        ("a\0b.png", "a\0b.png: character U+0000 is no part of any name; take it out"),
         ("x" * 5000, "makes a name of 5000 letters; no system takes more than 4096"),
         ("{scene:_>900}" * 5, "makes a name of 4500 letters"),
     ],

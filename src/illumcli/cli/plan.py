@@ -19,13 +19,15 @@ from illumcli.cli._options import no_cache_option, overrides_option, scene_argum
 def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json: bool, cache: bool) -> None:
     """Print what will run for SCENE, what is reused, what is skipped and why; parse no mesh, trace nothing.
 
-    Files are hashed to know what is reused; with --no-cache they are not opened.
+    Files are hashed to know what is reused; with --no-cache only headers of images are read. Exit status: 4
+    where the memory that is free cannot hold the scene, which the plan shows.
 
     \b
     Examples:
       illum plan scenes/teapot.yaml
       illum plan scenes/teapot.yaml --only depth --json
     """
-    from illumcli.jobs.plan import run
+    from illumcli.jobs.plan import refuse_too_large, run
 
     click.echo(run(scene, overrides, only, as_json, cache))
+    refuse_too_large(scene, overrides)

@@ -11,6 +11,7 @@ import hashlib
 import os
 import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any, Literal, Self
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError, OutputError
 from illumcli.files.seal import BLANK, seal
 from illumcli.files.writer import NO_UTF8, ImageWriter, Refused, bits_of, no_utf8, numbers_of, shown
-from illumcli.memory import refuse_little
+from illumcli.memory import refuse_beyond, refuse_little
 from illumcli.pixels import from_srgb
 from illumcli.records import Record
 
@@ -30,6 +31,7 @@ import OpenImageIO as oiio  # noqa: E402
 
 SHEET_CELL = 256  # width of a picture on a contact sheet [pixels]
 READ_ROWS = 64  # rows held at once while reading back
+PLANE_BYTES, TEXTURE_BYTES = 6, 12  # of each channel of a pixel while an image, or a texture, is read
 HEADER = 1 << 24  # bytes in which the channels of a file written here are named
 
 _HINTS: Mapping[str, Any] = {
@@ -174,6 +176,7 @@ def read_image(path: str | os.PathLike[str]) -> Image:
         No such file, no image, damaged, cut short, or of several parts.
     """
     with _Source(Path(path)) as source:
+        source.refuse_large(PLANE_BYTES)
         height, width = source.height, source.width
         planes = np.empty((len(source.names), height, width), np.float32)
         y = 0
@@ -197,6 +200,27 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
         return source.metadata()
 
 
+def texel_count(path: Path) -> int:
+    """Numbers in the image at `path`, by its header alone, which is read once while the file stays the same.
+
+    Raises
+    ------
+    InputError
+        No such file, or no image.
+    """
+    try:
+        facts = path.stat()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from error
+    return _texel_count(path, facts.st_mtime_ns, facts.st_size)
+
+
+@lru_cache(maxsize=256)
+def _texel_count(path: Path, modified: int, length: int) -> int:
+    with _Source(path) as source:
+        return source.texel_count
+
+
 def read_texture(
     path: str | os.PathLike[str], space: Literal["srgb", "linear"] | None = None
 ) -> NDArray[np.float32]:
@@ -214,6 +238,7 @@ def read_texture(
         As `read_image`; NaN or Inf.
     """
     with _Source(Path(path)) as source:
+        source.refuse_large(TEXTURE_BYTES)
         colours = [c for c, name in enumerate(source.names) if name.rpartition(".")[2] != "A"]
         small = source.dtype == np.uint8
         space = space or ("srgb" if source.encoded else "linear")
@@ -373,6 +398,16 @@ class _Source:
     @property
     def height(self) -> int:
         return int(self._spec.height)
+
+    @property
+    def texel_count(self) -> int:
+        """Pixels times channels."""
+        return self.width * self.height * int(self._spec.nchannels)
+
+    def refuse_large(self, each: int) -> None:
+        """Raise LimitError where the image, `each` bytes a channel of a pixel, does not fit into memory."""
+        what = f"{self._path}: {self.width} x {self.height} pixels"
+        refuse_beyond(each * self.texel_count, what, "make it smaller")
 
     @property
     def dtype(self) -> np.dtype[Any]:

@@ -15,7 +15,6 @@ from illumcli.variants import suggestion
 LONGEST = 4096
 """Letters of a path; no system takes more."""
 _FIELD = re.compile(r"\{\{|\}\}|\{(?P<name>[^{}:]*)(?::(?P<form>[^{}]*))?\}|[{}]")
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f]")
 
 
 def expand(pattern: str, values: Mapping[str, Any]) -> str:
@@ -30,12 +29,12 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
     ------
     InputError
         All that is wrong with the pattern: a lone brace, a field that is not among `values`, a form that does
-        not suit its value or is wider than any name, a control character.
+        not suit its value or is wider than any name, a NUL.
     """
     problems: list[str] = []
     shown = pattern if len(pattern) <= 80 else f"{pattern[:80]}..."
-    if found := _CONTROL.search(pattern):
-        problems.append(f"{shown}: character U+{ord(found[0]):04X} is not text; take it out of the name")
+    if "\0" in pattern:
+        problems.append(f"{shown}: character U+0000 is no part of any name; take it out")
 
     def value(field: re.Match[str]) -> str:
         if field[0] in ("{{", "}}"):

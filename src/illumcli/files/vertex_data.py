@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import struct
+import zipfile
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import field, fields
 from pathlib import Path
@@ -14,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.errors import InputError
+from illumcli.errors import InputError, LimitError
 from illumcli.files.atomic import Part
 from illumcli.files.seal import BLANK, seal
+from illumcli.memory import in_words, refuse_beyond
 from illumcli.records import Record
 
 SUFFIXES = (".npz", ".ply", ".glb")
@@ -116,6 +118,13 @@ def _sealed(baked: Baked) -> dict[str, Any]:
     return {**baked.about, "body": BLANK}
 
 
+def refuse_unpacked(path: Path) -> None:
+    """Raise LimitError where what an archive packs does not fit into memory; a small file may hold much."""
+    with zipfile.ZipFile(path) as archive:
+        length = sum(each.file_size for each in archive.infolist())
+    refuse_beyond(3 * length, f"{path}: {in_words(length)} unpacked", "bake a smaller mesh")
+
+
 def read_npz(path: Path) -> Baked:
     """What `write_npz` wrote.
 
@@ -125,11 +134,14 @@ def read_npz(path: Path) -> Baked:
         Another kind of file, or a damaged one.
     """
     try:
+        refuse_unpacked(path)
         with np.load(path, allow_pickle=False) as data:
             names = [part.name for part in fields(Baked) if part.name != "about" and part.name in data]
             arrays = {name: np.asarray(data[name], np.float32) for name in names}
             about = json.loads(str(data["about"])) if "about" in data else {}
             made = Baked(**arrays, about=about)
+    except LimitError:
+        raise
     except Exception as why:  # zipfile, numpy and json each have their own
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
     values = [made.obscurance, *(() if made.corner_obscurance is None else (made.corner_obscurance,))]
@@ -143,6 +155,7 @@ def read_content(path: Path) -> str | None:
     """The hash of what a baked file was made from; None where it is no such file."""
     try:
         if path.suffix.lower() == ".npz":
+            refuse_unpacked(path)
             with np.load(path, allow_pickle=False) as data:
                 found = json.loads(str(data["about"]))["content"]
         elif path.suffix.lower() == ".glb":

@@ -38,6 +38,7 @@ from illumcli.jobs.ao_bake_cast import MOST_SAMPLES, Caster, Occluders
 from illumcli.jobs.ao_bake_points import Surfaces, Vertices, vertex_points
 from illumcli.jobs.ao_bake_shapes import shapes_of
 from illumcli.jobs.ao_bake_values import baked_values
+from illumcli.jobs.limits import expected_memory, refuse_memory
 from illumcli.jobs.render import peak_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs_data
 from illumcli.plan import stages
@@ -178,6 +179,9 @@ def prepared(
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
     clock = _Clock()
     loaded = bare(path, overrides) if path.suffix.lower() in MESH_SUFFIXES else load(path, overrides)
+    expected = expected_memory(loaded, loaded.scene)
+    expected.pop("textures", None)  # no bake reads them
+    refuse_memory(0, 0, 0, expected, str(path))
     surfaces, repairs = surfaces_of(loaded.scene, loaded)
     meshes = [placed.mesh for placed in surfaces.world.placed]
     hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from illumcli.errors import InputError, LimitError
-from illumcli.jobs.render import prepared
+from illumcli.jobs.render import prepared, refuse_too_large
 from illumcli.scene.load import file_problems, load, unused_lines
 
 
@@ -28,7 +28,8 @@ def run(paths: Sequence[Path], overrides: Sequence[str] = ()) -> tuple[list[Path
             loaded = load(path, overrides)
             found = file_problems(loaded)
             if not found:
-                prepared(loaded)
+                work = prepared(loaded)
+                refuse_too_large(work, work.targets)
             outputs = loaded.scene.outputs
             unused += unused_lines(loaded, loaded.scene, outputs.layers, outputs.files)
         except InputError as error:

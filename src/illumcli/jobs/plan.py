@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import textwrap
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from illumcli.jobs.limits import expected_memory, refuse_memory
 from illumcli.jobs.render import opened_store
 from illumcli.plan.artifacts import Artifacts
 from illumcli.plan.execute import Tally
@@ -33,7 +35,22 @@ def run(
     numbers = unseen_objects(made, Artifacts(store), Tally(), at_hand=True)
     made = replace(without(made, loaded, numbers), objects=objects(made, numbers))
     parts = [reusing(made, view, Artifacts(store, look=True)) for view in made.views]
-    return json.dumps([part.as_data() for part in parts], indent=1) if as_json else table(parts)
+    expected = expected_memory(loaded, loaded.scene)
+    if as_json:
+        return json.dumps([data_of(part, expected) for part in parts], indent=1)
+    return table(parts, expected)
+
+
+def refuse_too_large(path: Path, overrides: Sequence[str] = ()) -> None:
+    """Raise LimitError where memory cannot hold the scene's shapes, meshes and textures."""
+    loaded = load(path, overrides)
+    refuse_memory(0, 0, 0, expected_memory(loaded, loaded.scene), str(path))
+
+
+def data_of(part: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
+    """A plan as JSON has it, with what shapes, mesh files and textures are expected to take."""
+    data = part.as_data()
+    return data | {"expected_bytes": {**expected, **data["expected_bytes"]}}
 
 
 def objects(made: Plan, left_out: tuple[int, ...]) -> str:
@@ -46,14 +63,15 @@ def objects(made: Plan, left_out: tuple[int, ...]) -> str:
     return "known once the meshes are read, or all are needed"
 
 
-def table(parts: Sequence[Plan]) -> str:
-    """Plans in words, one per view: what runs once, what per tile, what does not and why."""
-    return "\n\n".join("\n".join(_lines(part)) for part in parts)
+def table(parts: Sequence[Plan], expected: Mapping[str, int] | None = None) -> str:
+    """Plans in words, one per view: what runs once, what per tile, what does not and why; and what shapes,
+    mesh files and textures are `expected` to take [bytes]."""
+    return "\n\n".join("\n".join(_lines(part, expected or {})) for part in parts)
 
 
-def _lines(made: Plan) -> list[str]:
+def _lines(made: Plan, expected: Mapping[str, int]) -> list[str]:
     view = made.views[0]
-    memory = made.expected_bytes()
+    memory = {**expected, **made.expected_bytes()}
     lines = [
         f"view    {view.name}: {view.width} x {view.height}, {view.samples} samples per pixel"
         + (f", {view.adaptive.first} where these agree" if view.is_adaptive else ""),

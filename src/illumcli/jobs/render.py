@@ -25,7 +25,7 @@ from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
 from illumcli.geometry.assemble import Standing
 from illumcli.geometry.repairs import Repairs
-from illumcli.jobs.limits import refuse_disk, refuse_memory
+from illumcli.jobs.limits import expected_memory, refuse_disk, refuse_memory
 from illumcli.jobs.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.layers import Layer
 from illumcli.plan.artifacts import Artifacts, Memory
@@ -309,23 +309,12 @@ def proportions(work: Work, steps: Plan, standing: Standing | None) -> list[str]
 def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
     """Raise LimitError where memory or disk cannot hold what is due; nothing has been read or made yet."""
     values = sum(len(layer.channels) for layer in work.plan.layers) + 1
-    files = mesh_files(work.loaded, work.scene)
+    expected = expected_memory(work.loaded, work.scene) if due else {}
     for target in due:
         view = target.view
-        refuse_memory(BAND_ROWS, view.width, values, files, str(work.loaded.path))
+        refuse_memory(BAND_ROWS, view.width, values, expected, str(work.loaded.path))
         types = channels(work.scene, target).values()
         refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
-
-
-def mesh_files(loaded: Loaded, scene: Scene) -> set[Path]:
-    """The mesh files of a scene's objects."""
-    found = set()
-    for thing in scene.objects:
-        source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
-        name = source if isinstance(source, str) else getattr(source, "file", None)
-        if name is not None:
-            found.add(loaded.path.parent / name)
-    return found
 
 
 def image_set(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -121,11 +122,15 @@ def resolve(loaded: Loaded, path: str) -> Path:
 
 def refuse_outside(loaded: Loaded, number: int, path: Path) -> None:
     """Raise InputError where the pattern of this number in `outputs.files` leads to `path`, outside the
-    folders that the scene may read from. Links are followed; a pattern that `-D` gives may lead anywhere."""
+    folders that the scene may read from, or holds control characters. Links are followed; a pattern that `-D`
+    gives may lead anywhere."""
     at = ("outputs", "files", number)
     node = loaded.tree.find(at)
     if node is None or node.place.source.startswith("-D "):
         return
+    if strange := [letter for letter in str(path) if unicodedata.category(letter) == "Cc"]:
+        fact = f"character U+{ord(strange[0]):04X} is not text; take it out of the name"
+        raise InputError(told(loaded, at, fact))
     folder = Path(os.path.realpath(path)).parent
     with suppress(OSError):  # a plain name is safe wherever the user stands, be it the top of the disk
         if folder == Path.cwd().resolve():

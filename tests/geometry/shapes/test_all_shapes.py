@@ -44,6 +44,12 @@ OPEN = {  # and the edges of their rims
 EVERY = CLOSED | {name: scene for name, (scene, _) in OPEN.items()}
 
 
+@pytest.mark.parametrize("name", EVERY)
+def test_no_shape_makes_more_triangles_than_it_says(name):
+    shape = SHAPE.validate_python(EVERY[name])
+    assert len(triangulate(shape.mesh()).corners) <= shape.triangles() <= MAX_TRIANGLES
+
+
 def made(scene):
     return SHAPE.validate_python(scene).mesh()
 

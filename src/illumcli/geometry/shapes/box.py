@@ -27,6 +27,9 @@ class Box(Shape):
     resolution: Annotated[int, Whole(ge=1, le=1024)] = 1
     """Quads along each edge."""
 
+    def triangles(self) -> int:
+        return 12 * self.resolution**2
+
     def mesh(self) -> Mesh:
         """Quads, each face with uv from 0 to 1."""
         n = self.resolution

@@ -25,6 +25,9 @@ class Cone(Shape):
     caps: bool = True
     """Closed by a disc; without it the rim is open."""
 
+    def triangles(self) -> int:
+        return 2 * self.segments * (self.rings + 1)
+
     def mesh(self) -> Mesh:
         """Quads, and triangles at the apex, where a cone has no normal: each has that of its middle there."""
         rise = np.linspace(0, 1, self.rings + 1)

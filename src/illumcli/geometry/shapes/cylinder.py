@@ -25,6 +25,9 @@ class Cylinder(Shape):
     caps: bool = True
     """Closed by discs; without them both rims are open."""
 
+    def triangles(self) -> int:
+        return 2 * self.segments * (self.rings + 2)
+
     def mesh(self) -> Mesh:
         """Quads around, with radial normals; the caps are triangles with their own flat normals."""
         low, high = -self.height / 2, self.height / 2

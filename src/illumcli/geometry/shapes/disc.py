@@ -21,6 +21,9 @@ class Disc(Shape):
     rings: Rings = 1
     """Facets from the middle to the rim."""
 
+    def triangles(self) -> int:
+        return 2 * self.segments * self.rings
+
     def mesh(self) -> Mesh:
         """Triangles around the middle, quads beyond; uv are x and -z in the unit square."""
         radius = self.radius * np.linspace(1, 0, self.rings + 1)

@@ -25,7 +25,8 @@ from illumcli.description import checks
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.formula import MAX_LENGTH, Formula, checked, parse
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.shapes._base import MAX_TRIANGLES, Shape
+from illumcli.geometry.shapes._base import MAX_TRIANGLES, TRIANGLE_BYTES, Shape
+from illumcli.memory import refuse_beyond
 from illumcli.values import After, Text, Vector, Whole
 
 XYZ = ("x", "y", "z")
@@ -53,6 +54,10 @@ class Implicit(Shape):
         low = before.get("low", high)
         if "low" in before and not all(a < b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"must be above low, {list(low)}, along every axis, is {list(high)}")
+
+    def triangles(self) -> int:
+        """Those of a surface that crosses the box several times; a wilder one is counted while it is made."""
+        return min(24 * self.resolution**2, MAX_TRIANGLES)
 
     def mesh(self) -> Mesh:
         """Quads; without uv.
@@ -113,6 +118,7 @@ def _net(f: Formula, axes: list[NDArray[np.float64]]) -> tuple[Vectors, NDArray[
     count = 2 * sum(len(where[0]) for where, _ in found)
     if count > MAX_TRIANGLES:
         raise LimitError(f"implicit: {count} triangles, at most {MAX_TRIANGLES} are made; lower `resolution`")
+    refuse_beyond(TRIANGLE_BYTES * count, f"implicit: {count} triangles", "lower `resolution`")
     crossings, cells = [], []
     for (i, j, k), (a, b, c) in found:
         grows = inside.transpose(a, b, c)[i, j + 1, k + 1, None]

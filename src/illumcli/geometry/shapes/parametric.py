@@ -52,6 +52,9 @@ class Parametric(Shape):
         if not span[0] < span[1]:
             raise ValueError(f"must run from low to high, is {list(span)}; `flip` turns the surface round")
 
+    def triangles(self) -> int:
+        return 2 * self.resolution[0] * self.resolution[1]
+
     def mesh(self) -> Mesh:
         """Quads; where the surface closes on itself or shrinks to a point, vertices are shared.
 

@@ -19,6 +19,9 @@ class Plane(Shape):
     resolution: CellsByCells = (1, 1)
     """Quads along x and z."""
 
+    def triangles(self) -> int:
+        return 2 * self.resolution[0] * self.resolution[1]
+
     def mesh(self) -> Mesh:
         """Quads; u runs along x, v along -z."""
         columns, rows = self.resolution

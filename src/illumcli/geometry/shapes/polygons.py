@@ -43,6 +43,9 @@ class Polygons(Shape):
             if not any(normal):
                 raise ValueError(f"normal {number} is zero")
 
+    def triangles(self) -> int:
+        return sum(len(face) - 2 for face in self.faces)
+
     def mesh(self) -> Mesh:
         """The faces as they are."""
         corners = np.concatenate(self.faces).astype(np.int32)

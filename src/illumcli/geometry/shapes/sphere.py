@@ -25,6 +25,9 @@ class Sphere(Shape):
     rings: Annotated[int, Whole(ge=2, le=2048)] = 48
     """Facets from pole to pole."""
 
+    def triangles(self) -> int:
+        return 2 * self.segments * self.rings
+
     def mesh(self) -> Mesh:
         """Normals radial; triangles at the poles, quads between; u is the longitude, v the latitude."""
         latitude = np.pi * (np.arange(self.rings + 1) / self.rings - 0.5)

@@ -57,6 +57,9 @@ class Teapot(Shape):
     resolution: Annotated[int, Whole(ge=2, le=512)] = 12
     """Quads along each side of a patch."""
 
+    def triangles(self) -> int:
+        return 2 * 36 * self.resolution**2
+
     def mesh(self) -> Mesh:
         """Quads, triangles at the knob and in the middle of the bottom; u runs around, v up or along."""
         scale = self.size / (RIGHT - LEFT)

@@ -30,6 +30,9 @@ class Torus(Shape):
         if minor >= before.get("major", np.inf):
             raise ValueError(f"must be smaller than major, {before['major']}; the torus would cut itself")
 
+    def triangles(self) -> int:
+        return 2 * self.segments * self.sides
+
     def mesh(self) -> Mesh:
         """Quads; v runs around the tube from its inner equator."""
         angle = np.pi + 2 * np.pi * np.arange(self.sides + 1) / self.sides

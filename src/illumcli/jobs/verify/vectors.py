@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.errors import InputError
+from illumcli.errors import InputError, LimitError
 from illumcli.records import Record
 from illumcli.variants import suggestion
 
@@ -27,6 +27,8 @@ PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
 
 KEYS = ("id", "model", "inputs", "expected", "rtol", "atol")
 SHOWN = 10
+MOST_BYTES = 1 << 28
+"""Of a file once it is unpacked."""
 OPENERS: dict[str, Callable[..., Any]] = {".xz": lzma.open, ".gz": gzip.open}
 
 
@@ -94,7 +96,10 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
 def _entries(path: Path) -> list[Any]:
     try:
         with OPENERS.get(path.suffix, open)(path, "rb") as file:
-            text = file.read().decode("utf-8")
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise LimitError(f"{path}: more than {MOST_BYTES >> 20} MiB of text; check its cases in parts")
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start})") from None
     except (OSError, EOFError, lzma.LZMAError) as error:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 
+import click
 import pytest
+
+from illumcli.cli import illum
 
 ENDS = {
     "OSError(28, 'No space left on device', 'x.exr')": (5, "x.exr: No space left on device"),
@@ -98,3 +102,38 @@ def test_a_signal_during_an_import_ends_by_itself(tmp_path, number, halves):
         run.send_signal(number)
         assert run.wait(timeout=30) == -number
         assert run.stderr.read() == ""
+
+
+def commands():
+    """The words of every command and subcommand."""
+    context = click.Context(illum)
+    for name in illum.list_commands(context):
+        command = illum.get_command(context, name)
+        below = command.commands if isinstance(command, click.Group) else {None: command}
+        for sub, each in below.items():
+            yield [name] if sub is None else [name, sub], each
+
+
+def test_quiet_and_verbose_are_the_same_options_of_every_command():
+    said = {"quiet": set(), "verbose": set()}
+    for words, command in commands():
+        options = {option.name: option for option in command.params}
+        for letter, name in (("-q", "quiet"), ("-v", "verbose")):
+            assert letter in options[name].opts, words
+            said[name].add((options[name].help, options[name].is_flag))
+    assert [len(each) for each in said.values()] == [1, 1]
+
+
+@pytest.mark.parametrize("words", [["schema"], ["models"], ["cache", "list"], ["check", "{scene}"]])
+def test_commands_that_say_little_take_quiet_and_verbose(tmp_path, words):
+    (tmp_path / "s.yaml").write_text("version: 1\nambient: 1\nobjects: [{mesh: {shape: box}}]\n")
+    words = [word.format(scene=tmp_path / "s.yaml") for word in words]
+    said = {
+        subprocess.run(
+            [sys.executable, "-m", "illumcli", *words, *more],
+            env={**os.environ, "ILLUM_CACHE": str(tmp_path / "cache")},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for more in ([], ["-q"], ["-v"])
+    }  # fmt: skip
+    assert len(said) == 1

@@ -49,8 +49,10 @@ class Commands(click.Group):
         if name not in COMMANDS:
             return None
         refuse_little(_TO_LOAD)
+        from illumcli.cli._options import with_common
+
         module = name.replace("-", "_")
-        return getattr(import_module(f"illumcli.cli.{module}"), module)
+        return with_common(getattr(import_module(f"illumcli.cli.{module}"), module))
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         try:

@@ -90,6 +90,34 @@ keep_going_option = click.option(
     help="Where one of several fails: do the others all the same, or stop. The exit code is the first one's.",
 )
 
+quiet_option = click.option(
+    "-q",
+    "--quiet",
+    is_flag=True,
+    help="Say nothing but results and what is wrong: no progress, no counts.",
+)
+
+verbose_option = click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Say more, where there is more: what was skipped, repaired, reused, and where time went.",
+)
+
+
+def with_common(command: click.Command) -> click.Command:
+    """The command, and those below it, with `-q` and `-v`; where there is no less or no more to say,
+    they change nothing."""
+    for below in command.commands.values() if isinstance(command, click.Group) else ():
+        with_common(below)
+    taken = {option.name for option in command.params}
+    for name, option in (("quiet", quiet_option), ("verbose", verbose_option)):
+        if name not in taken and not isinstance(command, click.Group):
+            option(command)
+            next(each for each in command.params if each.name == name).expose_value = False
+    return command
+
+
 strict_option = click.option(
     "--strict", is_flag=True, help="Refuse meshes and textures that need repairs, instead of counting them."
 )

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from illumcli.cli._options import SCENE, keep_going_option, overrides_option, strict_option, tell
+from illumcli.cli._options import (
+    SCENE,
+    keep_going_option,
+    overrides_option,
+    quiet_option,
+    strict_option,
+    tell,
+    verbose_option,
+)
 
 if TYPE_CHECKING:
     from illumcli.jobs.ao_bake import Report
@@ -114,8 +122,8 @@ class _Distance(click.ParamType):
 @click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
 @keep_going_option
 @strict_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too, and where time went.")
+@quiet_option
+@verbose_option
 def ao_bake(
     inputs: tuple[Path, ...],
     patterns: tuple[str, ...],

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from illumcli.cli._options import quiet_option
+
 _FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
@@ -51,6 +53,7 @@ Examples:
 @click.option("--log", is_flag=True, help="Slices and lobes on a logarithmic scale, four decades.")
 @click.option("--times-cos", is_flag=True, help="The response, cosine included, instead of the BRDF.")
 @click.option("--force", is_flag=True, help="Replace files that differ.")
+@quiet_option
 def brdf(
     models: tuple[str, ...],
     overrides: tuple[str, ...],
@@ -61,6 +64,7 @@ def brdf(
     log: bool,
     times_cos: bool,
     force: bool,
+    quiet: bool,
 ) -> None:
     """Draw illumination models side by side; print the path of every file written.
 
@@ -76,5 +80,5 @@ def brdf(
     paths, kept = run(models, overrides, output, table, views, angles, log, times_cos, force)
     for path in paths:
         click.echo(path)
-    for path in kept:
+    for path in [] if quiet else kept:
         click.echo(f"{path}: kept, its content is the same", err=True)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from illumcli.cli._options import quiet_option
+
 _FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
@@ -35,6 +37,7 @@ Examples:
 @click.option("--max-difference", type=float, metavar="X", help="Largest absolute difference.")
 @click.option("--no-flip", is_flag=True, help="Leave FLIP out, which takes most of the time.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@quiet_option
 def compare(
     reference: Path,
     test: Path,
@@ -43,6 +46,7 @@ def compare(
     force: bool,
     no_flip: bool,
     as_json: bool,
+    quiet: bool,
     **bounds: float | None,
 ) -> None:
     """Compare image B with the reference A, layer by layer.
@@ -61,7 +65,7 @@ def compare(
     if no_flip and "max_flip" in limits:
         raise click.UsageError("--max-flip needs FLIP; leave --no-flip out")
     comparison = run(reference, test, names, not no_flip, heat, force)
-    if comparison.heat_is_kept:
+    if comparison.heat_is_kept and not quiet:
         click.echo(f"{heat}: kept, its content is the same", err=True)
     if as_json:
         click.echo(json.dumps(as_data(comparison), indent=2))

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import no_cache_option, overrides_option, scene_argument, studio_options
+from illumcli.cli._options import (
+    no_cache_option,
+    overrides_option,
+    quiet_option,
+    scene_argument,
+    studio_options,
+)
 
 if TYPE_CHECKING:
     from illumcli.jobs.converge import Vary
@@ -53,7 +59,7 @@ Examples:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 @click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
 @no_cache_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
+@quiet_option
 def converge(
     scene: Path,
     overrides: tuple[str, ...],

@@ -11,10 +11,12 @@ from illumcli.cli._options import (
     keep_going_option,
     no_cache_option,
     overrides_option,
+    quiet_option,
     scenes_argument,
     strict_option,
     studio_options,
     tell,
+    verbose_option,
 )
 
 if TYPE_CHECKING:
@@ -49,10 +51,8 @@ if TYPE_CHECKING:
 @keep_going_option
 @strict_option
 @no_cache_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@click.option(
-    "-v", "--verbose", is_flag=True, help="Say what was skipped, repaired and kept, and where time went."
-)
+@quiet_option
+@verbose_option
 def render(
     scenes: tuple[Path, ...],
     pattern: str | None,

@@ -11,9 +11,11 @@ from illumcli.cli._options import (
     allow_option,
     keep_going_option,
     no_cache_option,
+    quiet_option,
     scene_argument,
     strict_option,
     studio_options,
+    verbose_option,
 )
 
 if TYPE_CHECKING:
@@ -56,8 +58,8 @@ _FILE = click.Path(path_type=Path)
 @strict_option
 @no_cache_option
 @allow_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress.")
-@click.option("-v", "--verbose", is_flag=True, help="Say harmless counts too.")
+@quiet_option
+@verbose_option
 def sweep(
     scene: Path,
     overrides: tuple[str, ...],

@@ -1,0 +1,49 @@
+"""An output folder that vanishes while its files are made is exit 5, and nothing else."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from illumcli.errors import OutputError
+from illumcli.jobs import ao_bake, render
+from illumcli.jobs.render_all import Settings
+from illumcli.jobs.sweep import Files, variants_of
+from illumcli.jobs.sweep import run as sweep
+
+SMALL = ["film.width=24", "film.height=16"]
+
+
+@pytest.mark.parametrize("name", ["a.exr", "a.png", "{layer}.png"])
+def test_of_a_render(folder, name):
+    def gone(what, done, of):
+        shutil.rmtree(folder / "new", ignore_errors=True)
+
+    with pytest.raises(OutputError, match=r"cannot be written: No such file"):
+        render.run(
+            folder / "scene.yaml", SMALL, str(folder / "new" / name), ["beauty"],
+            threads=1, cache=False, progress=gone,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.ply", "a.glb"])
+def test_of_a_bake_it_is_made_again(folder, name):
+    def gone(what, done, of):
+        shutil.rmtree(folder / "new", ignore_errors=True)
+
+    settings = ao_bake.Settings(samples=8)
+    ao_bake.run(folder / "thing.obj", [folder / "new" / name], settings, threads=1, progress=gone)
+    assert [path.name for path in (folder / "new").iterdir()] == [name]
+
+
+@pytest.mark.parametrize("what", ["sheet", "table"])
+def test_of_a_sweep(folder, what):
+    def gone(outcome):
+        shutil.rmtree(folder / "new", ignore_errors=True)
+
+    files = Files(**{what: folder / f"all.{'png' if what == 'sheet' else 'csv'}"})
+    settings = Settings(pattern=str(folder / "new" / "{ambient}.png"), cache=False, only=("beauty",))
+    variants = variants_of(["ambient=0.1,0.2", *SMALL])
+    with pytest.raises(OutputError, match="others took it away"):
+        sweep(folder / "scene.yaml", variants, settings, files, written=gone)

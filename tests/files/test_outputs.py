@@ -10,6 +10,7 @@ import pytest
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files import outputs
+from illumcli.files.atomic import beside
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
 from illumcli.files.writer import ImageWriter
 
@@ -118,3 +119,18 @@ def test_a_file_that_is_kept_is_dated_now(tmp_path):
     refresh(path)
     assert path.stat().st_mtime > 1.5e9
     refresh(tmp_path / "none")
+
+
+def test_a_link_to_nothing_makes_no_file_elsewhere_unless_it_is_asked_for(tmp_path):
+    (tmp_path / "a.png").symlink_to(tmp_path / "elsewhere.png")
+    with pytest.raises(OutputError, match=r"a.png: is a link to nothing; use --force"):
+        is_kept(tmp_path / "a.png", ["one"])
+    assert not is_kept(tmp_path / "a.png", ["one"], force=True)
+
+
+def test_a_run_that_keeps_all_tidies_up_too(tmp_path):
+    (tmp_path / "a.json").write_text(TWO["t.json"])
+    left = beside(tmp_path / "b.json", "0123abcd.part")
+    left.write_text("half")
+    refresh(tmp_path / "a.json")
+    assert os.listdir(tmp_path) == ["a.json"]

@@ -149,3 +149,14 @@ def test_a_report_says_what_failed(illum, folder):
     again = illum("render", "s.yaml", "bad.yaml", "none.yaml", "-o", "{scene}.png", "--report", "r.json")
     assert again.returncode == 0, again.stderr
     assert "error" in json.loads((folder / "r.json").read_text())[1]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_no_file_is_made_through_a_link_to_nothing(illum, folder, name):
+    (folder / "new").mkdir()
+    (folder / name).symlink_to(folder / "elsewhere")
+    words = WRITERS[name][0].split()
+    done = illum(*words, name)
+    assert done.returncode == 5, done.stderr
+    assert "is a link to nothing; use --force" in done.stderr
+    assert not (folder / "elsewhere").exists()

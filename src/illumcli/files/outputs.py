@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import refusals
+from illumcli.files.atomic import refusals, remove_left_over
 from illumcli.files.seal import is_sealed
 
 INCOMPLETE = "incomplete"
@@ -52,8 +52,16 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
             if len(stored) != len(contents) or any(a not in (b, INCOMPLETE) for a, b in pairs):
                 fact = "a different file is there" if stored else f"a different file is there{_OR_CHANGED}"
                 raise OutputError(f"{path}: {fact}; use --force to replace it, or another name")
+        if not force:
+            refuse_empty_link(path)
     refuse_unwritable(path)
     return False
+
+
+def refuse_empty_link(path: Path) -> None:
+    """Raise OutputError where `path` is a link to nothing: what others plant shall make no file elsewhere."""
+    if path.is_symlink() and not path.exists():
+        raise OutputError(f"{path}: is a link to nothing; use --force to write there, or another name")
 
 
 def is_whole(path: Path) -> bool:
@@ -62,9 +70,10 @@ def is_whole(path: Path) -> bool:
 
 
 def refresh(path: Path) -> None:
-    """Date a file that is kept now, so that `make` takes it for made."""
+    """Date a file that is kept now, so that `make` takes it for made, and tidy up after killed runs."""
     with suppress(OSError):  # somebody else's file, a folder that is read-only
         os.utime(path)
+        remove_left_over(Path(os.path.realpath(path)).parent)
 
 
 def stored_contents(path: Path) -> list[str]:

@@ -12,7 +12,7 @@ from pydantic_core import ValidationError
 
 from illumcli.description import Description
 from illumcli.errors import InputError, OutputError
-from illumcli.files.outputs import refresh, refuse_suffix, refuse_unwritable
+from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
 from illumcli.jobs.brdf import views
 from illumcli.models._base import IlluminationModel
 from illumcli.scene.faults import faults
@@ -174,6 +174,8 @@ def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
                     fact = "a different file is there; use --force to replace it, or another name"
                     raise OutputError(f"{path}: {fact}")
                 kept.append(path)
+            elif not force:
+                refuse_empty_link(path)
     for path, data in files.items():
         if path in kept:
             refresh(path)

@@ -20,10 +20,12 @@ MESHES = ROOT.parent / "shared" / "meshes"
 
 @pytest.fixture(autouse=True, scope="session")
 def _own_cache(tmp_path_factory):
-    """Runs of tests keep their artifacts apart from the user's."""
+    """Runs of tests keep their artifacts apart from the user's, in folders that no group can write to."""
     before = os.environ.get("ILLUM_CACHE")
+    mask = os.umask(0o022)
     os.environ["ILLUM_CACHE"] = str(tmp_path_factory.mktemp("cache"))
     yield
+    os.umask(mask)
     del os.environ["ILLUM_CACHE"]
     if before is not None:
         os.environ["ILLUM_CACHE"] = before

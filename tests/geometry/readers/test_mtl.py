@@ -139,7 +139,9 @@ def test_a_library_outside_the_folder_is_left_out(
     assert {path.name for path in opened} == {"a.obj", "a.mtl"}  # the latter is written
 
 
-@pytest.mark.parametrize("name", ["../a.mtl", "/work/a.mtl", "C:\\work\\a.mtl", "deep/a.mtl", "no/a.mtl"])
+@pytest.mark.parametrize(
+    "name", ["../a.mtl", "/elsewhere/a.mtl", "C:\\elsewhere\\a.mtl", "deep/a.mtl", "no/a.mtl"]
+)
 def test_one_elsewhere_stands_for_that_of_its_name_beside_the_mesh(folder: Path, name: str) -> None:
     mesh = mesh_of(folder, "newmtl a\nmap_Kd D:\\art\\w.png\n", name=name)
     assert set(mesh.materials) == {"a"}

@@ -245,7 +245,7 @@ def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pat
     paths, _ = run(scene, pattern=str(tmp_path / "mine.png"), cache=False)
     paths += run(scene, [f"outputs.files=[{tmp_path / 'over.png'}]"], cache=False)[0]
     monkeypatch.setenv("ILLUM_ALLOW", str(tmp_path))
-    paths += run(scene, cache=False)[0]
+    paths += run(scene, cache=False, force=True)[0]
     assert all(os.path.exists(os.path.realpath(path)) for path in paths)
     assert load(scene).scene.outputs.files == (written,)
 

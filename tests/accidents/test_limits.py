@@ -91,6 +91,9 @@ def bombs(folder):
     )
     phong = "{mesh: {shape: box}, material: {model: phong}}"
     (folder / "unused.yaml").write_text(f"{start}materials: {{m: {texture}}}\nobjects: [{phong}]\n")
+    (folder / "wide.yaml").write_text(
+        f"{start.replace('8', '65536')}objects: [{phong}]\nobscurance: {{samples: 1}}\n"
+    )
     (folder / "bomb.mtl").write_text("newmtl a\nmap_Kd bomb.png\n")
     (folder / "mesh.obj").write_text(
         "mtllib bomb.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n"
@@ -103,7 +106,8 @@ def bombs(folder):
         ["check", "texture.yaml"], ["check", "spheres.yaml"], ["plan", "texture.yaml"],
         ["plan", "spheres.yaml"], ["sweep", "spheres.yaml", "-D", "seed=1,2"],
         ["ao-bake", "spheres.yaml", "-o", "x.npz"], ["compare", "bomb.png", "bomb.png"],
-        ["verify", "bomb.json.xz"],
+        ["verify", "bomb.json.xz"], ["converge", "wide.yaml", "--width", "65536"],
+        ["converge", "texture.yaml"],
     ]  # fmt: skip
 
 
@@ -117,6 +121,27 @@ def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(py
         assert code == "4", (each, said)
         assert re.search("takes about|MiB of text", " ".join(said)), (each, said)
         assert int(kilobytes) < 500 * 1024, each
+
+
+def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path):
+    """One column of 60,000 pixels makes cells of 15 million; 90,000 variants make as many cells."""
+    from illumcli.jobs.sweep import Settings, run, variants_of
+    from illumcli.jobs.sweep_files import Files
+
+    start = "version: 1\nambient: 1\nobjects: [{mesh: {shape: box}}]\n"
+    (tmp_path / "s.yaml").write_text(f"{start}film: {{width: 1, height: 60000, samples: 1}}\n")
+    settings = Settings(pattern=str(tmp_path / "{seed}.png"), cache=False)
+    with pytest.raises(LimitError, match="a sheet of 8 pictures, 256 x 15360000 pixels each: takes about"):
+        run(tmp_path / "s.yaml", variants_of(["seed=1:8:8"]), settings, Files(sheet=tmp_path / "sheet.png"))
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize("said", ["9" * 5000, "\u00b2"])
+def test_references_are_numbers_of_variants_or_files(tmp_path, said):
+    from illumcli.jobs.sweep_files import reference_of
+
+    with pytest.raises(InputError):
+        reference_of(said, [])
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):

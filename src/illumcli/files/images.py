@@ -360,8 +360,12 @@ class _Source:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        if not path.is_file():
-            raise InputError(f"{path}: no such file" if not path.exists() else f"{path}: not a file")
+        try:
+            if not path.is_file():
+                raise InputError(f"{path}: no such file" if not path.exists() else f"{path}: not a file")
+        except (OSError, ValueError) as error:  # a name that no file can have
+            name = f"{path}" if len(f"{path}") <= 80 else f"{str(path)[:80]}..."
+            raise InputError(f"{name}: {getattr(error, 'strerror', None) or error}; check the name") from None
         if no_utf8(os.fspath(path)):
             raise InputError(f"{shown(os.fspath(path))}: {NO_UTF8}")
         raw = oiio.ImageSpec()

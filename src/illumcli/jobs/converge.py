@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from illumcli import __version__
 from illumcli.errors import InputError
 from illumcli.files.store import Store
+from illumcli.jobs.limits import expected_memory, refuse_memory
 from illumcli.jobs.render import opened_store, versions
 from illumcli.jobs.sampled import Sampler, Sampling, Subject, subject
 from illumcli.plan.keys import Keys, code, digest
@@ -32,6 +33,8 @@ Vary: TypeAlias = Literal["obscurance", "pixels", "both"]
 Progress = Callable[[str, int, int], None]
 
 SAMPLERS: tuple[Sampler, ...] = ("spiral", "owen", "random")
+PICTURES = 5
+"""Whole pictures that are held at once, in double precision."""
 DOUBLED: dict[Vary, tuple[int, int]] = {"obscurance": (4, 256), "pixels": (2, 64), "both": (8, 512)}
 """From where to where samples are doubled by default: rays, samples, or rays of all samples of a pixel."""
 FINER: dict[Vary, tuple[int, int]] = {"obscurance": (1, 4), "pixels": (4, 1), "both": (2, 2)}
@@ -154,6 +157,8 @@ def run(
     few, many = DOUBLED[vary]
     levels = samplings(scene, vary, first or few, last or max(many, 2 * (first or few)), samplers)
     _check(own, vary)
+    held = PICTURES * len(own.layer.channels)
+    refuse_memory(own.view.height, own.view.width, held, expected_memory(loaded, scene), str(path))
     finest = max(levels, key=lambda level: level.rays)
     contents = {
         (level.sampler, _count(level, vary), repeat): _content(

@@ -16,11 +16,17 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files.content import file_digest
 from illumcli.files.outputs import INCOMPLETE, is_kept, is_whole, refresh, refuse_suffix
 from illumcli.jobs.render import channels
+from illumcli.memory import refuse_beyond
 from illumcli.plan.keys import digest
 from illumcli.records import Record, Value
 
 if TYPE_CHECKING:
     from illumcli.jobs.sweep import Outcome
+
+LONGEST_NUMBER = 9
+"""Digits of a variant's number; what is longer is the name of a file."""
+SHEET_BYTES = 9
+"""Of each pixel of a contact sheet: three colours, as cells, as rows and as a whole."""
 
 
 class Files(Value):
@@ -88,6 +94,8 @@ def checked(files: Files, outcomes: Sequence[Outcome], force: bool) -> ToWrite:
         A reference that is not there, is none or does not fit; a suffix that is not written.
     OutputError
         A file that cannot be written; another file in its place, unless `force` is given.
+    LimitError
+        A contact sheet that does not fit into memory.
     """
     for path, what, suffix in (
         (files.sheet, "a contact sheet", ".png"),
@@ -96,6 +104,8 @@ def checked(files: Files, outcomes: Sequence[Outcome], force: bool) -> ToWrite:
     ):
         if path is not None:
             refuse_suffix(path, what, suffix)
+    if files.sheet is not None:
+        refuse_large_sheet(files.sheet, outcomes)
     reference = None if files.reference is None else reference_of(files.reference, outcomes)
     contents = {
         outcome.number: digest(
@@ -116,6 +126,17 @@ def checked(files: Files, outcomes: Sequence[Outcome], force: bool) -> ToWrite:
     return ToWrite(files, reference, contents, kept)
 
 
+def refuse_large_sheet(path: Path, outcomes: Sequence[Outcome]) -> None:
+    """Raise LimitError where the pictures of a contact sheet, all as high as the highest, are too much."""
+    from illumcli.files.images import SHEET_CELL
+
+    views = [outcome.work.targets[0].view for outcome in outcomes if outcome.work is not None]
+    tallest = max((SHEET_CELL * view.height // view.width for view in views), default=0)
+    size = SHEET_BYTES * len(views) * SHEET_CELL * (tallest + SHEET_CELL // 8)
+    what = f"{path}: a sheet of {len(views)} pictures, {SHEET_CELL} x {tallest} pixels each"
+    refuse_beyond(size, what, "leave --sheet out, or sweep in parts")
+
+
 def _of_all(contents: Sequence[str]) -> str:
     """The content of a file about all variants: as good as none where one of them failed."""
     return INCOMPLETE if INCOMPLETE in contents else digest(contents)
@@ -124,7 +145,7 @@ def _of_all(contents: Sequence[str]) -> str:
 def reference_of(said: str, outcomes: Sequence[Outcome]) -> Reference:
     """The picture that `--reference` names: a variant's first one, by its number or its file, or an image."""
     planned = {outcome.number: outcome.work for outcome in outcomes if outcome.work is not None}
-    number = int(said) if said.isdigit() else None
+    number = int(said) if said.isascii() and said.isdecimal() and len(said) <= LONGEST_NUMBER else None
     if number is not None and not 1 <= number <= len(outcomes):
         raise InputError(f"--reference {said}: there are variants 1 to {len(outcomes)}")
     if number is not None and number not in planned:

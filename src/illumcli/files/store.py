@@ -279,7 +279,14 @@ class Writer:
         self._failed = False
         self._number = 0
         atomic.remember(part)
-        self._file = os.fdopen(atomic.created(part), "r+b", buffering=0)
+        handle = atomic.created(part)
+        try:
+            self._file = os.fdopen(handle, "r+b", buffering=0)
+        except OSError:
+            os.close(handle)
+            part.unlink()
+            atomic.forget(part)
+            raise
         self._try(lambda: self._file.truncate(self._start + end))
 
     def write(self, array: NDArray[Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 SCRIPT = """
-import builtins, errno, fcntl, hashlib, io, os, sys
+import builtins, errno, fcntl, gc, hashlib, io, os, sys
 from pathlib import Path
 
 import illumcli.files.images
@@ -86,6 +86,7 @@ for once_more in range(2):
     assert run() is None and files() == whole
     assert not list(Path("out").glob(".*")), list(Path("out").glob(".*"))
     emptied()
+gc.collect()  # an error that was told holds what it was about
 assert len(os.listdir("/proc/self/fd")) <= handles, os.listdir("/proc/self/fd")
 print("\\n", tries, refused)
 """

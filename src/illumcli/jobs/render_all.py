@@ -6,13 +6,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from illumcli.files.atomic import write_text
 from illumcli.files.names import check_unique
-from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
-from illumcli.jobs.batch import Batch, Tell
-from illumcli.jobs.render import Progress, Report, Work, prepared, report_text, run_prepared
+from illumcli.jobs.batch import Batch, BatchReport, Tell
+from illumcli.jobs.render import Progress, Report, Work, prepared, run_prepared
 from illumcli.plan.keys import digest
 from illumcli.records import Value
 from illumcli.scene.load import load
@@ -66,7 +63,7 @@ def run(
     """
     batch = Batch("scenes", len(scenes), settings.keep_going, tell)
     works: dict[int, Work] = {}
-    entries: list[dict[str, Any]] = [{"scene": str(scene), "content": INCOMPLETE} for scene in scenes]
+    whole = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
 
     # all that can be known before the first ray
     for number in batch.due():
@@ -74,26 +71,16 @@ def run(
             works[number] = work = settings.prepared(scenes[number])
             work.due(settings.force)
             names = [str(target.path) for target in work.targets]
-            entries[number]["content"] = digest((work.content, names, settings.target_error))
+            whole.plan(number, digest((work.content, names, settings.target_error)))
     check_unique([str(path) for path, _ in _files(works)])
-    report_is_kept = False
-    if report is not None:
-        refuse_suffix(report, "a report", ".json")
-        report_is_kept = is_kept(report, [entry["content"] for entry in entries], settings.force)
+    whole.look(settings.force)
 
     for number in batch.due():
         with batch.piece(number):
             done = _rendered(scenes[number], works.pop(number), settings, progress)
-            entries[number] = done.report.as_data() | {"content": entries[number]["content"]}
+            whole.add(number, done.report.as_data())
             written(done)
-    for number, failure in batch.failures.items():
-        entries[number] |= {"content": INCOMPLETE, "error": str(failure)}
-    if report is not None and report_is_kept:
-        refresh(report)
-    elif report is not None:
-        write_text(report, report_text(entries))
-    batch.finish()
-    return report_is_kept
+    return whole.finish(batch)
 
 
 def _files(works: dict[int, Work]) -> list[tuple[Path, str]]:

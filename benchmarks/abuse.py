@@ -27,7 +27,7 @@ lights: [{light: point, name: key, position: [3, 4, 5], intensity: 30}]
 WORKER = """
 import sys
 from pathlib import Path
-from illumcli.jobs.render import run
+from illumcli.commands.render import run
 for k in range(int(sys.argv[2])):
     change, name = f"materials.clay.exponent={4 + k % 5}", f"{sys.argv[1]}-{k % 5}.png"
     _, report = run(Path("scene.yaml"), [change], name, force=True)
@@ -48,8 +48,8 @@ def main() -> None:
 
 def damaged(flips: int, truncations: int) -> int:
     """Pictures that differ after an entry was damaged."""
-    from illumcli.jobs.render import opened_store, run
-    from illumcli.plan import artifacts
+    from illumcli.commands.render import opened_store, run
+    from illumcli.render_graph import cached as artifacts
 
     artifacts.worth = lambda seconds, size: True
     (path,), _ = run(Path("scene.yaml"), (), "a.png", force=True, cache=False)
@@ -72,7 +72,7 @@ def damaged(flips: int, truncations: int) -> int:
 
 def shared(processes: int, runs: int) -> int:
     """Runs that failed and pictures that differ between processes."""
-    from illumcli.jobs.render import opened_store
+    from illumcli.commands.render import opened_store
 
     opened_store().prune(0)
     workers = [subprocess.Popen([sys.executable, "-c", WORKER, str(n), str(runs)]) for n in range(processes)]

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import _bench
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
 SIZE = ("film.width=64", "film.height=36") if _bench.SMALL else ("film.width=480", "film.height=270")
@@ -73,8 +73,8 @@ def compared(what: str, scene: Path, *overrides: str) -> dict[str, Run]:
 
 def left(folder: Path, what: str, runs: dict[str, Run]) -> None:
     """Write pictures to look at."""
-    from illumcli.files.writer import ImageWriter
     from illumcli.film.encode import picture
+    from illumcli.images.writer import ImageWriter
 
     full, adaptive, few = (
         runs[name].beauty for name in ("16 samples", "4 to 16, difference 0.1", "4 samples")

@@ -23,11 +23,11 @@ import numpy as np
 
 from _bench import SMALL, header
 from illumcli.arrays import F, columns, cross, dot, length, rows, unit
-from illumcli.demand import order
+from illumcli.baking.bake import Settings, run
 from illumcli.files.vertex_data import read_npz
-from illumcli.jobs.ao_bake import Settings, run
-from illumcli.plan.recipes import recipes
-from illumcli.rays.surface import Hits, facets
+from illumcli.graph import order
+from illumcli.rays.interaction import Hits, facets
+from illumcli.render_graph.build import recipes
 from illumcli.scene.load import Loaded, load
 
 POINTS = 20 if SMALL else 2000

@@ -2,7 +2,7 @@
 
 Question   How often does a single estimate's 95 % interval hold the closed form?
 Reference  The obscurance cases of the packaged vectors, built as real triangles
-           (jobs/verify/surroundings.py).
+           (verification/surroundings.py).
 Repeats    SCRAMBLES scrambles of every case. The error law is that of a bake with one vertex in every case:
            PAIRS pairs of others from each, all cases of a kind together, about as many as a bake of 130,000
            vertices draws. For comparison `own`: a law for each case alone, from OWN pairs of it, which no
@@ -21,14 +21,14 @@ from typing import Any
 import numpy as np
 
 from illumcli.arrays import F, columns
-from illumcli.geometry.assemble import place
 from illumcli.geometry.mesh import Mesh
-from illumcli.jobs.verify.inputs import Inputs
-from illumcli.jobs.verify.obscurance import CAST, exponential
-from illumcli.jobs.verify.surroundings import surroundings
-from illumcli.jobs.verify.vectors import PACKAGED, read_cases
+from illumcli.geometry.scene_geometry import place
+from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import lifted
-from illumcli.rays.tracer import Tracer
+from illumcli.verification.inputs import Inputs
+from illumcli.verification.obscurance import CAST, exponential
+from illumcli.verification.surroundings import surroundings
+from illumcli.verification.vectors import PACKAGED, read_cases
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Errors, Estimates, Hemispheres, Method, estimates
 

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from illumcli.jobs.ao_bake import Settings, bare, occluders_of, surfaces_of
-from illumcli.jobs.ao_bake_cast import Caster
-from illumcli.jobs.ao_bake_points import vertex_points
+from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
+from illumcli.baking.points import vertex_points
+from illumcli.baking.sampling import Caster
 from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64, 256, 1024)

@@ -19,11 +19,11 @@ import numpy as np
 
 from _bench import SMALL, header
 from illumcli.arrays import F, columns, dot, length, rows, unit
-from illumcli.demand import order
-from illumcli.jobs.ao_bake import bare
-from illumcli.plan.recipes import recipes
-from illumcli.plan.stages import corner_weights, obscurance_normals, ray_origins
-from illumcli.rays.surface import Facets, Hits, facets
+from illumcli.baking.bake import bare
+from illumcli.graph import order
+from illumcli.rays.interaction import Facets, Hits, facets
+from illumcli.render_graph.build import recipes
+from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Hemispheres, Method, estimates
 

@@ -31,9 +31,9 @@ import numpy as np
 from _bench import SMALL, Took, header, took
 from ao_error import caster
 from illumcli.arrays import F
-from illumcli.jobs.ao_bake import Settings, bare, occluders_of, surfaces_of
-from illumcli.jobs.ao_bake_cast import Caster
-from illumcli.jobs.ao_bake_points import vertex_points
+from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
+from illumcli.baking.points import vertex_points
+from illumcli.baking.sampling import Caster
 from illumcli.rays.sampling import GOLDEN
 from illumcli.visibility.obscurance import Method, turned_frame
 

@@ -63,7 +63,7 @@ def schema_cases(count: int, seed: int) -> list[str]:
     """Scenes drawn from the JSON schema, most of them wrong in some part."""
     import json
 
-    from illumcli.jobs.schema import run
+    from illumcli.commands.schema import run
 
     schema, draw = json.loads(run()), random.Random(seed)
     return [json.dumps(_drawn(schema, schema.get("$defs", {}), draw, 0)) for _ in range(count)]
@@ -140,7 +140,7 @@ def tried(cases: Iterator[bytes] | list[bytes], suffix: str, read: Callable[[Pat
 
 def load_and_plan(path: Path) -> None:
     """A scene as `illum plan` reads it."""
-    from illumcli.plan.plan import plan
+    from illumcli.render_graph.schedule import plan
     from illumcli.scene.load import load
 
     loaded = load(path)
@@ -168,7 +168,7 @@ def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     draw = random.Random(seed)
-    from illumcli.geometry.readers import read_mesh
+    from illumcli.mesh_files import read_mesh
 
     os.environ.setdefault("ILLUM_CACHE", "")
     rows = {"scene bytes": tried(scene_cases(count, draw), ".yaml", load_and_plan)}

@@ -20,10 +20,12 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["illumcli.scene", "illumcli.geometry.readers"]):
+with atheris.instrument_imports(include=["illumcli.scene", "illumcli.mesh_files"]):
     import fuzz
     from illumcli.errors import IllumError
-    from illumcli.geometry.readers import gltf, obj, ply, read_mesh, stl  # noqa: F401
+    from illumcli.mesh_files import (
+        read_mesh,
+    )
     from illumcli.scene.load import load
 
 TARGETS = ("scene", "obj", "ply", "stl", "gltf", "glb", "mtl")

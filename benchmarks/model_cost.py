@@ -17,8 +17,8 @@ from collections.abc import Callable
 import numpy as np
 
 from illumcli.arrays import F, columns, cross, unit
+from illumcli.schema.families import member, tags
 from illumcli.shading import terms
-from illumcli.variants import member, tags
 
 LANES, REPEATS = 8192, 7
 

@@ -25,31 +25,29 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-READERS = "tests/geometry/readers"
+READERS = "tests/mesh_files"
 MODULES = {
     "files/atomic.py": ["tests/files/test_atomic.py"],
-    "files/content.py": ["tests/files/test_content.py"],
-    "files/images.py": ["tests/files/test_images.py"],
+    "cache/fingerprint.py": ["tests/cache/test_fingerprint.py"],
+    "images/oiio.py": ["tests/images/test_images.py"],
     "files/names.py": ["tests/files/test_names.py"],
-    "files/png.py": ["tests/files/test_png.py"],
-    "files/store.py": ["tests/files/test_store.py"],
+    "images/png.py": ["tests/images/test_png.py"],
+    "cache/store.py": ["tests/cache/test_store.py"],
     "files/vertex_data.py": ["tests/files/test_vertex_data.py"],
-    "files/writer.py": ["tests/files/test_images.py", "tests/files/test_png.py"],
-    "scene/faults.py": ["tests/scene/test_load.py"],
+    "images/writer.py": ["tests/images/test_images.py", "tests/images/test_png.py"],
+    "schema/faults.py": ["tests/scene/test_load.py"],
     "scene/load.py": ["tests/scene/test_load.py"],
     "scene/override.py": ["tests/scene/test_load.py"],
     "scene/references.py": ["tests/scene/test_load.py", "tests/scene/test_spec.py"],
     "scene/source.py": ["tests/scene/test_source.py"],
-    "geometry/readers/_files.py": [f"{READERS}/test_read_mesh.py", f"{READERS}/test_gltf.py"],
-    "geometry/readers/_mtl.py": [f"{READERS}/test_mtl.py"],
-    "geometry/readers/_polygons.py": [
-        f"{READERS}/test_{name}.py" for name in ("obj", "ply", "gltf", "read_mesh")
-    ],
-    "geometry/readers/_text.py": [f"{READERS}/test_{name}.py" for name in ("obj", "stl", "ply", "read_mesh")],
-    "geometry/readers/gltf.py": [f"{READERS}/test_gltf.py"],
-    "geometry/readers/obj.py": [f"{READERS}/test_obj.py", f"{READERS}/test_mtl.py"],
-    "geometry/readers/ply.py": [f"{READERS}/test_ply.py"],
-    "geometry/readers/stl.py": [f"{READERS}/test_stl.py"],
+    "mesh_files/_files.py": [f"{READERS}/test_read_mesh.py", f"{READERS}/test_gltf.py"],
+    "mesh_files/_mtl.py": [f"{READERS}/test_mtl.py"],
+    "mesh_files/_polygons.py": [f"{READERS}/test_{name}.py" for name in ("obj", "ply", "gltf", "read_mesh")],
+    "mesh_files/_text.py": [f"{READERS}/test_{name}.py" for name in ("obj", "stl", "ply", "read_mesh")],
+    "mesh_files/gltf.py": [f"{READERS}/test_gltf.py"],
+    "mesh_files/obj.py": [f"{READERS}/test_obj.py", f"{READERS}/test_mtl.py"],
+    "mesh_files/ply.py": [f"{READERS}/test_ply.py"],
+    "mesh_files/stl.py": [f"{READERS}/test_stl.py"],
 }
 MEMORY = 8 << 30  # [bytes] of address space, for changes that make a program ask for all there is
 

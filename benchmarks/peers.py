@@ -39,7 +39,7 @@ from _bench import (
     spread,
     table,
 )
-from illumcli.files.images import read_image
+from illumcli.images.oiio import read_image
 
 ERROR = 0.01
 SIZE = (64, 36) if SMALL else (1280, 720)
@@ -50,10 +50,10 @@ LAMPS = ((3.0, 4.0, 2.0), (-3.0, 3.0, 3.0))
 
 def placed_bunny(folder: Path) -> Path:
     """The bunny as illum's `fit: 1` places it, as a PLY with smooth normals that everybody reads."""
-    from illumcli.geometry import assemble
+    from illumcli.geometry import scene_geometry as assemble
     from illumcli.geometry.normals import corner_normals
-    from illumcli.geometry.readers import read_mesh
     from illumcli.geometry.shapes.teapot import Teapot
+    from illumcli.mesh_files import read_mesh
     from illumcli.scene.spec import Transform
 
     source = bunny(folder)

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from _bench import REPEATS, SMALL, Took, ambient_scene, header, ratio, table, took
-from illumcli.jobs.render import run
-from illumcli.plan import execute
-from illumcli.plan.plan import plan
-from illumcli.plan.stages import Tile
-from illumcli.rays.tracer import Tracer
+from illumcli.commands.render import run
+from illumcli.rays.embree import Tracer
+from illumcli.render_graph import execute
+from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.stages import Tile
 from illumcli.scene.load import load
 
 Question = tuple[str, np.ndarray, np.ndarray, Any]

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from _bench import REPEATS, SMALL, Took, header, illum, interleaved, lit_scene, spread
-from illumcli.jobs.render import run
+from illumcli.commands.render import run
 
 AXES = ("pixels", "samples", "lights", "triangles")
 

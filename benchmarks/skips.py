@@ -19,14 +19,15 @@ import numpy as np
 
 from illumcli.arrays import rows
 from illumcli.models._base import IlluminationModel
-from illumcli.plan import recipes, stages
-from illumcli.plan.artifacts import Artifacts
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
-from illumcli.plan.unseen import unseen_objects, without
+from illumcli.render_graph import build as recipes
+from illumcli.render_graph import stages
+from illumcli.render_graph.cached import Artifacts
+from illumcli.render_graph.culling import unseen_objects, without
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.shading import direct
-from illumcli.visibility import arriving
+from illumcli.visibility import incident as arriving
 
 SCENE = """
 version: 1
@@ -102,7 +103,7 @@ def _directions(_):
 
 
 DARK = ((recipes, "sends", yes),)
-plan_module = import_module("illumcli.plan.plan")
+plan_module = import_module("illumcli.render_graph.schedule")
 AMBIENT = ((recipes, "is_ambient", yes), (plan_module, "is_ambient", yes))
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),

@@ -69,8 +69,8 @@ def main() -> None:
 
 def swept(count: int, cold: int) -> None:
     """A sweep of one material parameter: variants against the first render, bytes against cold ones."""
-    from illumcli.jobs.render import run as render
-    from illumcli.jobs.sweep import run, variants_of
+    from illumcli.commands.render import run as render
+    from illumcli.commands.sweep import run, variants_of
 
     axis = f"materials.subject.exponent=4:256:{count}log"
     done = run(Path("scene.yaml"), variants_of([axis]))
@@ -105,7 +105,7 @@ def shell(runs: int) -> None:
 
 def moved() -> None:
     """What is traced again after one thing moves."""
-    from illumcli.jobs.render import run
+    from illumcli.commands.render import run
 
     changes = {
         "colours": [
@@ -125,8 +125,8 @@ def moved() -> None:
 
 def stored() -> None:
     """Every artifact: bytes, seconds it took, seconds to load it, checksum included."""
-    from illumcli.files.store import described
-    from illumcli.jobs.render import opened_store, run
+    from illumcli.cache.store import described
+    from illumcli.commands.render import opened_store, run
 
     store = opened_store()
     store.prune(0)

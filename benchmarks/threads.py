@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from _bench import SMALL, ambient_scene, header, interleaved, lit_scene, ratio, table
-from illumcli.jobs.render import run
+from illumcli.commands.render import run
 
 
 def numbers(threads: int) -> Callable[[], object]:

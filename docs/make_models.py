@@ -9,8 +9,8 @@ import inspect
 import sys
 from pathlib import Path
 
-from illumcli.jobs.models import CLAIMS, page
-from illumcli.variants import member, tags
+from illumcli.commands.models import CLAIMS, page
+from illumcli.schema.families import member, tags
 
 PAGE = Path(__file__).with_name("models.md")
 PACKAGE = "illumcli.models"

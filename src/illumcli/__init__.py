@@ -1,3 +1,3 @@
 """Batch renderer for local illumination models and ambient obscurance, driven by YAML scenes."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

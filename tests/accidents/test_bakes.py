@@ -13,9 +13,9 @@ from contextlib import suppress
 
 import pytest
 
+from illumcli.baking.bake import Settings, prepared, run
+from illumcli.baking.sampling import Caster
 from illumcli.files.journal import place
-from illumcli.jobs.ao_bake import Settings, prepared, run
-from illumcli.jobs.ao_bake_cast import Caster
 
 RAYS = 1 << 10
 """Of a piece: small, so that small bakes have many."""
@@ -24,7 +24,7 @@ RAYS = 1 << 10
 @pytest.fixture
 def mesh(tmp_path, monkeypatch):
     """A bumpy sheet, whose bake takes some fifty pieces."""
-    monkeypatch.setattr("illumcli.jobs.ao_bake_cast.RAYS", RAYS)
+    monkeypatch.setattr("illumcli.baking.sampling.RAYS", RAYS)
     return sheet(tmp_path / "mesh.obj", 16)
 
 

@@ -6,8 +6,9 @@ import random
 
 import pytest
 
+from illumcli.baking import bake as ao_bake
+from illumcli.commands import render
 from illumcli.errors import OutputError
-from illumcli.jobs import ao_bake, render
 
 
 def picture(folder, name):

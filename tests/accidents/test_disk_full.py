@@ -8,8 +8,8 @@ COMMON = """
 import os, sys, hashlib, shutil
 from pathlib import Path
 from illumcli.errors import IllumError, OutputError
-from illumcli.jobs.render import run
-from illumcli.files import images
+from illumcli.commands.render import run
+from illumcli.images import oiio as images
 
 def files(folder="out"):
     return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(Path(folder).glob("*"))}

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 
 from illumcli import memory
+from illumcli.commands import limits
 from illumcli.errors import InputError, LimitError
-from illumcli.jobs import limits
 
 TOO_LARGE = {
     "film": "film: {width: 1000000, height: 1000000}",
@@ -43,7 +43,7 @@ def test_too_large_is_exit_4_in_one_line_with_little_memory(python, tmp_path, wh
 
 
 def test_little_memory_and_little_disk_are_refused_before_anything_is_made(folder, monkeypatch):
-    from illumcli.jobs.render import run
+    from illumcli.commands.render import run
 
     monkeypatch.setattr(memory, "free_memory", lambda: 100_000)
     with pytest.raises(LimitError, match="memory"):
@@ -125,8 +125,8 @@ def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(py
 
 def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path):
     """One column of 60,000 pixels makes cells of 15 million; 90,000 variants make as many cells."""
-    from illumcli.jobs.sweep import Settings, run, variants_of
-    from illumcli.jobs.sweep_files import Files
+    from illumcli.commands.sweep import Settings, run, variants_of
+    from illumcli.commands.sweep_files import Files
 
     start = "version: 1\nambient: 1\nobjects: [{mesh: {shape: box}}]\n"
     (tmp_path / "s.yaml").write_text(f"{start}film: {{width: 1, height: 60000, samples: 1}}\n")
@@ -138,14 +138,14 @@ def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_pa
 
 @pytest.mark.parametrize("said", ["9" * 5000, "\u00b2"])
 def test_references_are_numbers_of_variants_or_files(tmp_path, said):
-    from illumcli.jobs.sweep_files import reference_of
+    from illumcli.commands.sweep_files import reference_of
 
     with pytest.raises(InputError):
         reference_of(said, [])
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):
-    from illumcli.jobs.plan import run
+    from illumcli.commands.plan import run
 
     bombs(tmp_path)
     assert "shapes " in run(tmp_path / "spheres.yaml", cache=False)
@@ -192,9 +192,9 @@ def hook(event, words):
 
 from pathlib import Path
 from illumcli.errors import IllumError
-from illumcli.jobs.render import run
-from illumcli.files import images
-import illumcli.jobs.check
+from illumcli.commands.render import run
+from illumcli.images import oiio as images
+import illumcli.commands.check
 os.chdir(root)
 sys.addaudithook(hook)
 for number in range(int(sys.argv[2])):
@@ -246,8 +246,8 @@ OUTSIDE = [
 
 @pytest.mark.parametrize("pattern", OUTSIDE)
 def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pattern):
-    from illumcli.jobs.check import run as check
-    from illumcli.jobs.render import run
+    from illumcli.commands.check import run as check
+    from illumcli.commands.render import run
     from illumcli.scene.load import load
 
     monkeypatch.chdir(jail)
@@ -276,7 +276,7 @@ def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pat
 
 
 def test_names_of_a_scene_hold_no_control_characters(folder):
-    from illumcli.jobs.render import run
+    from illumcli.commands.render import run
 
     for said in ("\\e[31mx.png", "a\\0.png", "a\\nb.png", "\\x9b.png"):
         text = (folder / "scene.yaml").read_text().partition("outputs:")[0]
@@ -287,7 +287,7 @@ def test_names_of_a_scene_hold_no_control_characters(folder):
 
 @pytest.mark.parametrize("pattern", ["x.png", "new/x.png", "../x.png", "../c/x.png", "{top}/a/b/x.png"])
 def test_a_scene_writes_beside_itself_and_where_the_user_stands(jail, tmp_path, monkeypatch, pattern):
-    from illumcli.jobs.render import run
+    from illumcli.commands.render import run
 
     monkeypatch.chdir(jail)
     (jail / "s.yaml").write_text(

@@ -18,7 +18,7 @@ from collections import Counter
 import pytest
 
 from illumcli.errors import LimitError, known
-from illumcli.variants import modules
+from illumcli.schema.families import modules
 
 SHIM = """
 #include <errno.h>
@@ -49,12 +49,13 @@ from pathlib import Path
 
 import numpy as np
 
-import illumcli.files.images, illumcli.plan.execute, illumcli.scene.load
+import illumcli.images.oiio, illumcli.render_graph.execute, illumcli.scene.load
 from embreex import mesh_construction, rtcore_scene
 from illumcli.errors import known
-from illumcli.jobs import ao_bake, render
-from illumcli.rays.tracer import Tracer
-from illumcli.rays.upload import _library
+from illumcli.baking import bake as ao_bake
+from illumcli.commands import render
+from illumcli.rays.embree import Tracer
+from illumcli.rays.embree_upload import _library
 
 what, least, stride = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 shim = ctypes.CDLL(None)

@@ -10,8 +10,8 @@ SLOW = pytest.mark.slow
 SWEEP = """
 import gc, json, os, sys
 from pathlib import Path
-from illumcli.jobs import sweep
-from illumcli.plan import artifacts
+from illumcli.commands import sweep
+from illumcli.render_graph import cached as artifacts
 
 count = int(sys.argv[1])
 artifacts.worth = lambda seconds, size: True  # every artifact is kept, however fast it was made
@@ -39,7 +39,7 @@ print(json.dumps(states))
 GARBAGE = """
 import gc
 from pathlib import Path
-from illumcli.jobs.render import run
+from illumcli.commands.render import run
 
 run(Path("scene.yaml"))
 gc.collect()

@@ -11,8 +11,8 @@ import sys
 import numpy as np
 import pytest
 
-from illumcli.files import store as module
-from illumcli.files.store import SUFFIX, Refused, Store, read_entry
+from illumcli.cache import store as module
+from illumcli.cache.store import SUFFIX, Refused, Store, read_entry
 
 KEY = "0123456789abcdef" * 2
 ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
@@ -207,7 +207,7 @@ CUT = """
 import os
 from pathlib import Path
 import numpy as np
-from illumcli.files.store import Store
+from illumcli.cache.store import Store
 
 store = Store(Path("kept"))
 store.save("a" * 32, {}, [np.ones(1 << 18)])
@@ -233,7 +233,7 @@ FULL = """
 import os, sys
 from pathlib import Path
 import numpy as np
-from illumcli.files.store import Store
+from illumcli.cache.store import Store
 
 store = Store(Path(sys.argv[1], "kept"))
 writer = store.writer("a" * 32, {}, [((1 << 18,), np.float64)])
@@ -265,7 +265,7 @@ def test_a_disk_that_is_full_before_an_entry_is_whole_ends_no_process(tmp_path):
 
 RENDER = """
 import sys
-from illumcli.plan import artifacts
+from illumcli.render_graph import cached as artifacts
 artifacts.worth = lambda seconds, size: True
 from illumcli.cli import illum
 illum()

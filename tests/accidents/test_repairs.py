@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from illumcli.commands.render import run
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, NO_MATERIAL, NOT_ASKED
-from illumcli.jobs.render import run
-from illumcli.plan import artifacts
+from illumcli.render_graph import cached as artifacts
 
 BAD = """v 0 0 0
 v 1 0 0

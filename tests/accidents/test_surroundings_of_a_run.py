@@ -115,7 +115,7 @@ def test_little_memory_gives_the_right_picture_or_one_line(folder, steps):
 MANY = """
 import os, sys, gc
 from pathlib import Path
-from illumcli.jobs.render import run
+from illumcli.commands.render import run
 
 def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

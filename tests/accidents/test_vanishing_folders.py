@@ -6,11 +6,12 @@ import shutil
 
 import pytest
 
+from illumcli.baking import bake as ao_bake
+from illumcli.commands import render
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import Files, variants_of
+from illumcli.commands.sweep import run as sweep
 from illumcli.errors import OutputError
-from illumcli.jobs import ao_bake, render
-from illumcli.jobs.render_all import Settings
-from illumcli.jobs.sweep import Files, variants_of
-from illumcli.jobs.sweep import run as sweep
 
 SMALL = ["film.width=24", "film.height=16"]
 

@@ -14,7 +14,7 @@ import pytest
 from illumcli.errors import OutputError
 from illumcli.files import atomic
 from illumcli.files.atomic import Part, write_bytes, write_text
-from illumcli.files.writer import ImageWriter
+from illumcli.images.writer import ImageWriter
 
 
 def parts(folder: Path) -> list[str]:

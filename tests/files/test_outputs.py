@@ -12,7 +12,7 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files import outputs
 from illumcli.files.atomic import beside
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
-from illumcli.files.writer import ImageWriter
+from illumcli.images.writer import ImageWriter
 
 TWO = {
     "t.csv": "a,content,seconds\n1,one,0.5\n2,two,0.7\n",

@@ -9,7 +9,7 @@ import pytest
 
 from illumcli.files.seal import is_sealed
 from illumcli.files.vertex_data import Baked, Shape, write_glb, write_npz, write_ply
-from illumcli.files.writer import ImageWriter
+from illumcli.images.writer import ImageWriter
 
 FORMATS = ("half.exr", "mixed.exr", "8.png", "16.png", "npz", "ply", "glb")
 

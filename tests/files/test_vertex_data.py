@@ -24,9 +24,9 @@ from illumcli.files.vertex_data import (
     write_npz,
     write_ply,
 )
-from illumcli.geometry.readers import read_mesh
-from illumcli.geometry.readers.gltf import primitives_of
-from illumcli.geometry.readers.gltf.document import open_document
+from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.gltf import primitives_of
+from illumcli.mesh_files.gltf.document import open_document
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 ABOUT = {"content": "abc", "vertices": {"a": 4, "b": 4}, "meshes": {"a": "hash a", "b": "hash b"}}

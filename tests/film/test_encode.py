@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from illumcli.color import to_srgb
 from illumcli.errors import IllumError
 from illumcli.film.encode import exposed, picture, srgb8, srgb16, unpremultiplied
-from illumcli.pixels import to_srgb
 
 
 def single(*values):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from illumcli.color import from_srgb
 from illumcli.film.heat import NOT_FINITE, heat
-from illumcli.pixels import from_srgb
 
 
 def lightness(colours):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.frame import Frame
 from illumcli.lights.spot import Spot
+from illumcli.render_space import Frame
 
 FRAME = Frame((0.0, 0.0, 0.0), 1.0)
 HEIGHT = 1000.0

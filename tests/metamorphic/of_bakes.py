@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.baking import bake as ao_bake
 from illumcli.files.vertex_data import read_npz
-from illumcli.geometry.assemble import transform_matrix
-from illumcli.geometry.readers import read_mesh
-from illumcli.jobs import ao_bake
+from illumcli.geometry.scene_geometry import transform_matrix
+from illumcli.mesh_files import read_mesh
 from illumcli.scene.load import load
 from metamorphic import scenes, surfaces
 from metamorphic.pictures import Studio

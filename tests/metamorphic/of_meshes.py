@@ -8,7 +8,7 @@ from random import Random
 
 import numpy as np
 
-from illumcli.pixels import from_srgb
+from illumcli.color import from_srgb
 from metamorphic import scenes, surfaces
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, same
 from metamorphic.premises import (

@@ -12,13 +12,13 @@ from unittest.mock import patch
 
 import numpy as np
 
-from illumcli.files.images import read_image
-from illumcli.files.store import Store
-from illumcli.jobs import render, sweep
-from illumcli.plan import artifacts
-from illumcli.plan.artifacts import Memory
-from illumcli.plan.execute import Tally, at_pixels, run_once
-from illumcli.plan.plan import plan
+from illumcli.cache.store import Store
+from illumcli.commands import render, sweep
+from illumcli.images.oiio import read_image
+from illumcli.render_graph import cached as artifacts
+from illumcli.render_graph.cached import Memory
+from illumcli.render_graph.execute import Tally, at_pixels, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, pictures, same
 from metamorphic.premises import UNDRAWN, at_centres, fixed_samples, one_camera, without_rays

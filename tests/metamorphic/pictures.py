@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.files.store import Store
-from illumcli.plan.artifacts import Artifacts, Memory
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan, reusing
-from illumcli.plan.unseen import unseen_objects, without
+from illumcli.cache.store import Store
+from illumcli.render_graph.cached import Artifacts, Memory
+from illumcli.render_graph.culling import unseen_objects, without
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
 from metamorphic.scenes import Case

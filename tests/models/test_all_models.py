@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
 from illumcli.arrays import columns, cross, dot, unit
-from illumcli.description import Description
-from illumcli.jobs.schema import schema_of
+from illumcli.commands.schema import schema_of
 from illumcli.models._base import IlluminationModel
+from illumcli.schema.description import Description
+from illumcli.schema.families import member, members, tags
 from illumcli.shading.terms import evaluate, words
-from illumcli.variants import member, members, tags
 
 MODELS = members("illumcli.models")
 CLAIMS = ("reciprocal", "conserving", "isotropic", "physical")

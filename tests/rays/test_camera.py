@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from illumcli.frame import Frame
 from illumcli.rays.camera import CLOSEST, MARGIN, axes, camera_rays, film_points, framing
+from illumcli.render_space import Frame
 from illumcli.scene.spec import Filter, Orthographic, Perspective
 
 UNIT = Frame((0.0, 0.0, 0.0), 1.0)

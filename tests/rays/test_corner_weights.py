@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from illumcli.arrays import columns
 from illumcli.geometry import planar
-from illumcli.geometry.assemble import CornerVectors, place, polygon_centres, rotation
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
+from illumcli.geometry.scene_geometry import CornerVectors, place, polygon_centres, rotation
 from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
-from illumcli.rays.surface import Facets, quadratic
+from illumcli.rays.interaction import Facets, quadratic
 
 F = np.float32
 TURNED = rotation(0, 33) @ rotation(1, 12) @ rotation(2, 71)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.jobs.stress.rays import grazing, icosphere, surface_points, world_of
+from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
-from illumcli.rays.tracer import Tracer
+from illumcli.stress.rays import grazing, icosphere, surface_points, world_of
 
 F = np.float32
 

@@ -202,8 +202,8 @@ class Difference:
 
 def compare(setup, folder):
     """A row per layer, over the pixels whose every ray answered alike, and the counts of those left out."""
-    from illumcli.files.images import read_image
-    from illumcli.jobs.render import run
+    from illumcli.commands.render import run
+    from illumcli.images.oiio import read_image
 
     image = folder / f"{setup.name}.exr"
     run(setup.write(folder), pattern=str(image), cache=False)
@@ -233,7 +233,7 @@ def compare(setup, folder):
 
 def setups():
     """Two coarse smooth balls: three materials, then far from the origin, tiny, and flattened."""
-    from illumcli.jobs.stress.rays import icosphere
+    from illumcli.stress.rays import icosphere
 
     ball = icosphere(2)
     faces = ball.corners.reshape(-1, 3)

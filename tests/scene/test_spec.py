@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from pydantic_core import ValidationError
 
-from illumcli.docstrings import field_docs
-from illumcli.jobs.schema import schema_of
+from illumcli.commands.schema import schema_of
 from illumcli.layers import FIXED, PER_LIGHT
 from illumcli.scene.load import PATHS
 from illumcli.scene.references import reference_faults
 from illumcli.scene.spec import LAYERS, Scene
+from illumcli.schema.docs import field_docs
 
 SCHEMA = schema_of(Scene)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.commands.repairs import repairs
 from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
-from illumcli.jobs.repairs import repairs
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load, unused_lines
 
 BASE = """version: 1
@@ -75,7 +75,7 @@ CASES = {
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """Loads the scene with overrides."""
-    from illumcli.files.writer import ImageWriter
+    from illumcli.images.writer import ImageWriter
 
     folder = tmp_path_factory.mktemp("unused")
     (folder / "s.yaml").write_text(BASE)

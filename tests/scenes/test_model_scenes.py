@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
 

@@ -8,7 +8,7 @@ import weakref
 import numpy as np
 import pytest
 
-from illumcli.demand import order
+from illumcli.graph import order
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.lambert import Lambert
 from illumcli.models.ward import Ward

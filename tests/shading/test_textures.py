@@ -8,17 +8,17 @@ import struct
 import numpy as np
 import pytest
 
+from illumcli.color import from_srgb
+from illumcli.commands.check import run as check
+from illumcli.commands.render import run
 from illumcli.errors import InputError
-from illumcli.files.writer import ImageWriter
 from illumcli.geometry.repairs import Repair
-from illumcli.jobs.check import run as check
-from illumcli.jobs.render import run
+from illumcli.images.writer import ImageWriter
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar
-from illumcli.pixels import from_srgb
-from illumcli.plan import artifacts
-from illumcli.plan.execute import Tally, bands, run_once
-from illumcli.plan.plan import plan
+from illumcli.render_graph import cached as artifacts
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
 
@@ -321,7 +321,7 @@ def test_images_are_read_only_for_what_is_made(scene, print_, only, material, re
 
 
 def test_an_image_that_several_parameters_name_is_read_once(scene, picture, print_, monkeypatch):
-    from illumcli.files import images
+    from illumcli.images import oiio as images
 
     opened, real = [], images.read_texture
     monkeypatch.setattr(images, "read_texture", lambda *words: opened.append(words) or real(*words))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import lifted
-from illumcli.rays.tracer import Tracer
-from illumcli.variants import members
+from illumcli.schema.families import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Hemispheres, Method, obscurance, turned_frame

@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from illumcli.files.images import read_image
-from illumcli.geometry.assemble import place, world_normals
+from illumcli.commands.render import run
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import corner_normals
+from illumcli.geometry.scene_geometry import place, world_normals
 from illumcli.geometry.smooth_parts import SmoothParts
-from illumcli.jobs.render import run
-from illumcli.jobs.stress.rays import icosphere
+from illumcli.images.oiio import read_image
+from illumcli.stress.rays import icosphere
 
 SUN = np.array([-0.4, 1.0, 0.2]) / np.linalg.norm([-0.4, 1.0, 0.2])
 """Unit vector to the light."""

@@ -19,7 +19,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.jobs.ao_bake import Report
+    from illumcli.baking.bake import Report
 
 _EPILOG = """\b
 Examples:
@@ -151,10 +151,10 @@ def ao_bake(
     vertex with several normals has their mean, and one value for each where the file can hold it. An
     interrupted bake goes on where it stopped when the same command is given again.
     """
+    from illumcli.baking.bake import Settings
     from illumcli.cli._progress import reporter
-    from illumcli.jobs import ao_bake_all as job
-    from illumcli.jobs.ao_bake import Settings
-    from illumcli.jobs.repairs import told
+    from illumcli.commands import bake as job
+    from illumcli.commands.repairs import told
 
     if samples is not None and target_error is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")

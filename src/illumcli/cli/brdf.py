@@ -72,7 +72,7 @@ def brdf(
     and lobes share one scale; they show response / n.l, for the intensity models the BRDF that would give
     the same picture. Pictures need matplotlib: pip install 'illumcli[plot]'.
     """
-    from illumcli.jobs.brdf import VIEWS, run
+    from illumcli.brdf import VIEWS, run
 
     if output is None and table is None:
         output = Path("brdf.png")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from illumcli.jobs.cache import Pruned
+    from illumcli.commands.cache import Pruned
 
 
 @click.group()
@@ -23,7 +23,7 @@ def cache() -> None:
 @cache.command("list")
 def list_() -> None:
     """Print every entry: bytes, when it was last used, key, buffer."""
-    from illumcli.jobs.cache import listing, table
+    from illumcli.commands.cache import listing, table
 
     click.echo(table(listing()))
 
@@ -31,8 +31,8 @@ def list_() -> None:
 @cache.command()
 def verify() -> None:
     """Read every entry and remove those that are damaged."""
-    from illumcli.jobs.cache import refuse_stayed
-    from illumcli.jobs.cache import verify as run
+    from illumcli.commands.cache import refuse_stayed
+    from illumcli.commands.cache import verify as run
 
     done = run()
     for path, fact in done.faults.items():
@@ -45,7 +45,7 @@ def verify() -> None:
 @click.option("--size", metavar="SIZE", help="Bytes that may stay, as 500M or 4G; by default the limit.")
 def prune(size: str | None) -> None:
     """Remove the least recently used entries until the rest fits."""
-    from illumcli.jobs.cache import prune as run
+    from illumcli.commands.cache import prune as run
 
     _tell(run(size))
 
@@ -53,13 +53,13 @@ def prune(size: str | None) -> None:
 @cache.command()
 def clear() -> None:
     """Remove every entry."""
-    from illumcli.jobs.cache import clear as run
+    from illumcli.commands.cache import clear as run
 
     _tell(run())
 
 
 def _tell(pruned: Pruned) -> None:
-    from illumcli.jobs.cache import refuse_stayed
+    from illumcli.commands.cache import refuse_stayed
 
     click.echo(f"{len(pruned.gone)} removed, {sum(entry.bytes for entry in pruned.gone):,} bytes")
     refuse_stayed(pruned.stayed)

@@ -15,8 +15,8 @@ from illumcli.cli._options import overrides_option, scenes_argument, studio_opti
 @studio_options
 def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
     """Validate each SCENE and say every problem at once; nothing is rendered and no mesh is read."""
+    from illumcli.commands.check import run
     from illumcli.errors import InputError
-    from illumcli.jobs.check import run
 
     valid, unused, problems = run(scenes, overrides)
     for line in unused:

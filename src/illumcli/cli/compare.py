@@ -59,7 +59,7 @@ def compare(
     """
     import json
 
-    from illumcli.jobs.compare import as_data, as_table, check, run
+    from illumcli.commands.compare import as_data, as_table, check, run
 
     limits = {name: bound for name, bound in bounds.items() if bound is not None}
     if no_flip and "max_flip" in limits:

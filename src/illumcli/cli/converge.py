@@ -16,8 +16,8 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.jobs.converge import Vary
-    from illumcli.jobs.sampled import Sampler
+    from illumcli.accuracy.convergence import Vary
+    from illumcli.accuracy.sampled import Sampler
 
 _FILE = click.Path(path_type=Path)
 _EPILOG = """\b
@@ -89,9 +89,9 @@ def converge(
     import json
     import sys
 
+    from illumcli.accuracy import convergence_report as converge_report
+    from illumcli.accuracy.convergence import SAMPLERS, run
     from illumcli.cli._progress import reporter
-    from illumcli.jobs import converge_report
-    from illumcli.jobs.converge import SAMPLERS, run
 
     files = converge_report.Outputs(csv_file, output, force)
     found = run(

@@ -15,6 +15,6 @@ def models(name: str | None) -> None:
       illum models
       illum models cook_torrance
     """
-    from illumcli.jobs.models import page, table
+    from illumcli.commands.models import page, table
 
     click.echo(page(name) if name else table())

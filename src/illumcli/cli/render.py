@@ -20,7 +20,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.jobs.render_all import Rendered
+    from illumcli.commands.render_all import Rendered
 
 
 @click.command()
@@ -80,8 +80,8 @@ def render(
       illum render bunny.obj
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs import render_all as job
-    from illumcli.jobs.repairs import told
+    from illumcli.commands import render_all as job
+    from illumcli.commands.repairs import told
 
     def written(done: Rendered) -> None:
         found = done.report

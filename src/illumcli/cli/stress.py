@@ -21,8 +21,8 @@ def stress(quick: bool, as_json: bool, quiet: bool) -> None:
     """
     import json
 
+    from illumcli import stress as job
     from illumcli.cli._progress import reporter
-    from illumcli.jobs import stress as job
 
     result = job.run(quick, reporter(quiet))
     click.echo(json.dumps(job.as_data(result), indent=2) if as_json else job.as_table(result))

@@ -19,7 +19,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.jobs.sweep import Outcome
+    from illumcli.commands.sweep import Outcome
 
 _FILE = click.Path(path_type=Path)
 
@@ -93,8 +93,8 @@ def sweep(
       illum sweep scene.yaml --frames 0:119 -D 'camera.position=[4*cos(frame*pi/60), 1, 4*sin(frame*pi/60)]'
     """
     from illumcli.cli._progress import reporter
-    from illumcli.jobs import sweep as job
-    from illumcli.jobs.repairs import told
+    from illumcli.commands import sweep as job
+    from illumcli.commands.repairs import told
 
     said: set[str] = set()
 

@@ -43,7 +43,7 @@ def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bo
     """
     import json
 
-    from illumcli.jobs import verify as job
+    from illumcli import verification as job
 
     file = file or job.PACKAGED
     if precision == "single":

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import InputError
-from illumcli.variants import suggestion
+from illumcli.schema.families import suggestion
 
 LONGEST = 4096
 """Letters of a path; no system takes more."""

@@ -93,7 +93,7 @@ def stored_contents(path: Path) -> list[str]:
             case ".svg":
                 return _SVG.findall(path.read_text(encoding="utf-8"))
             case ".png" | ".exr":
-                from illumcli.files.images import read_metadata
+                from illumcli.images.oiio import read_metadata
 
                 return [str(read_metadata(path)["illum:content"])]
             case _:

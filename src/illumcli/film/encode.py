@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.pixels import from_srgb, refuse_nonfinite, to_srgb
+from illumcli.color import from_srgb, refuse_nonfinite, to_srgb
 
 NAMES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, columns, cross, dot, length, rows, unit
-from illumcli.geometry.assemble import CornerVectors, World, moved
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
+from illumcli.geometry.scene_geometry import CornerVectors, World, moved
 from illumcli.records import Record
 
 FLATNESS = 2.0**-10

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
-from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.components import components
+from illumcli.geometry.scene_geometry import CornerVectors, World
 
 NORMAL_STEPS = 512
 """Normals that round to the same multiples of 1 / NORMAL_STEPS are one: exporters write the normal of a

@@ -5,6 +5,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.lights._base import Light
-from illumcli.variants import Tagged
+from illumcli.schema.families import Tagged
 
 AnyLight: TypeAlias = Annotated[Light, Tagged("illumcli.lights", "light")]

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from illumcli.arrays import Lanes
-from illumcli.description import Description
-from illumcli.values import By, NonNegative, Positive
+from illumcli.schema.description import Description
+from illumcli.schema.fields import By, NonNegative, Positive
 
 
 class NoLaw(Description):

@@ -7,10 +7,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, columns, length
-from illumcli.description import Description
-from illumcli.frame import Frame
 from illumcli.records import Record
-from illumcli.values import Name
+from illumcli.render_space import Frame
+from illumcli.schema.description import Description
+from illumcli.schema.fields import Name
 
 NEAREST = 1e-6
 """Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""

@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Vectors
-from illumcli.frame import Frame
 from illumcli.lights._base import Arriving, Light
-from illumcli.values import Color, Direction
+from illumcli.render_space import Frame
+from illumcli.schema.fields import Color, Direction
 
 
 class Directional(Light):

@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Vectors
-from illumcli.description import written
-from illumcli.frame import Frame
 from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Arriving, Light, towards
-from illumcli.values import Color, Vector
+from illumcli.render_space import Frame
+from illumcli.schema.description import written
+from illumcli.schema.fields import Color, Vector
 
 
 class Point(Light):

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, dot, unit
-from illumcli.description import written
-from illumcli.frame import Frame
 from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Arriving, Light, towards
-from illumcli.values import Color, Share, Vector, Within
+from illumcli.render_space import Frame
+from illumcli.schema.description import written
+from illumcli.schema.fields import Color, Share, Vector, Within
 
 
 class Spot(Light):

@@ -5,6 +5,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.models._base import IlluminationModel
-from illumcli.variants import Tagged
+from illumcli.schema.families import Tagged
 
 AnyModel: TypeAlias = Annotated[IlluminationModel, Tagged("illumcli.models", "model")]

@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from illumcli.description import Description
 from illumcli.models._parameters import Color, Texture, VertexValues
+from illumcli.schema.description import Description
 
 Lobe = Callable[..., Any]
 D = TypeVar("D", bound=Description)

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Lanes, Vectors, like
-from illumcli.description import Description
 from illumcli.models._lobes import channels
 from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
-from illumcli.values import By
+from illumcli.schema.description import Description
+from illumcli.schema.fields import By
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Lanes, Vectors
-from illumcli.description import Description
+from illumcli.schema.description import Description
 
 
 def lobe(gap: Lanes, exponent: Any) -> Lanes:

@@ -23,10 +23,10 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 
 from illumcli.arrays import Lanes, like
-from illumcli.description import Description
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
-from illumcli.values import By
+from illumcli.schema.description import Description
+from illumcli.schema.fields import By
 
 
 def gaussian(n_h: Any, sin2_h: Any, m: Any) -> Any:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from illumcli import values
-from illumcli.description import Description
-from illumcli.values import By, Tag, Three, Within, spread
+from illumcli.schema import fields as values
+from illumcli.schema.description import Description
+from illumcli.schema.fields import By, Tag, Three, Within, spread
 
 
 class Texture(Description):

@@ -25,12 +25,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, like
-from illumcli.description import Description, written
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
 from illumcli.models._microfacet import Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Albedo, Share
+from illumcli.schema.description import Description, written
 
 WHITE = (1.0, 1.0, 1.0)
 

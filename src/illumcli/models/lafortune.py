@@ -23,7 +23,7 @@ from illumcli.arrays import Lanes, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
-from illumcli.values import Within
+from illumcli.schema.fields import Within
 
 Weight = Varying[Annotated[float, Within(ge=-1, le=1)]]
 

@@ -20,7 +20,7 @@ from illumcli.arrays import Lanes, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Varying
-from illumcli.values import Within
+from illumcli.schema.fields import Within
 
 
 class Minnaert(IlluminationModel):

@@ -27,7 +27,7 @@ from illumcli.arrays import Lanes, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
 from illumcli.models._parameters import Albedo, NonNegative, Varying
-from illumcli.values import Within
+from illumcli.schema.fields import Within
 
 Slope = Varying[Annotated[float, Within(ge=1e-3, le=1.57)]]
 

@@ -32,7 +32,7 @@ from illumcli.arrays import Lanes, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import channels, lobe, tint, weighed
 from illumcli.models._parameters import Albedo, Share
-from illumcli.values import Within
+from illumcli.schema.fields import Within
 
 Offset = Annotated[float, Within(ge=1.001, le=10)]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Lanes, Vectors, columns
-from illumcli.frame import Frame
+from illumcli.render_space import Frame
 
 PARALLEL = 1e-9
 """Sine of the angle below which `up` is taken to point along the line of sight."""

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, rows
-from illumcli.geometry.assemble import CornerVectors, PolygonCentres, World
 from illumcli.geometry.planar import PlanarPolygons
+from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, World
 from illumcli.records import Record
 
 BLOCK = 1 << 15

@@ -13,19 +13,19 @@ from typing import Any, TypeVar
 
 from pydantic_core import ValidationError
 
-from illumcli.description import Description
 from illumcli.errors import InputError
 from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.blame import Applied, PlacedFault, blamed
-from illumcli.scene.faults import faults, shown
 from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
 from illumcli.scene.spec import Scene
 from illumcli.scene.studio import SETTINGS, STUDIO, Settings, arranged
 from illumcli.scene.unused import lacking, unused
-from illumcli.variants import suggestion
+from illumcli.schema.description import Description
+from illumcli.schema.families import suggestion
+from illumcli.schema.faults import faults, shown
 
 MAX_EXTENDS = 8  # files, one extending the next
 MAX_FILES = 64

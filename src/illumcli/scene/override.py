@@ -7,9 +7,9 @@ from typing import Any
 
 from illumcli.records import Value
 from illumcli.scene import source
-from illumcli.scene.faults import shown
 from illumcli.scene.source import MAX_DEPTH, Node, Place, Problem
-from illumcli.variants import suggestion
+from illumcli.schema.families import suggestion
+from illumcli.schema.faults import shown
 
 NAMED = {
     "materials": "material",

@@ -7,11 +7,11 @@ from typing import Any
 
 from pydantic_core import ValidationError
 
-from illumcli.description import Description
 from illumcli.layers import owner_of
-from illumcli.scene.faults import Fault, faults
 from illumcli.scene.source import Path
-from illumcli.variants import member, suggestion
+from illumcli.schema.description import Description
+from illumcli.schema.families import member, suggestion
+from illumcli.schema.faults import Fault, faults
 
 
 def reference_faults(scene: Any) -> Iterator[Fault]:

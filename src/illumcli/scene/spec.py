@@ -10,12 +10,12 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from illumcli.description import Description, checks, written
 from illumcli.geometry.shapes import AnyShape
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
 from illumcli.scene.references import reference_faults
-from illumcli.values import (
+from illumcli.schema.description import Description, checks, written
+from illumcli.schema.fields import (
     Before,
     By,
     Color,

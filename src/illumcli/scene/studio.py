@@ -11,10 +11,10 @@ from math import atan2, cos, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
-from illumcli.description import Description, written
 from illumcli.scene.override import Override, assign
 from illumcli.scene.source import Node, Place, Problem
-from illumcli.values import Within
+from illumcli.schema.description import Description, written
+from illumcli.schema.fields import Within
 
 STUDIO = Path(__file__).with_name("studio.yaml")
 SETTINGS = "studio"

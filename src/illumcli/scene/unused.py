@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Any
 
-from illumcli.description import Description
 from illumcli.models._parameters import Texture
-from illumcli.scene.faults import Fault
 from illumcli.scene.source import Path
 from illumcli.scene.spec import MeshFile, Object, Scene
-from illumcli.values import Three, marks
+from illumcli.schema.description import Description
+from illumcli.schema.faults import Fault
+from illumcli.schema.fields import Three, marks
 
 
 def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:

@@ -12,7 +12,7 @@ from illumcli.arrays import F, Ids, Vectors, rows, some
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.shading.textures import Parameters
-from illumcli.visibility.arriving import Lit
+from illumcli.visibility.incident import Lit
 
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:

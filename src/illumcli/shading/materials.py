@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, rows
-from illumcli.geometry.assemble import World
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.repairs import Repairs, joined, located, path_of
+from illumcli.geometry.scene_geometry import World
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import VertexValues
 from illumcli.records import Record, Value
@@ -202,7 +202,7 @@ def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> Illuminatio
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:
     """A model from the keys that a mesh file's own library gives; `folder` is that of the mesh."""
-    from illumcli.variants import member
+    from illumcli.schema.families import member
 
     keys = textures_at(description, lambda path: str(folder / path))
     return member("illumcli.models", str(keys["model"])).validated(keys)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, rows
-from illumcli.geometry.assemble import CornerVectors, PolygonCentres, World
+from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, World
 from illumcli.rays.corner_weights import (
     Corners,
     CornerWeights,
@@ -23,7 +23,7 @@ from illumcli.rays.corner_weights import (
     TriangleCorners,
     concatenated,
 )
-from illumcli.rays.surface import Facets, facing, interpolated, quadratic
+from illumcli.rays.interaction import Facets, facing, interpolated, quadratic
 from illumcli.records import Record
 
 RATES = ("constant", "gouraud", "phong", "quadratic")

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from illumcli.arrays import Lanes, Vectors, cross, dot, length, mirror, unit
-from illumcli.demand import Recipe, order, required
+from illumcli.graph import Recipe, order, required
 
 GIVEN = ("n", "l", "v", "t", "light")
 

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, columns, rows
 from illumcli.errors import InputError
-from illumcli.geometry.assemble import CornerVectors, World
 from illumcli.geometry.repairs import Repair, Repairs, note
+from illumcli.geometry.scene_geometry import CornerVectors, World
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
-from illumcli.rays import surface
+from illumcli.rays import interaction as surface
 from illumcli.rays.corner_weights import CornerWeights
 from illumcli.records import Record, Value
+from illumcli.schema.fields import LARGEST, Three, Within, marks
 from illumcli.shading.materials import Materials, colors_at
-from illumcli.values import LARGEST, Three, Within, marks
 
 Floats: TypeAlias = NDArray[np.float32]
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Lanes, Vectors, columns, dot, repeated, rows
+from illumcli.rays.embree import Tracer
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
-from illumcli.rays.tracer import Tracer
 from illumcli.records import Record, Value
 from illumcli.visibility.falloffs._base import Falloff
 

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows, unit
-from illumcli.geometry.assemble import CornerVectors, World
+from illumcli.geometry.scene_geometry import CornerVectors, World
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.rays.corner_weights import Corners, CornerWeights
+from illumcli.rays.embree import Tracer
+from illumcli.rays.interaction import Facets, facing
 from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
-from illumcli.rays.surface import Facets, facing
-from illumcli.rays.tracer import Tracer
 from illumcli.records import Record
-from illumcli.visibility.arriving import Lit
+from illumcli.visibility.incident import Lit
 
 TERMINATOR_SHARE = 1 / 3
 """Of the diagonal of a polygon's bounding box: how far off it a shadow ray may start at most; normals may say

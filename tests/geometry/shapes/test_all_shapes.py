@@ -10,8 +10,8 @@ from illumcli.geometry.normals import area_vectors, polygon_normals
 from illumcli.geometry.shapes import AnyShape
 from illumcli.geometry.shapes._base import MAX_TRIANGLES
 from illumcli.geometry.triangulate import triangulate
-from illumcli.values import schema_of
-from illumcli.variants import members, tags
+from illumcli.schema.families import members, tags
+from illumcli.schema.fields import schema_of
 
 SHAPE = SchemaValidator(schema_of(AnyShape))
 PACKAGE = "illumcli.geometry.shapes"

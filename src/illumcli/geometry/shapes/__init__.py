@@ -8,6 +8,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.geometry.shapes._base import Shape
-from illumcli.variants import Tagged
+from illumcli.schema.families import Tagged
 
 AnyShape: TypeAlias = Annotated[Shape, Tagged("illumcli.geometry.shapes", "shape")]

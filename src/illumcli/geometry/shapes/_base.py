@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, TypeAlias
 
-from illumcli.description import Description
 from illumcli.geometry.mesh import Mesh
-from illumcli.values import Whole
+from illumcli.schema.description import Description
+from illumcli.schema.fields import Whole
 
 MAX_TRIANGLES = 20_000_000
 """No shape makes more; the ranges below keep to it."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
-from illumcli.values import Positive, Whole
+from illumcli.schema.fields import Positive, Whole
 
 FACES = (  # direction to the right and upwards, seen from outside
     ((0, 0, -1), (0, 1, 0)),  # +x

@@ -9,7 +9,7 @@ import numpy as np
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Rings, Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
-from illumcli.values import Positive
+from illumcli.schema.fields import Positive
 
 
 class Cylinder(Shape):

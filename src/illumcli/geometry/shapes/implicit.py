@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, dot, length, unit
-from illumcli.description import checks
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.formula import MAX_LENGTH, Formula, checked, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import MAX_TRIANGLES, TRIANGLE_BYTES, Shape
 from illumcli.memory import refuse_beyond
-from illumcli.values import After, Text, Vector, Whole
+from illumcli.schema.description import checks
+from illumcli.schema.fields import After, Text, Vector, Whole
 
 XYZ = ("x", "y", "z")
 LANES = 2**20  # grid nodes evaluated at once

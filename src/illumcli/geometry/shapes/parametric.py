@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, length, unit
-from illumcli.description import checks
 from illumcli.errors import InputError
 from illumcli.geometry.formula import MAX_LENGTH, checked, parametric_normal, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, turned, vertex_numbers, woven
-from illumcli.values import After, Number, Text
+from illumcli.schema.description import checks
+from illumcli.schema.fields import After, Number, Text
 
 UV = ("u", "v")
 WELD = 1e-9  # of the surface's extent: nodes on a seam or at a pole that are as near are one vertex

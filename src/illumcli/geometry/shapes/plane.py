@@ -9,7 +9,7 @@ import numpy as np
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, vertex_numbers, woven
-from illumcli.values import Positive
+from illumcli.schema.fields import Positive
 
 
 class Plane(Shape):

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from illumcli.description import checks
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
-from illumcli.values import Many, Vector, Whole
+from illumcli.schema.description import checks
+from illumcli.schema.fields import Many, Vector, Whole
 
 Face = Annotated[tuple[Annotated[int, Whole(ge=0)], ...], Many(least=3)]
 

@@ -13,7 +13,7 @@ import numpy as np
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
-from illumcli.values import Positive, Whole
+from illumcli.schema.fields import Positive, Whole
 
 
 class Sphere(Shape):

@@ -20,7 +20,7 @@ from illumcli.arrays import cross, unit
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, vertex_numbers, woven
-from illumcli.values import Positive, Whole
+from illumcli.schema.fields import Positive, Whole
 
 # control points (radius, height), the outside to the right
 POT = (

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from illumcli.description import checks
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
-from illumcli.values import Positive, Whole
+from illumcli.schema.description import checks
+from illumcli.schema.fields import Positive, Whole
 
 
 class Torus(Shape):

@@ -6,8 +6,8 @@ import re
 from typing import Annotated, Any, ClassVar, TypeAlias
 
 from illumcli.arrays import Lanes
-from illumcli.description import Description
-from illumcli.values import LARGEST, After, By, Positive, Tag
+from illumcli.schema.description import Description
+from illumcli.schema.fields import LARGEST, After, By, Positive, Tag
 
 
 def _radii(text: str) -> str:

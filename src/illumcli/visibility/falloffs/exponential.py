@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from illumcli.arrays import Lanes
-from illumcli.values import Positive
+from illumcli.schema.fields import Positive
 from illumcli.visibility.falloffs._base import Falloff
 
 

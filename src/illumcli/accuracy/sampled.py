@@ -1,0 +1,146 @@
+"""A scene's layer at any sampling, as an array, whole or at some pixels: what measuring its error takes."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import field, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.graph import order
+from illumcli.layers import Layer
+from illumcli.rays.sampling import stream
+from illumcli.records import Record, Value
+from illumcli.render_graph.build import View, recipes
+from illumcli.render_graph.execute import Tally, at_pixels, bands
+from illumcli.render_graph.framing import placed
+from illumcli.render_graph.schedule import Plan, plan
+from illumcli.scene.load import Loaded
+from illumcli.scene.spec import Scene
+
+Sampler: TypeAlias = Literal["spiral", "owen", "random"]
+
+
+class Sampling(Value):
+    """How finely a picture is sampled, and by which random numbers."""
+
+    pixel: int  # samples per pixel; 1 looks through the pixel's centre
+    obscurance: int  # rays per sample
+    sampler: Sampler
+    seed: int
+
+    @property
+    def rays(self) -> int:
+        """Obscurance rays per pixel."""
+        return self.pixel * self.obscurance
+
+
+class Subject(Record):
+    """A view of a scene and one of its layers, with the buffers that no sampling changes."""
+
+    loaded: Loaded
+    view: View
+    layer: Layer
+    threads: int
+    shared: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def scene(self) -> Scene:
+        return self.loaded.scene
+
+    def seen_by(self, view: View) -> Subject:
+        """The same from another view, all of whose pixels get all samples."""
+        if view.camera.fit is not None:
+            name = f"camera:{view.name}"
+            for step in order(recipes(self.scene, self.loaded), [name]):
+                if step.makes not in self.shared:
+                    self.shared[step.makes] = step.make(self.shared)
+            view = placed(view, self.shared[name])
+        return replace(self, view=replace(view, adaptive=None))
+
+    def planned(self, sampling: Sampling) -> tuple[Plan, View]:
+        """The plan and the view at a sampling, all that no tile changes being made."""
+        update: dict[str, Any] = {"seed": sampling.seed}
+        if self.scene.obscurance is not None:
+            finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
+            update["obscurance"] = self.scene.obscurance.replaced(**finer)
+        steps = plan(self.scene.replaced(**update), self.loaded, [self.layer.name])
+        for step in steps.once:
+            if step.makes not in self.shared:
+                self.shared[step.makes] = step.make(self.shared)
+        return steps, replace(self.view, samples=sampling.pixel)
+
+    def picture(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
+        """(H, W, channels) the layer at a sampling, the rays it took, and the seconds."""
+        steps, view = self.planned(sampling)
+        tally, start = Tally(), time.perf_counter()
+        rows = [band.layers for band in bands(steps, self.shared, view, self.threads, tally)]
+        seconds = time.perf_counter() - start
+        return np.concatenate([row[self.layer.name] for row in rows]), sum(tally.rays.values()), seconds
+
+    def pixels(
+        self, sampling: Sampling, x: NDArray[np.int64], y: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], int]:
+        """(K, channels) the layer at K pixels, and the rays it took."""
+        steps, view = self.planned(sampling)
+        tally = Tally()
+        made = at_pixels(steps, self.shared, view, x, y, self.threads, tally)
+        return made[self.layer.name].astype(np.float64), sum(tally.rays.values())
+
+    def scattered(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Columns and rows of `count` pixels drawn at random; of all of them where they are fewer."""
+        pixels = self.view.width * self.view.height
+        random = np.random.default_rng(stream(self.scene.seed, purpose))
+        y, x = np.divmod(np.sort(random.choice(pixels, min(count, pixels), replace=False)), self.view.width)
+        return x, y
+
+
+def subject(
+    loaded: Loaded, name: str, threads: int | None = None, camera: str | None = None, width: int | None = None
+) -> Subject:
+    """A scene's layer, ready to be sampled.
+
+    Parameters
+    ----------
+    name : str
+        Of a layer that is the mean of its pixels' samples; data layers such as depth have no error.
+    camera : str, optional
+        By default the first.
+    width : int, optional
+        The film is scaled down to at most this many pixels across.
+
+    Raises
+    ------
+    InputError
+        No such layer, or one without error; no such camera.
+    """
+    steps = plan(loaded.scene, loaded, [name])
+    view = chosen_view(steps.views, camera)
+    if len(steps.layers) != 1 or steps.layers[0].data:
+        raise InputError(
+            f"layer '{name}' is no mean of a pixel's samples; take beauty, ambient, obscurance or one light"
+        )
+    if width is not None and view.width > width:
+        view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
+    own = Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+    return own.seen_by(view)
+
+
+def chosen_view(views: Sequence[View], camera: str | None) -> View:
+    """The view of this name, or the first.
+
+    Raises
+    ------
+    InputError
+    """
+    if camera is None:
+        return views[0]
+    named = {view.name: view for view in views}
+    if camera not in named:
+        raise InputError(f"no camera '{camera}'; there are: {', '.join(named)}")
+    return named[camera]

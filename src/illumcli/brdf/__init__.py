@@ -1,0 +1,184 @@
+"""Draw BRDFs: polar slices, a lit sphere, a lit plane, the lobe in space."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import ValidationError
+
+from illumcli.brdf import views
+from illumcli.errors import InputError, OutputError
+from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
+from illumcli.models._base import IlluminationModel
+from illumcli.scene.override import Override, parse
+from illumcli.scene.source import Problem
+from illumcli.schema.description import Description
+from illumcli.schema.families import member, suggestion
+from illumcli.schema.faults import faults
+
+VIEWS = ("polar", "sphere", "plane", "lobe")
+PACKAGE = "illumcli.models"
+
+
+def run(
+    names: Sequence[str],
+    overrides: Sequence[str] = (),
+    output: Path | None = None,
+    table: Path | None = None,
+    chosen: Sequence[str] = VIEWS,
+    angles: Sequence[float] = (15.0, 40.0, 65.0),
+    log: bool = False,
+    times_cos: bool = False,
+    force: bool = False,
+) -> tuple[list[Path], list[Path]]:
+    """Draw the models `names` side by side; the paths written, and those of them that are kept.
+
+    Parameters
+    ----------
+    overrides : sequence of str
+        `PARAMETER=VALUE` for every model, or `MODEL.PARAMETER=VALUE`; MODEL is a name or a number from 1.
+    output : Path, optional
+        A picture, .png or .svg.
+    table : Path, optional
+        The polar slices as CSV.
+    angles : sequence of float
+        Angles of incidence [degrees].
+
+    Raises
+    ------
+    InputError
+        Models or parameters that do not exist, values out of range; all at once.
+    OutputError
+        A different file is there and `force` is not given.
+    """
+    if output is not None:
+        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg")
+    if table is not None:
+        refuse_suffix(table, "a table", ".csv")
+    for path in (table, output):
+        if path is not None:
+            refuse_unwritable(path)
+    models = described(names, overrides)
+    files: dict[Path, bytes] = {}
+    if table is not None:
+        files[table] = slices_table(models, angles, times_cos).encode()
+    if output is not None:
+        from illumcli.brdf.figure import drawn
+
+        kind = output.suffix.lower().removeprefix(".")
+        files[output] = drawn(models, chosen, angles, log, times_cos, kind)
+    return list(files), _write(files, force)
+
+
+def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
+    """The models by name, with their parameters; those named twice are numbered by their place."""
+    problems: list[str] = []
+    read: list[Problem] = []
+    changes = [(text, change) for text in overrides if (change := parse(text, read))]
+    problems += map(str, read)
+    models: dict[str, IlluminationModel] = {}
+    applied: set[str] = set()
+    parameters: list[str] = []
+    for place, name in enumerate(names, start=1):
+        title = name if names.count(name) == 1 else f"{name} {place}"
+        try:
+            Model = member(PACKAGE, name)
+        except LookupError as error:
+            problems.append(f"no model '{name}'; {error}")
+            applied |= {text for text, change in changes if change.steps[0] in (name, str(place))}
+            continue
+        parameters += [name for name in Model.fields() if name != "model"]
+        mine = [(text, own) for text, change in changes if (own := _for(change, name, place, Model, names))]
+        applied |= {text for text, _ in mine}
+        made, found = _described(Model, mine)
+        problems += [f"{title}: {fact}" if not fact.startswith("-D ") else fact for fact in found]
+        if made is not None:
+            models[title] = made
+    known = tuple(dict.fromkeys([*names, *parameters]))
+    for text, change in changes:
+        if text not in applied:
+            way = suggestion(change.steps[0], known)
+            problems.append(f"-D {text}: no model or parameter '{change.steps[0]}'; {way}")
+    if problems:
+        raise InputError(dict.fromkeys(problems))
+    return models
+
+
+def _for(
+    change: Override, name: str, place: int, Model: type[Description], names: Sequence[str]
+) -> tuple[tuple[str, ...], Any] | None:
+    """Steps within the model and the value, where the override is meant for it."""
+    first, *rest = change.steps
+    if first in (name, str(place)) and rest:
+        return tuple(rest), change.value.plain()
+    if first in Model.fields() and first != "model" and first not in names:
+        return change.steps, change.value.plain()
+    return None
+
+
+def _described(
+    Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
+) -> tuple[IlluminationModel | None, list[str]]:
+    """The model with its changes, or None and what is wrong, after the override that it comes from."""
+    keys: dict[str, Any] = {"model": Model.model}
+    said: dict[tuple[str, ...], str] = {}
+    for text, (steps, value) in changes:
+        here = keys
+        for step in steps[:-1]:
+            here = here.setdefault(step, {})
+            if not isinstance(here, dict):
+                return None, [
+                    f"-D {text}: nothing is inside {step}, which has a value of its own; give it whole"
+                ]
+        here[steps[-1]] = value
+        said[steps] = text
+    classes: dict[int, type[Description]] = {}
+    try:
+        return Model.validated(keys, classes), []
+    except ValidationError as error:
+        found = []
+        for path, fact in faults(error, keys, classes):
+            where = ".".join(map(str, path))
+            given = [text for steps, text in said.items() if path[: len(steps)] == steps]
+            found.append(f"-D {given[-1]}: {fact}" if given else f"{where}: {fact}" if where else fact)
+        return None, found
+
+
+def slices_table(models: Mapping[str, IlluminationModel], angles: Sequence[float], times_cos: bool) -> str:
+    """The polar slices as CSV: model, both angles [degrees], values; the light is at negative angles."""
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    kind = "response" if times_cos else "f"
+    rows.writerow(["model", "incidence", "view", *(f"{kind}.{channel}" for channel in "RGB")])
+    for title, model in models.items():
+        for angle in angles:
+            view, found = views.polar_slice(model, angle, times_cos)
+            for at, color in zip(view.tolist(), found.tolist(), strict=True):
+                rows.writerow([title, f"{angle:g}", f"{at:.10g}", *(repr(each) for each in color)])
+    return out.getvalue()
+
+
+def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
+    """Write the files but those that hold the same bytes already; these."""
+    from illumcli.files.atomic import refusals, write_bytes
+
+    kept = []
+    for path, data in files.items():
+        with refusals(str(path)):
+            if not force and path.is_file():
+                if path.read_bytes() != data:
+                    fact = "a different file is there; use --force to replace it, or another name"
+                    raise OutputError(f"{path}: {fact}")
+                kept.append(path)
+            elif not force:
+                refuse_empty_link(path)
+    for path, data in files.items():
+        if path in kept:
+            refresh(path)
+        else:
+            write_bytes(path, data)
+    return kept

@@ -1,0 +1,95 @@
+"""Several pieces of work: one that fails is told, the others are done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from illumcli.commands.render import report_text
+from illumcli.errors import IllumError, known
+from illumcli.files.atomic import write_text
+from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
+
+Tell = Callable[[str], None]
+
+
+class Batch:
+    """What became of `count` pieces of work, which are `what`; `tell` is given the text of each failure.
+
+    With `keep_going` the pieces after one that failed are due as those before it are, else those before it
+    alone. What a lone piece raises goes on its way.
+    """
+
+    def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
+        self.failures: dict[int, IllumError] = {}
+        self._what, self._count = what, count
+        self._keep_going, self._tell = keep_going, tell
+
+    def due(self) -> Iterator[int]:
+        """The numbers of the pieces that are still to be done."""
+        for number in range(self._count):
+            if self.failures and not self._keep_going and number > min(self.failures):
+                return
+            if number not in self.failures:
+                yield number
+
+    @contextmanager
+    def piece(self, number: int, label: str = "") -> Iterator[None]:
+        """What goes wrong within is a failure of this piece, told after its label."""
+        try:
+            yield
+        except Exception as error:
+            failure = known(error)
+            if failure is None or self._count == 1:
+                raise
+            self.failures[number] = failure
+            self._tell(f"{label}: {failure}" if label else str(failure))
+
+    def finish(self, *also: str) -> None:
+        """Raise how many pieces failed and what is `also` to be told, with the exit code of the first."""
+        if self.failures:
+            failed = f"{len(self.failures)} of {self._count} {self._what} failed"
+            whole = IllumError("\n".join([failed, *also]))
+            whole.exit_code = self.failures[min(self.failures)].exit_code
+            raise whole
+
+
+class BatchReport:
+    """The report of a batch: an entry for each piece, which holds the content that the piece was to have.
+
+    `path` is None where no report is asked for.
+    """
+
+    def __init__(self, path: Path | None, entries: list[dict[str, Any]]) -> None:
+        self._path, self._entries = path, entries
+        self._contents = [INCOMPLETE] * len(entries)
+        self._is_kept = False
+
+    def plan(self, number: int, content: str) -> None:
+        """Say what content a piece will have."""
+        self._contents[number] = content
+
+    def look(self, force: bool) -> None:
+        """See whether a report of the same content is there; refuse a different file without `force`."""
+        if self._path is not None:
+            refuse_suffix(self._path, "a report", ".json")
+            self._is_kept = is_kept(self._path, self._contents, force)
+
+    def add(self, number: int, entry: dict[str, Any]) -> None:
+        """Take the entry of a piece that is done."""
+        self._entries[number] = entry
+
+    def finish(self, batch: Batch) -> bool:
+        """Write the report, or date the one that is kept, and end the batch; is it kept?"""
+        for number, failure in batch.failures.items():
+            self._contents[number] = INCOMPLETE
+            self._entries[number] |= {"content": INCOMPLETE, "error": str(failure)}
+        if self._path is not None and self._is_kept:
+            refresh(self._path)
+        elif self._path is not None:
+            pairs = zip(self._entries, self._contents, strict=True)
+            write_text(self._path, report_text([entry | {"content": content} for entry, content in pairs]))
+        batch.finish()
+        return self._is_kept

@@ -1,0 +1,203 @@
+"""Wavefront MTL: the material library of OBJ files, as keys of a scene's materials.
+
+illum 0             the colour Kd, whatever the light
+illum 1             Ka ambient + Kd n.l
+illum 2 and above   Ka ambient + Kd n.l + Ks (n.h)^Ns, h half way between light and eye
+
+Those are `blinn_phong` as it stands: intensities, without 1/pi. What it has no word for (transparency,
+reflection, refraction, factors and placement of textures) is counted, not guessed, and so is what makes no
+sense: no statement of a library refuses the mesh.
+
+References
+----------
+Wavefront Technologies (1995). MTL material format, version 4.2. Ke is a later custom, meant as emission.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from illumcli.errors import IllumError
+from illumcli.geometry.mesh import Substitute
+from illumcli.geometry.repairs import Repair, note
+from illumcli.mesh_files._files import TAKEN, content, nearby
+from illumcli.mesh_files._polygons import LARGEST
+from illumcli.mesh_files._text import decoded, without_comment
+from illumcli.records import Value
+
+_COLORS = {"ka": "Ka", "kd": "Kd", "ks": "Ks", "ke": "Ke"}
+_NUMBERS = {"ns": "Ns", "d": "d", "tr": "Tr", "illum": "illum"}
+_NOTHING = {
+    "ni",
+    "tf",
+    "sharpness",
+}  # of transparent and mirroring materials alone, which are counted as such
+
+# what may stand before the name of an image: a word, two numbers, or one to three
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?=\s)"
+_OPTION = re.compile(
+    rf"-(?:(?P<name>blendu|blendv|boost|bm|cc|clamp|imfchan|texres|type)\s+(?P<word>\S+)"
+    rf"|mm(?:\s+{_NUMBER}){{1,2}}|[ost](?:\s+{_NUMBER}){{1,3}})(?:\s+|$)",
+    re.IGNORECASE,
+)
+
+Color: TypeAlias = tuple[float, ...]
+BLACK = (0.0, 0.0, 0.0)
+WHITE = (1.0, 1.0, 1.0)
+
+
+class Library(Value):
+    """What a library holds, by material name: keys of a scene's material, what stands in for textures."""
+
+    materials: dict[str, dict[str, Any]] = field(default_factory=dict)
+    substitutes: dict[str, dict[str, Substitute]] = field(default_factory=dict)
+    repairs: dict[str, Repair] = field(default_factory=dict)
+    looks: dict[str, Repair] = field(default_factory=dict)
+    """What has no counterpart here and changes how a material looks; told where the library is used."""
+
+
+def read(path: Path, folder: Path) -> Library:
+    """The materials of a library, and what was left out of it.
+
+    Parameters
+    ----------
+    path : Path
+        The library, inside `folder`.
+    folder : Path
+        The folder of the mesh, in which the textures lie. The path of a texture begins as it does.
+    """
+    library = Library()
+    name = path.relative_to(folder).as_posix()
+    try:
+        lines = list(_statements(content(path)))
+    except IllumError:
+        note(library.repairs, "material libraries that are empty or cannot be read", name)
+        return library
+    materials: dict[str, _Material] = {}
+    current: _Material | None = None
+    for number, word, rest in lines:
+        place = f"{name}:{number}"
+        if word == "newmtl":
+            called = without_comment(rest).rstrip()
+            if called in materials:
+                note(library.repairs, "materials that are defined twice, joined", place)
+            current = materials.setdefault(called, _Material(path, folder, library))
+        elif current is None:
+            note(library.repairs, "statements before any material left out", place)
+        else:
+            current.take(word, rest, place)
+    for material, found in materials.items():
+        library.materials[material], library.substitutes[material] = found.keys()
+    return library
+
+
+def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
+    """Number, keyword in small letters and the rest of each line that says something."""
+    lines = data.removeprefix(b"\xef\xbb\xbf").rstrip(b"\0\x1a").splitlines()
+    for number, line in enumerate(lines, start=1):
+        word, *rest = decoded(line).split(None, 1)[:2] or ("",)
+        if word and not word.startswith("#"):
+            yield number, word.lower(), rest[0].rstrip() if rest else ""
+
+
+class _Material:
+    """The statements of one material."""
+
+    def __init__(self, path: Path, folder: Path, library: Library) -> None:
+        self._path, self._folder = path, folder
+        self._repairs, self._looks = library.repairs, library.looks
+        self._values: dict[str, Any] = {}
+        self._places: dict[str, str] = {}
+
+    def take(self, word: str, rest: str, place: str) -> None:
+        """One more statement; one that makes no sense is left out."""
+        words = rest.partition("#")[0].split()
+        if word in _COLORS:
+            self._set(_COLORS[word], self._color(words, place), place)
+        elif word in _NUMBERS:
+            self._set(_NUMBERS[word], next(iter(self._numbers(words[-1:], place)), None), place)
+        elif word == "map_kd":
+            self._set("map_Kd", self._texture(rest, place), place)
+        elif word.startswith("map_") or word in ("bump", "disp", "decal", "refl", "norm"):
+            note(self._looks, "images of materials other than map_Kd left out", place)
+        elif word not in _NOTHING:
+            note(self._looks, "statements of materials that have no meaning here left out", place)
+
+    def _set(self, key: str, value: Any, place: str) -> None:
+        if value is not None:
+            self._values[key], self._places[key] = value, place
+
+    def _color(self, words: list[str], place: str) -> Color | None:
+        if words[:1] and words[0].lower() in ("spectral", "xyz"):
+            note(self._looks, "spectral and XYZ colours left out", place)
+            return None
+        values = self._numbers(words[:3], place)
+        if len(values) == 2:
+            note(self._repairs, "colours of two numbers, the first taken for all", place)
+        return (values if len(values) == 3 else values[:1] * 3) or None
+
+    def _numbers(self, words: list[str], place: str) -> Color:
+        """The numbers; none where one is no number or out of range."""
+        try:
+            values = tuple(map(float, words))
+        except ValueError:
+            values = ()
+        if values and all(math.isfinite(value) and 0 <= value <= LARGEST for value in values):
+            return values
+        note(self._repairs, f"values of materials that are no numbers from 0 to {LARGEST:g} left out", place)
+        return ()
+
+    def _texture(self, text: str, place: str) -> dict[str, str] | None:
+        """The texture that a map statement names, without its options; None where there is none."""
+        # options stand before the name, which may hold blanks
+        texture: dict[str, str] = {}
+        at, options = 0, False
+        while option := _OPTION.match(text, at):
+            at = option.end()
+            if (option["name"] or "").lower() == "clamp" and option["word"].lower() == "on":
+                texture["wrap"] = "clamp"
+            else:
+                options = True
+        if options:
+            note(self._looks, "texture options left out", place)
+
+        # as it stands, else without a comment, else without quotes
+        name = text[at:]
+        names = dict.fromkeys((name, without_comment(name).rstrip(), name.strip("\"'")))
+        found = [nearby(self._path, each, self._folder) for each in names]
+        file, matter = next((each for each in found if each[0]), found[0])
+        if matter:
+            note(self._repairs, f"textures {matter} {TAKEN if file else 'left out'}", place)
+        return None if file is None else {"texture": str(file), **texture}
+
+    def keys(self) -> tuple[dict[str, Any], dict[str, Substitute]]:
+        """The keys of a scene's material, and what stands in for textures among them."""
+        found, places = self._values, self._places
+        diffuse = found.get("map_Kd", found.get("Kd"))
+        if "map_Kd" in found and found.get("Kd", WHITE) != WHITE:
+            note(self._looks, "factors Kd of a texture left out", places["Kd"])
+        if found.get("d", 1 - found.get("Tr", 0.0)) < 1:
+            note(self._repairs, "transparent materials made opaque", places["d" if "d" in found else "Tr"])
+        illum = found.get("illum", 2.0)
+        if illum > 2:
+            note(self._looks, "reflection of materials left out", places["illum"])
+        if illum == 0:
+            light = WHITE if diffuse is None else diffuse
+            keys = {"diffuse": BLACK, "specular": BLACK, "ambient": BLACK, "emission": light}
+        else:
+            keys = {
+                "diffuse": diffuse,
+                "specular": found.get("Ks", BLACK) if illum >= 2 else BLACK,
+                "exponent": found.get("Ns"),
+                "emission": found.get("Ke"),
+                "ambient": found.get("Ka"),
+            }
+        said = {key: value for key, value in keys.items() if value is not None}
+        substitute = Substitute(found.get("Kd", WHITE), places.get("map_Kd", ""))
+        textured = {key: substitute for key, value in said.items() if isinstance(value, dict)}
+        return {"model": "blinn_phong", **said}, textured

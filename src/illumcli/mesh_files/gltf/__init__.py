@@ -1,0 +1,141 @@
+"""glTF 2.0, as text with its buffers (.gltf) or in one file (.glb): the triangles of a scene, in world space.
+
+References
+----------
+The Khronos Group (2021). glTF 2.0 specification, 2.0.1. ISO/IEC 12113:2022. Sections are its own.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.geometry.mesh import Mesh
+from illumcli.mesh_files._polygons import Ints, polygons, starts_of
+from illumcli.mesh_files.gltf.document import Document, open_document, printable
+from illumcli.mesh_files.gltf.materials import Library
+from illumcli.mesh_files.gltf.primitives import Part, parts
+
+FILLED = {"color": 1.0, "alpha": 1.0}
+"""What vertices of a primitive have that lacks an attribute of others: white and opaque (3.7.2.1)."""
+
+
+def read(path: Path) -> Mesh:
+    """The triangles of every node of the file's scene, one primitive after the other, in the nodes' order.
+
+    The mesh stands as the file places it at rest: the transforms of nodes, instances, skins and the default
+    weights of morph targets are applied. Primitives without normals are flat (3.7.2.1). `COLOR_0` becomes
+    the attribute `color` (and `alpha`), an attribute that begins with an underscore keeps its name; one that
+    is not on every primitive is left out. Groups are the nodes. `materials` are those of the file, as near as
+    a scene's materials come to them. All that is mended or left out is counted in `repairs`; what of the
+    materials, in `material_repairs`.
+    """
+    document = open_document(path)
+    found = list(parts(document))
+    if not any(len(part.triangles) for part in found):
+        why = "; ".join(document.repairs)
+        raise InputError(f"{path}: has no faces{f' ({why})' * bool(why)}; export the mesh with its faces")
+    sizes = [len(part.vertices) for part in found]
+    firsts = starts_of(np.array(sizes, np.int64)).tolist()
+    triangles = [part.triangles + first for part, first in zip(found, firsts, strict=False)]
+    corners = np.concatenate([np.empty((0, 3), np.int64), *triangles]).ravel()
+    counts = [len(part.triangles) for part in found]
+
+    # normals and uv of each corner; a primitive without normals is flat
+    normals, corner_normals = _joined([part.normals for part in found], sizes, corners)
+    uvs, corner_uvs = _joined([part.uvs.get(0) for part in found], sizes, corners)
+    flat = np.array([part.normals is None for part in found], np.bool_)
+    smoothing = np.repeat(np.where(flat, 0, -1), counts) if flat.any() else None
+
+    # names: materials by number, groups by name
+    library = Library(document, found)
+    material_names, materials = _numbered([library.name(part) for part in found])
+    group_names, groups = _numbered([part.group for part in found])
+    return polygons(
+        path,
+        np.concatenate([np.empty((0, 3)), *(part.vertices for part in found)]),
+        corners,
+        np.full(len(corners) // 3, 3),
+        normals=normals,
+        corner_normals=corner_normals,
+        uvs=uvs,
+        corner_uvs=corner_uvs,
+        material_names=material_names,
+        polygon_materials=np.repeat(materials, counts) if material_names else None,
+        group_names=group_names,
+        polygon_groups=np.repeat(groups, counts),
+        polygon_smoothing=smoothing,
+        attributes={**_shared(document, found), **library.coordinates()},
+        materials=library.materials,
+        substitutes=library.substitutes,
+        material_repairs=library.repairs,
+        repairs=document.repairs,
+        place=partial(_place, found, firsts, starts_of(np.array(counts)).tolist()),
+    )
+
+
+def _place(found: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:
+    """Where a part of the mesh stands in the file: its primitive, and its number in it from 1."""
+    first = faces if part == "face" else vertices
+    k = bisect_right(first, number, hi=len(found)) - 1
+    return f": meshes[{found[k].mesh}].primitives[{found[k].primitive}], {part} {number - first[k] + 1}"
+
+
+def primitives_of(document: Document) -> list[tuple[int, int, int]]:
+    """(mesh, number of the primitive in it, vertices) for each run of vertices, in the order of `read`."""
+    return [
+        (part.mesh, part.primitive, len(part.vertices) // part.copies)
+        for part in parts(document)
+        for _ in range(part.copies)
+    ]
+
+
+def _joined(
+    tables: list[NDArray[np.float64] | None], sizes: list[int], corners: Ints
+) -> tuple[NDArray[np.float64] | None, Ints | None]:
+    """The tables one after the other and each corner's row, -1 where a part has no table."""
+    width = next((table.shape[1] for table in tables if table is not None), None)
+    if width is None:
+        return None, None
+    if all(table is not None for table in tables):
+        return np.concatenate([table for table in tables if table is not None]), corners
+    filled = [
+        np.zeros((size, width)) if table is None else table for table, size in zip(tables, sizes, strict=True)
+    ]
+    present = np.repeat([table is not None for table in tables], sizes)
+    return np.concatenate(filled), np.where(present[corners], corners, -1)
+
+
+def _numbered(names: list[str | None]) -> tuple[tuple[str, ...], Ints]:
+    """The distinct names in order, and the number of each of `names` among them, -1 for none."""
+    numbers: dict[str | None, int] = {name: i for i, name in enumerate(dict.fromkeys(n for n in names if n))}
+    found = tuple(name for name in numbers if name)
+    return found, np.array([numbers.get(name, -1) for name in names], np.int64)
+
+
+def _shared(document: Document, found: list[Part]) -> dict[str, NDArray[Any]]:
+    """The attributes of all parts together: those that every part has in the same width, and colours."""
+    shared = {}
+    for name in sorted({name for part in found for name in part.attributes}):
+        known = [part.attributes.get(name) for part in found]
+        shapes = {table.shape[1:] for table in known if table is not None}
+        if len(shapes) > 1 or (name not in FILLED and any(table is None for table in known)):
+            what = f"attribute {printable(name)} that some primitives lack or have otherwise, left out"
+            document.count(what)
+            continue
+        (shape,) = shapes
+        shared[name] = np.concatenate(
+            [
+                np.full((len(part.vertices), *shape), FILLED.get(name, 0), np.float32)
+                if table is None
+                else table
+                for part, table in zip(found, known, strict=True)
+            ]
+        )
+    return shared

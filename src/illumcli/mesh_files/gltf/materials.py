@@ -1,0 +1,344 @@
+"""glTF materials, as near as the materials of a scene come to them.
+
+metallic-roughness (3.9, appendix B): Cook-Torrance with GGX of alpha = roughness^2 and Schlick's F,
+
+    diffuse = base * (1 - metallic)
+    F0      = f0 * (1 - metallic) + base * metallic,   f0 = ((ior - 1) / (ior + 1))^2
+
+where the V-groove term stands for Smith's, and (1 - f0) for the share that F leaves to the diffuse part.
+Ambient light leaves by the base colour, metals too. KHR_materials_unlit is light of its own;
+KHR_materials_pbrSpecularGlossiness gives diffuse and F0 as it stands, alpha = (1 - glossiness)^2.
+
+The base colour is factor * texture (sRGB) * COLOR_0. What has no word here (textures of roughness, metal,
+normals and occlusion; transparency; coats, sheen and so on) is counted, not guessed; where a texture says
+which parts are metal, none is taken for it.
+
+References
+----------
+The Khronos Group (2021). glTF 2.0 specification, 2.0.1. ISO/IEC 12113:2022.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.geometry.mesh import Substitute
+from illumcli.geometry.repairs import Repair, note
+from illumcli.mesh_files._files import TAKEN
+from illumcli.mesh_files.gltf.document import (
+    Document,
+    extension,
+    extensions,
+    is_finite,
+    is_index,
+    is_inline,
+    printable,
+)
+from illumcli.mesh_files.gltf.primitives import Part
+
+BLACK = (0.0, 0.0, 0.0)
+WHITE = (1.0, 1.0, 1.0)
+SMOOTHEST = 1e-4
+"""The least alpha that single precision holds a lobe of."""
+SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
+_USED = {
+    "KHR_materials_unlit",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    SPECULAR_GLOSSINESS,
+    "KHR_materials_variants",
+}
+_REPEAT, _CLAMP, _MIRROR, _NEAREST = 10497, 33071, 33648, 9728
+_WRAPS = {_REPEAT: "repeat", _CLAMP: "clamp", _MIRROR: "mirror"}
+
+Color = tuple[float, float, float]
+Varying = Color | dict[str, Any]
+"""A colour, or what a scene writes for one that varies over the surface."""
+
+
+class _Missing(Exception):
+    """An image that is not there, which is counted already."""
+
+
+class Library:
+    """The materials that the parts of a document have."""
+
+    def __init__(self, document: Document, parts: list[Part]) -> None:
+        self._document = document
+        self._parts = parts
+        self._names: dict[int | None, str] = {}
+        self._coordinates: dict[tuple[int, tuple[float, ...]], str] = {}
+        self.repairs: dict[str, Repair] = {}
+        for part in parts:
+            if part.material is None and "color" in part.attributes:
+                self._names.setdefault(None, "vertex colours")
+        for number in sorted({part.material for part in parts if part.material is not None}):
+            name = document.item("materials", number).get("name")
+            name = name if isinstance(name, str) and name else f"material {number}"
+            taken = name in self._names.values()
+            self._names[number] = f"{name} ({number})" if taken else name
+        self.materials = {name: self._material(number) for number, name in self._names.items()}
+        """Name -> keys of a scene's material."""
+        self.substitutes = {
+            name: dict(_substitutes(self.materials[name], f": materials[{number}]"))
+            for number, name in self._names.items()
+        }
+        """Name -> path of a parameter -> what stands in for its texture."""
+
+    def name(self, part: Part) -> str | None:
+        """What a part's material is called; None for one that has none and no colours either."""
+        if part.material is None and "color" not in part.attributes:
+            return None
+        return self._names[part.material]
+
+    def coordinates(self) -> dict[str, NDArray[np.float32]]:
+        """Attribute -> (V, 2) coordinates, v upwards, of the textures that do not use set 0 as it is."""
+        found = {}
+        for (uv_set, transform), name in self._coordinates.items():
+            tables = [
+                part.uvs.get(uv_set, np.zeros((len(part.vertices), 2))).astype(np.float32)
+                for part in self._parts
+            ]
+            found[name] = _transformed(np.concatenate(tables), transform)
+        return found
+
+    def _count(self, what: str, where: str) -> None:
+        note(self.repairs, what, f": {where}")
+
+    def _material(self, number: int | None) -> dict[str, Any]:
+        """The keys for one material; None stands for colours at vertices alone."""
+        if number is None:
+            return {"model": "lambert", "diffuse": {"vertex": "color"}}
+        material, where = self._document.item("materials", number), f"materials[{number}]"
+        self._count_what_is_left_out(material, where)
+        gloss = extension(material, SPECULAR_GLOSSINESS)
+        metal = material.get("pbrMetallicRoughness")
+        metal = metal if isinstance(metal, dict) else {}
+
+        # light of its own
+        strength = _number(extension(material, "KHR_materials_emissive_strength"), "emissiveStrength", 1.0)
+        emission = _scaled(
+            self._color(number, material, ("emissiveFactor", "emissiveTexture"), BLACK), max(strength, 0.0)
+        )
+
+        # the colour that COLOR_0 multiplies, and what else the workflow says
+        names = ("diffuseFactor", "diffuseTexture") if gloss else ("baseColorFactor", "baseColorTexture")
+        base = self._color(number, gloss or metal, names, WHITE)
+        if any(part.material == number and "color" in part.attributes for part in self._parts):
+            base = _by_vertex_colors(base)
+        if "KHR_materials_unlit" in extensions(material):
+            return {"model": "lambert", "diffuse": BLACK, "ambient": BLACK, "emission": base}
+        if gloss:
+            return self._specular_glossiness(gloss, base, emission)
+        self._count("metallic-roughness materials, drawn as cook_torrance", where)
+        ior = max(_number(extension(material, "KHR_materials_ior"), "ior", 1.5), 1.0)
+        return _metallic_roughness(metal, base, emission, ((ior - 1) / (ior + 1)) ** 2)
+
+    def _count_what_is_left_out(self, material: dict[str, Any], where: str) -> None:
+        count = self._count
+        metal = material.get("pbrMetallicRoughness")
+        if isinstance(metal, dict) and "metallicRoughnessTexture" in metal:
+            count("textures of metal and roughness left out", where)
+        if "specularGlossinessTexture" in extension(material, SPECULAR_GLOSSINESS):
+            count("textures of specular and glossiness left out", where)
+        for name in ("normal", "occlusion"):
+            if f"{name}Texture" in material:
+                count(f"{name} textures left out", where)
+        if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+            count("transparent materials made opaque", where)
+        for name in extensions(material):
+            if name not in _USED:
+                count(f"extension {printable(name)} of materials left out", where)
+
+    def _specular_glossiness(self, gloss: dict[str, Any], base: Varying, emission: Varying) -> dict[str, Any]:
+        textured = "specularGlossinessTexture" in gloss
+        f0 = _factor(gloss, "specularFactor", WHITE, 1.0)
+        glossiness = min(max(_number(gloss, "glossinessFactor", 1.0), 0.0), 1.0)
+        if (
+            textured
+        ):  # the factors are the largest values that the texture leads to, no good guess at the rest
+            f0, glossiness = (0.04, 0.04, 0.04), 0.0
+        return _cook_torrance(_scaled(base, 1 - max(f0)), f0, (1 - glossiness) ** 2) | {
+            "ambient": base,
+            "emission": emission,
+        }
+
+    def _color(self, number: int, entry: dict[str, Any], names: tuple[str, str], default: Color) -> Varying:
+        """factor * texture of a material, the latter where it is there."""
+        factor = _factor(entry, names[0], default, 1.0)
+        info = entry.get(names[1])
+        if info is None or not any(factor):
+            return factor
+        try:
+            texture = self._texture(number, info)
+        except _Missing:
+            return factor
+        except InputError as error:
+            reason = self._document.reason(error)
+            self._count(f"textures left out ({reason})", f"materials[{number}].{names[1]}")
+            return factor
+        return texture if factor == WHITE else {**texture, "factor": factor}
+
+    def _texture(self, number: int, info: Any) -> dict[str, Any]:
+        """What a scene writes for a texture; refused where there is none to be had."""
+        document = self._document
+        if not isinstance(info, dict):
+            raise document.wrong("no texture")
+        texture = document.item("textures", info.get("index"))
+        found = {"texture": self._image(texture)}
+
+        # which coordinates it is looked up at, and what lies beyond them
+        transform = extension(info, "KHR_texture_transform")
+        uv_set = document.integer(transform or info, "texCoord", "texture", info.get("texCoord", 0))
+        if not any(uv_set in part.uvs for part in self._parts if part.material == number):
+            raise document.wrong(f"no TEXCOORD_{uv_set} to look them up by")
+        place = _transform(document, transform)
+        if uv_set != 0 or place != _UNMOVED:
+            plain = f"uv{uv_set}" if place == _UNMOVED else f"uv{uv_set}_{len(self._coordinates) + 1}"
+            found["uv"] = self._coordinates.setdefault((uv_set, place), plain)
+        if "sampler" in texture:
+            found |= self._sampling(
+                document.item("samplers", texture["sampler"]), f"samplers[{texture['sampler']}]"
+            )
+        return found
+
+    def _sampling(self, sampler: dict[str, Any], where: str) -> dict[str, str]:
+        said = [sampler.get(key, _REPEAT) for key in ("wrapS", "wrapT")]
+        wraps = [_WRAPS.get(code, "repeat") if is_index(code) else "repeat" for code in said]
+        if wraps[0] != wraps[1]:
+            self._count("textures that wrap in two ways, wrapped in the first", where)
+        found = {} if wraps[0] == "repeat" else {"wrap": wraps[0]}
+        return found | ({"filter": "nearest"} if sampler.get("magFilter") == _NEAREST else {})
+
+    def _image(self, texture: dict[str, Any]) -> str:
+        """The image of a texture: the path of a file beside, or ``FILE#images[N]`` for one in the file."""
+        document = self._document
+        sources = [texture, *extensions(texture).values()]
+        number = next((each["source"] for each in sources if "source" in each), None)
+        image = document.item("images", number)
+        uri = image.get("uri")
+        if str(image.get("mimeType")).startswith("image/ktx") or str(uri).lower().endswith((".ktx", ".ktx2")):
+            raise document.wrong("KTX images are not read", "export the textures as PNG or JPEG")
+        if isinstance(uri, str) and not is_inline(uri):
+            path, matter = document.nearby(uri)
+            if matter:
+                self._count(f"textures {matter} {TAKEN if path else 'left out'}", f"images[{number}]")
+            if path is None:
+                raise _Missing
+            return str(path)
+        if uri is None:
+            document.view(image.get("bufferView"))
+        return f"{document.path}#images[{number}]"
+
+
+def image_bytes(document: Document, number: int) -> bytes:
+    """The encoded image that a document holds itself.
+
+    Raises
+    ------
+    InputError
+        An image that is not there, or whose data cannot be read.
+    """
+    image = document.item("images", number)
+    if "uri" in image:
+        return document.resource(image["uri"], f"images[{number}].uri")
+    data, start, end = document.view(image.get("bufferView"))
+    return data[start:end]
+
+
+def _substitutes(keys: dict[str, Any], first: str, prefix: str = "") -> Iterator[tuple[str, Substitute]]:
+    """The path of each parameter that has a texture, and its factor."""
+    for key, value in keys.items():
+        if isinstance(value, dict) and "texture" in value:
+            yield prefix + key, Substitute(value.get("factor", WHITE), first)
+        elif isinstance(value, dict):
+            yield from _substitutes(value, first, f"{prefix}{key}.")
+
+
+def _metallic_roughness(
+    metal: dict[str, Any], base: Varying, emission: Varying, dielectric: float
+) -> dict[str, Any]:
+    """The keys of glTF's own workflow; `dielectric` is F0 of what is no metal."""
+    textured = "metallicRoughnessTexture" in metal
+    metallic = 0.0 if textured else min(max(_number(metal, "metallicFactor", 1.0), 0.0), 1.0)
+    roughness = min(max(_number(metal, "roughnessFactor", 1.0), 0.0), 1.0)
+    rest = (1 - metallic) * dielectric
+    if metallic == 0:
+        f0: Varying = (dielectric,) * 3
+    elif isinstance(base, dict):  # a metal's share alone varies: the rest is at most 0.04 or so
+        f0 = _scaled(base, metallic)
+    else:
+        r, g, b = (metallic * each + rest for each in base)
+        f0 = (r, g, b)
+    return _cook_torrance(_scaled(base, (1 - metallic) * (1 - dielectric)), f0, roughness**2) | {
+        "ambient": base,
+        "emission": emission,
+    }
+
+
+def _cook_torrance(diffuse: Varying, f0: Varying, alpha: float) -> dict[str, Any]:
+    return {
+        "model": "cook_torrance",
+        "diffuse": diffuse,
+        "diffuse_weight": 1.0,
+        "specular_weight": 1.0,
+        "distribution": {"D": "ggx", "alpha": max(alpha, SMOOTHEST)},
+        "fresnel": {"F": "schlick", "f0": f0},
+    }
+
+
+def _by_vertex_colors(base: Varying) -> dict[str, Any]:
+    if isinstance(base, dict):
+        return {**base, "vertex": "color"}
+    return {"vertex": "color"} if base == WHITE else {"vertex": "color", "factor": base}
+
+
+def _scaled(color: Varying, factor: float) -> Varying:
+    if isinstance(color, dict):
+        scaled = _scaled(color.get("factor", WHITE), factor)
+        return BLACK if scaled == BLACK else color if scaled == WHITE else {**color, "factor": scaled}
+    r, g, b = (each * factor for each in color)
+    return r, g, b
+
+
+def _factor(entry: dict[str, Any], key: str, default: Color, most: float) -> Color:
+    """Three numbers from 0 to `most`; `default` where there are none."""
+    values = entry.get(key)
+    if not isinstance(values, list) or len(values) < 3 or not all(map(is_finite, values[:3])):
+        return default
+    r, g, b = (min(max(float(each), 0.0), most) for each in values[:3])
+    return r, g, b
+
+
+def _number(entry: dict[str, Any], key: str, default: float) -> float:
+    value = entry.get(key, default)
+    return float(value) if is_finite(value) else default
+
+
+_UNMOVED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def _transform(document: Document, transform: dict[str, Any]) -> tuple[float, ...]:
+    """KHR_texture_transform as a to f: u' = a u + b v + c, v' = d u + e v + f, v downwards.
+
+    offset * rotation * scale, the rotation as its text and examples have it, [c s; -s c]; the matrix printed
+    in the same place turns the other way.
+    """
+    x, y = document.numbers(transform, "offset", "KHR_texture_transform", (0.0, 0.0))
+    width, height = document.numbers(transform, "scale", "KHR_texture_transform", (1.0, 1.0))
+    angle = _number(transform, "rotation", 0.0)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return tuple(map(float, (cosine * width, sine * height, x, -sine * width, cosine * height, y)))
+
+
+def _transformed(uv: NDArray[np.float32], transform: tuple[float, ...]) -> NDArray[np.float32]:
+    """(V, 2) texture coordinates, v upwards before and after."""
+    a, b, c, d, e, f = transform
+    u, v = uv[:, 0], 1 - uv[:, 1]
+    return np.stack([a * u + b * v + c, 1 - (d * u + e * v + f)], axis=1).astype(np.float32)

@@ -1,0 +1,259 @@
+"""Stanford PLY, in text and both byte orders: polygons, triangle strips, normals, uv, any vertex property.
+
+A reader of our own: what the rows mean; `_ply` reads them. Refused is only what no face could be known from;
+all else that is mended or left out is counted.
+
+References
+----------
+Turk, G. (1994). The PLY polygon file format. Stanford University.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import Repair, note
+from illumcli.mesh_files import _ply
+from illumcli.mesh_files._color import linear, unit_range
+from illumcli.mesh_files._files import TAKEN, content, nearby
+from illumcli.mesh_files._ply import Element, Lists, Table
+from illumcli.mesh_files._polygons import Ints, check_range, polygons, starts_of, strip
+from illumcli.mesh_files._text import Text
+from illumcli.records import Value
+
+_NORMAL = ("nx", "ny", "nz")
+_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+_COLOR = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_CORNERS = ("vertex_indices", "vertex_index")
+
+
+class _File(Value):
+    """What a file holds while it is read."""
+
+    path: Path
+    head: _ply.Header
+    tables: dict[str, Table]
+    text: Text | None
+    repairs: dict[str, Repair] = field(default_factory=dict)
+
+    def element(self, name: str) -> Element:
+        return next(each for each in self.head.elements if each.name == name)
+
+    def count(self, name: str) -> int:
+        """Rows of the elements of a name."""
+        return sum(each.count for each in self.head.elements if each.name == name)
+
+    def line(self, element: str, name: str) -> str:
+        """Where the header announces a property."""
+        found = next(each for each in self.element(element).properties if each.name == name)
+        return f":{found.line}"
+
+    def place(self, part: str, index: int) -> str:
+        """Where a vertex, with its normal, or a face stands."""
+        element = {"vertex": "vertex", "normal": "vertex", "face": "face"}.get(part)
+        line = None if element is None else self.row_line(element, index)
+        return f": {part} {index + 1}" if line is None else f":{line}"
+
+    def row_line(self, name: str, row: int) -> int | None:
+        """The number of the line of a row; None where rows are no lines."""
+        index = self.row_index(name, row)
+        return None if index is None or self.text is None else self.text.number(index)
+
+    def row_index(self, name: str, row: int) -> int | None:
+        """Which of the text's lines a row is."""
+        if self.text is None or row >= self.count(name):
+            return None
+        names = [element.name for element in self.head.elements]
+        before = sum(element.count for element in self.head.elements[: names.index(name)])
+        return int(np.searchsorted(self.text.starts, self.head.start)) + before + row
+
+
+def read(path: Path) -> Mesh:
+    """The faces and strips of a PLY file, and every property of its vertices.
+
+    `nx ny nz` become normals, `s t`, `u v` or `texture_u texture_v` become uv (a face's `texcoord` list
+    goes first), `red green blue` become the attribute `color`: integers are taken for sRGB, floats for
+    linear. Every other property of a vertex is an attribute of its name. Images named in comments as
+    `TextureFile` become materials, chosen by a face's `texnumber`. Numbers in text keep all digits.
+    """
+    data = content(path)
+    repairs: dict[str, Repair] = {}
+    head = _ply.header(path, data, repairs)
+    found, text = _ply.tables(path, data, head, repairs)
+    file = _File(path, head, found, text, repairs)
+    vertex = file.tables.get("vertex", {})
+    if any(isinstance(vertex.get(name, None), Lists | None) for name in "xyz"):
+        raise InputError(f"{path}: has no vertices with x, y and z; export the mesh again")
+    vertices = _stacked(vertex, ("x", "y", "z"))
+    corners, counts, wedges = _polygons(file, len(vertices))
+    _refuse_words(file, vertices, corners)
+    more: dict[str, Any] = {}
+    if _has(vertex, _NORMAL):
+        more.update(normals=_stacked(vertex, _NORMAL), corner_normals=corners)
+    if wedges is not None:
+        more.update(uvs=wedges, corner_uvs=np.arange(len(corners)))
+    elif pair := next((pair for pair in _UV if _has(vertex, pair)), None):
+        more.update(uvs=_stacked(vertex, pair), corner_uvs=corners)
+    more.update(_materials(file, "uvs" in more, len(counts)))
+    _count_what_is_left_out(file)
+    attributes = _attributes(file)
+    return polygons(
+        path, vertices, corners, counts, attributes=attributes, repairs=repairs, place=file.place, **more
+    )
+
+
+def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> None:
+    """Refuse the first line of a vertex in use that holds words in place of coordinates."""
+    unknown: NDArray[np.bool_] = np.any(np.isnan(vertices), axis=1)
+    for vertex in corners[unknown[corners]][:1].tolist():
+        index = file.row_index("vertex", vertex)
+        if file.text is not None and index is not None:
+            line = file.text.block(np.array([index]))
+            line.refuse_words(0, int(line.counts[0]))
+
+
+def _has(table: Table, names: tuple[str, ...]) -> bool:
+    """Are these single properties of a table?"""
+    return all(isinstance(table.get(name), np.ndarray) for name in names)
+
+
+def _stacked(table: Table, names: tuple[str, ...]) -> NDArray[np.float64]:
+    """(N, k) float64 of k single properties."""
+    return np.stack([np.asarray(table[name], np.float64) for name in names], axis=1)
+
+
+def _polygons(file: _File, size: int) -> tuple[Ints, Ints, NDArray[np.float64] | None]:
+    """Corners, corners per polygon, (C, 2) uv per corner if the faces hold them; strips follow faces."""
+    corners, counts, wedges = np.empty(0, np.int64), np.empty(0, np.int64), None
+    if file.count("face"):
+        corners, counts = _indices(file, "face", size)
+        uvs = file.tables["face"].get("texcoord")
+        if isinstance(uvs, Lists) and np.array_equal(uvs.counts, 2 * counts):
+            wedges = uvs.values.astype(np.float64).reshape(-1, 2)
+        elif uvs is not None:
+            note(file.repairs, "texture coordinates of faces left out", file.line("face", "texcoord"))
+    if file.count("tristrips"):
+        indices, lengths = _indices(file, "tristrips", size, least=-1)
+        triangles, joints = strip(np.insert(indices, starts_of(lengths)[1:-1], -1))
+        if joints:
+            note(file.repairs, "triangles that only join strips", count=joints)
+        corners = np.concatenate([corners, triangles.ravel()])
+        counts = np.concatenate([counts, np.full(len(triangles), 3)])
+        wedges = None if len(triangles) else wedges
+    return corners, counts, wedges
+
+
+def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints, Ints]:
+    """The vertices of the rows of an element one after the other, and how many each row has."""
+    table = file.tables[element]
+    lists = [name for name, column in table.items() if isinstance(column, Lists) and name != "texcoord"]
+    name = next((name for name in (*_CORNERS, *lists) if isinstance(table.get(name), Lists)), None)
+    if name is None:
+        raise InputError(f"{file.path}: element '{element}' has no list 'vertex_indices'; export it with one")
+    if name not in _CORNERS:
+        note(file.repairs, "lists of another name taken for the corners of faces", file.line(element, name))
+    found = table[name]
+    assert isinstance(found, Lists)
+    if any(each.name == name and each.type.kind == "f" for each in file.element(element).properties):
+        note(file.repairs, "indices in floats", file.line(element, name))
+
+    def row(position: int) -> str:
+        number = int(np.searchsorted(np.cumsum(found.counts), position, side="right"))
+        line = file.row_line(element, number)
+        place = f"{file.path}" if line is None else f"{file.path}:{line}"
+        return f"{place}: {element} {number} has the index {found.values[position]:g}"
+
+    with np.errstate(invalid="ignore"):
+        indices = found.values.astype(np.int64)
+    if (broken := indices != found.values).any():
+        raise InputError(f"{row(int(np.argmax(broken)))}, no whole number; export the mesh again")
+    check_range(
+        indices - least,
+        size - least,
+        lambda position: InputError(f"{row(position)}, there are {size} vertices; export the mesh again"),
+    )
+    return indices, found.counts
+
+
+def _materials(file: _File, has_uv: bool, count: int) -> dict[str, Any]:
+    """The fields of a mesh for the images that the header names."""
+    path, materials = file.path, {}
+    if file.head.textures and not has_uv:
+        note(file.repairs, "textures without coordinates left out", f":{file.head.textures[0][1]}")
+        return {}
+    for name, line in file.head.textures:
+        found, matter = nearby(path, name, path.parent)
+        if matter:
+            note(file.repairs, f"textures {matter} {TAKEN if found else 'left out'}", f":{line}")
+        diffuse = {} if found is None else {"diffuse": {"texture": str(found)}}
+        materials[name] = {"model": "lambert", **diffuse}
+    if not any("diffuse" in each for each in materials.values()):
+        return {}
+    names = list(materials)
+    by_number = np.array([names.index(name) for name, _ in file.head.textures])
+    number = file.tables.get("face", {}).get("texnumber", np.zeros(count))
+    chosen = np.zeros(count, np.int64)
+    if isinstance(number, np.ndarray):  # strips have the first image
+        chosen[: len(number)] = np.where((number >= 0) & (number < len(by_number)), number, 0)
+    return {"material_names": tuple(names), "materials": materials, "polygon_materials": by_number[chosen]}
+
+
+def _count_what_is_left_out(file: _File) -> None:
+    """Count what is read and means nothing here."""
+    for element in file.head.elements:
+        if element.count and element.name not in ("vertex", "face", "tristrips"):
+            note(file.repairs, "rows of other elements left out", f":{element.line}", element.count)
+        for each in element.properties if element.name == "face" else ():
+            if each.name in ("red", "diffuse_red"):
+                note(file.repairs, "colours of faces left out", f":{each.line}")
+
+
+def _attributes(file: _File) -> dict[str, NDArray[Any]]:
+    """Every vertex property that is nothing else, in its own type and this machine's byte order."""
+    vertex = file.tables["vertex"]
+    types = {each.name: each.type for each in file.element("vertex").properties}
+    taken = {"x", "y", "z"}
+    if _has(vertex, _NORMAL):
+        taken |= set(_NORMAL)
+    taken |= set(next((pair for pair in _UV if _has(vertex, pair)), ()))
+    attributes = {}
+    for names in _COLOR:
+        if "color" not in attributes and _has(vertex, names):
+            attributes["color"] = _color(_stacked(vertex, names), types[names[0]])
+            taken |= set(names)
+    for name, values in vertex.items():
+        if isinstance(values, Lists):
+            note(file.repairs, "lists of vertices left out", file.line("vertex", name))
+        elif name not in taken:
+            label = f"{name}_" if name in attributes else name  # a scalar `color` beside red, green, blue
+            attributes[label] = _typed(file, name, values, types[name].newbyteorder("="))
+    return attributes
+
+
+def _typed(file: _File, name: str, values: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+    """Values in the type that the header gives them; floats in text keep all digits."""
+    if values.dtype.kind != "f" or kind.kind == "f":
+        return values.astype(values.dtype.newbyteorder("="))
+    limits = np.iinfo(kind)
+    within = np.clip(np.nan_to_num(np.rint(values)), limits.min, limits.max)
+    if (other := within != values).any():
+        first = file.place("vertex", int(np.argmax(other)))
+        note(file.repairs, "values that do not fit their type, rounded", first, int(np.count_nonzero(other)))
+    return within.astype(kind)
+
+
+def _color(values: NDArray[np.float64], kind: np.dtype[Any]) -> NDArray[np.float32]:
+    """(V, 3) linear: integers are sRGB of their type's full range, or of a byte's if none is larger; floats
+    are linear, but sRGB where they are bytes."""
+    if kind.kind == "f":
+        code = unit_range(values)
+        return values.astype(np.float32) if code is values else linear(np.clip(code, 0, 1))
+    largest = 255 if values.max(initial=0) <= 255 else np.iinfo(kind).max
+    return linear(np.clip(values / largest, 0, 1))

@@ -1,0 +1,265 @@
+"""Hits to what shading asks of them: position, facet, view, normal, depth, uv, tangent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.geometry.planar import PlanarPolygons
+from illumcli.geometry.scene_geometry import CornerVectors, World, cofactors
+from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
+from illumcli.rays.embree import Closest
+from illumcli.rays.offsets import effective_edge
+from illumcli.records import Record
+
+
+class Hits(Record):
+    """The samples of a tile that see a surface; every surface buffer has these M lanes."""
+
+    lane: Ids  # (M,) which sample of the tile
+    triangle: Ids  # (M,)
+    u: Lanes  # (M,) float32 weight of corner 1
+    v: Lanes  # (M,) float32 weight of corner 2
+
+
+def seen(closest: Closest) -> Hits:
+    """The hits among `closest`, packed."""
+    lane = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
+    return Hits(
+        lane,
+        *(getattr(closest, name).take(lane) for name in ("triangle", "u", "v")),
+    )
+
+
+class Facets(Record):
+    """Where hits lie on their triangles, and the triangles' own planes."""
+
+    position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees
+    ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
+    edge: Lanes  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
+    behind: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
+
+
+def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors) -> Facets:
+    """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
+    v0, e1, e2 = (
+        columns(rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64) for k in range(3)
+    )
+    e1 -= v0
+    e2 -= v0
+    sides = columns(e1, F), columns(e2, F), columns(e2 - e1, F)
+    edge = np.sqrt(np.maximum(np.maximum(*(dot(side, side) for side in sides[:2])), dot(sides[2], sides[2])))
+    normal = cross(e1, e2)
+    area = length(normal)
+    behind = dot(normal, towards_eye) < 0
+    scale = np.divide(1 - 2 * behind.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
+    normal *= scale[:, None]
+    position = v0
+    position += np.multiply(e1, u[:, None], out=e1)
+    position += np.multiply(e2, v[:, None], out=e2)
+    return Facets(position, columns(normal, F), effective_edge(edge, area), behind)
+
+
+def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
+    """`n`, turned over where the eye sees the back."""
+    return n * (1 - 2 * behind.astype(n.dtype))[:, None]
+
+
+def corner_rows(world: World, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:
+    """Rows of `table` at the three corners of each hit triangle."""
+    a, b, c = (table.index.take(world.corners[:, k].take(triangle)) for k in range(3))
+    return a, b, c
+
+
+def polygon_facing(triangle: Ids, facet: Facets, planar: PlanarPolygons | None) -> Vectors:
+    """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
+
+    Of a planar polygon Newell's, of others the triangle's. Rays keep to the triangle's, which they leave.
+    """
+    row = np.zeros(0, np.int32) if planar is None else planar.row.take(triangle)
+    own = np.flatnonzero(row >= 0)
+    if planar is None or not own.size:
+        return facet.ng
+    normal, ng = rows(planar.normal, row.take(own)), rows(facet.ng, own)
+    out = facet.ng.copy(order="F")
+    out[own] = facing(normal, dot(normal, ng) < 0)
+    return out
+
+
+def interpolated(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
+    """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
+
+    The facet's own where the interpolated one vanishes. On the side the eye sees.
+    """
+    n = unit(weights.interpolate(world, normals))
+    n = facing(n, facet.behind)
+    return with_facet(n, facet.ng)
+
+
+def with_facet(n: Vectors, ng: Vectors) -> Vectors:
+    """`n`, or the facet's normal on lanes where `n` vanishes."""
+    gone = np.flatnonzero(~(dot(n, n) > 0.25))
+    if gone.size:
+        n[gone] = ng[gone]
+    return n
+
+
+def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
+    """(M, 3) unit normal, quadratic along every edge.
+
+    Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
+    b = 3 ((n0 + n1).delta / delta.delta) delta, so that on average it stays at right angles to the edge: an
+    inflection between two equal normals shows, which linear interpolation loses. Over a triangle the edge
+    terms are weighed by products w_i w_j of the weights of their ends, over a planar polygon of more corners
+    by w_i w_j / (w_i + w_j): each reduces to the edge's own form there, and between two parallel edges of a
+    quad the second is linear.
+
+    References
+    ----------
+    van Overveld, C. W. A. M. and Wyvill, B. (1997). Phong normal interpolation revisited. ACM TOG 16(4).
+    """
+    n = columns(weights.interpolate(world, normals))
+    for group in weights.groups:
+
+        def corner(k: int, group: Corners = group) -> Corner:
+            end = rows(normals.values, normals.index.take(group.corner(world, k)))
+            return rows(world.vertices, group.vertex(world, k)), end, group.end_weight(k)
+
+        share = np.multiply if isinstance(group, TriangleCorners) else between
+        if group.lane is None:
+            bend(n, group.count, corner, share)
+        else:
+            part = rows(n, group.lane)
+            bend(part, group.count, corner, share)
+            n[group.lane] = part
+    return with_facet(facing(unit(n), facet.behind), facet.ng)
+
+
+Corner: TypeAlias = tuple[Vectors, Vectors, Lanes]
+"""(M, 3) place of a corner, its unit normal, (M,) its weight."""
+
+
+def between(first: Lanes, last: Lanes) -> Lanes:
+    """(M,) w_i w_j / (w_i + w_j) for the weights of an edge's ends; 0 where one is not positive."""
+    product = np.maximum(first, 0) * np.maximum(last, 0)
+    return np.divide(product, first + last, out=np.zeros_like(product), where=product > 0)
+
+
+def bend(
+    n: Vectors,
+    count: int,
+    corner: Callable[[int], Corner],
+    share: Callable[[Lanes, Lanes], Lanes] = np.multiply,
+) -> None:
+    """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit.
+
+    `share` is how much of an edge's term there is, by the weights of its ends.
+    """
+    first = last = corner(0)
+    for k in range(1, count + 1):
+        following = corner(k) if k < count else first
+        delta = following[0] - last[0]
+        square = dot(delta, delta)
+        slope = np.divide(
+            3 * dot(last[1] + following[1], delta), square, out=np.zeros_like(square), where=square > 0
+        )
+        n -= (share(last[2], following[2]) * slope)[:, None] * delta
+        last = following
+
+
+def uv(world: World, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
+    """(M, 2) texture coordinates; 0 where a mesh has none.
+
+    Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
+    """
+    out = _with_all(world, uvs, weights.hits)
+    for group in weights.groups:
+        if isinstance(group, MeanCorners):
+            lane = slice(None) if group.lane is None else group.lane
+            out[lane] = _with_all(world, uvs, group)
+    return out
+
+
+def _with_all(world: World, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
+    """(m, 2) means by weight; 0 where a corner has none."""
+    index = [uvs.index.take(corners.corner(world, k)) for k in range(corners.count)]
+    has = np.minimum.reduce(index) >= 0
+    if not has.any():
+        return np.zeros((len(has), 2), F, order="F")
+    found = corners.mean(lambda k: rows(uvs.values, index[k]))
+    return np.asarray(np.where(has[:, None], found, F(0)))
+
+
+def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
+    """Where u grows, at every corner.
+
+    The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
+    the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
+    """
+    points = [rows(world.vertices, corner).astype(np.float64) for corner in world.triangles.T]
+    at = corner_rows(world, np.arange(len(world.triangles), dtype=np.int32), uvs)
+    along, hand = _along_u(points, at, uvs)
+    groups, parts = [], []
+    for k in range(3):
+        groups.append((world.triangles[:, k] * (len(uvs.values) + np.int64(1)) + at[k] + 1) * 3 + hand)
+        e1, e2 = points[k - 2] - points[k], points[k - 1] - points[k]
+        parts.append(along * np.arctan2(length(cross(e1, e2)), dot(e1, e2))[:, None])
+    _, index = np.unique(np.stack(groups, axis=1), return_inverse=True)
+    weights = np.stack(parts, axis=1).reshape(-1, 3)
+    sums: Vectors = np.stack(
+        [np.bincount(index.ravel(), part) for part in weights.T], axis=1, dtype=np.float64
+    )
+    none = np.zeros((1, 3))  # of corners that the cut skipped
+    corner = np.full(len(uvs.index), len(sums), np.int32)
+    corner[world.corners.ravel()] = index.ravel()
+    return CornerVectors(columns(np.concatenate([unit(sums), none]), F), corner)
+
+
+def _along_u(
+    points: Sequence[Vectors], at: Sequence[Ids], uvs: CornerVectors
+) -> tuple[Vectors, NDArray[np.int64]]:
+    """(T, 3) unit vectors where u grows on each triangle, and (T,) the handedness of its uv: 0, 1 flat, 2."""
+    if not len(uvs.values):
+        return np.zeros_like(points[0]), np.ones(len(points[0]), np.int64)
+    t0, t1, t2 = (rows(uvs.values, np.maximum(index, 0)).astype(np.float64) for index in at)
+    a, b = t1 - t0, t2 - t0
+    has = (at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0)
+    hand = np.where(has, np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), 0)
+    e1, e2 = points[1] - points[0], points[2] - points[0]
+    way: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
+    return unit(way) * hand[:, None], hand.astype(np.int64) + 1
+
+
+def rings(
+    matrix: NDArray[np.float64], axis: Sequence[float], centre: ArrayLike, position: Vectors
+) -> Vectors:
+    """(M, 3) unit direction of the ring about an axis through each point; zero on the axis.
+
+    Parameters
+    ----------
+    matrix : (3, 3)
+        From the object's own directions, in which axis and rings are meant, to those of the world: where it
+        stretches unevenly, rings become ellipses.
+    centre : (3,)
+        A point on the axis, in the world, as `position` is.
+    """
+    own = (position - np.asarray(centre)) @ cofactors(matrix)  # by the inverse, times the determinant
+    ring = np.cross(axis, own) @ matrix.T
+    return unit(ring * np.sign(np.linalg.det(matrix)))
+
+
+def tangent(n: Vectors, grain: Vectors) -> Vectors:
+    """(M, 3) unit `grain` made perpendicular to `n`; any perpendicular where it is parallel or zero."""
+    t = grain - dot(grain, n)[:, None] * n
+    size = length(t)
+    weak = np.flatnonzero(~(size > 1e-4))
+    if weak.size:
+        m = n[weak]
+        axis = np.zeros_like(m)
+        axis[np.arange(len(m)), np.argmin(np.abs(m), axis=1)] = 1
+        t[weak] = axis - dot(axis, m)[:, None] * m
+    return unit(t)

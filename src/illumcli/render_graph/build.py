@@ -1,0 +1,523 @@
+"""Every buffer a scene could make, and from what: the wiring diagram. Nothing here runs anything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from illumcli.cache.fingerprint import Content
+from illumcli.errors import InputError
+from illumcli.graph import Recipe
+from illumcli.layers import FIXED, Layer, of_light, shadow_of
+from illumcli.lights._base import Light
+from illumcli.mesh_files import companions
+from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import Texture
+from illumcli.records import Value
+from illumcli.render_graph import stages
+from illumcli.render_graph.replicates import error_recipes
+from illumcli.scene.load import resolve
+from illumcli.scene.spec import MeshFile, Normals, Object, Obscurance, Scene, default_material
+from illumcli.schema.families import suggestion
+from illumcli.shading.materials import DEFAULT, Choice, Token
+from illumcli.shading.rates import AT_SAMPLES
+from illumcli.shading.terms import words
+from illumcli.shading.textures import paths
+
+GIVEN = ("view", "tile")
+"""Buffers that need no recipe."""
+PURPOSES = ("lobes", "ambient", "emission")
+"""What parameters that vary over a surface may serve."""
+SMOOTH = ("gouraud", "phong", "quadratic")
+
+
+class View(Value):
+    """One picture: a camera and the size and sampling of its film."""
+
+    name: str
+    camera: Any
+    width: int
+    height: int
+    samples: int
+    adaptive: Any = None
+    first: int | None = None
+    """Number of the first sample, where these are part of a pixel's samples."""
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Are pixels sampled to different counts?"""
+        return self.adaptive is not None and self.adaptive.first < self.samples
+
+    def coarse(self) -> View:
+        """The view with the samples that every pixel gets."""
+        return replace(self, samples=self.adaptive.first, adaptive=None, first=0)
+
+    def rest(self) -> View:
+        """The view with all the other samples."""
+        few = self.adaptive.first
+        return replace(self, samples=self.samples - few, adaptive=None, first=few)
+
+
+def views(scene: Scene) -> list[View]:
+    """The scene's cameras with their films."""
+    film = scene.film
+    return [
+        View(
+            name,
+            camera,
+            camera.width or film.width,
+            camera.height or film.height,
+            camera.samples or film.samples,
+            film.adaptive,
+        )
+        for name, camera in scene.named_cameras().items()
+    ]
+
+
+def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
+    """The layers of these names: `lights` and `shadows` stand for one per light, which can be named alone.
+
+    Raises
+    ------
+    InputError
+        A name that is no layer of this scene.
+    """
+    lights = [of_light(name) for name in scene.named_lights()]
+    shadows = [shadow_of(name) for name in scene.named_lights()]
+    known = {layer.name: [layer] for layer in [*lights, *shadows, *FIXED.values()]}
+    known |= {"lights": lights, "shadows": shadows}
+    problems = [f"no layer '{name}'; {suggestion(name, tuple(known))}" for name in names if name not in known]
+    if problems:
+        raise InputError(problems)
+    return list({layer.name: layer for name in names for layer in known[name]}.values())
+
+
+def candidates(scene: Scene) -> list[IlluminationModel] | None:
+    """The models that some surface may have; None where a mesh file's own library decides."""
+    found: list[IlluminationModel] = []
+    for thing in scene.objects:
+        model = scene.material_of(thing)
+        if model is not None:
+            found.append(model)
+            continue
+        if imports(scene, thing):
+            return None
+        found += [default_material(), *scene.materials.values()]
+    return found
+
+
+def imports(scene: Scene, thing: Any) -> bool:
+    """Does an object have the materials that its mesh file describes?"""
+    wants = thing.fallback is not None or getattr(_source(scene, thing.mesh), "materials", False)
+    return thing.material is None and bool(wants)
+
+
+def reached_words(scene: Scene) -> frozenset[str]:
+    """The words (`v`, `t`, ...) that some lobe of some candidate asks for."""
+    models = candidates(scene)
+    if models is None:  # libraries of meshes describe models that know of no tangent
+        models = [*scene.materials.values(), *filter(None, map(scene.material_of, scene.objects))]
+        return frozenset(("n", "l", "v")).union(*(words(model.lobes()) for model in models))
+    return frozenset().union(*(words(model.lobes()) for model in models))
+
+
+def rates(scene: Scene) -> list[str]:
+    """The shading rate of each object."""
+    return [thing.shading or scene.shading for thing in scene.objects]
+
+
+def is_ambient(scene: Scene) -> bool:
+    """Does any ambient light leave a surface?"""
+    models = candidates(scene)
+    if not any(scene.ambient.color):
+        return False
+    return models is None or any(_glows(model, model.ambient_color()) for model in models)
+
+
+def weighs_ambient(scene: Scene) -> bool:
+    """Is the ambient light weighed by obscurance, traced or baked?"""
+    return scene.obscurance is not None or any(is_baked(scene))
+
+
+def is_emissive(scene: Scene) -> bool:
+    """Does any surface emit light?"""
+    models = candidates(scene)
+    return models is None or any(_glows(model, model.emission) for model in models)
+
+
+def _glows(model: IlluminationModel, color: Any) -> bool:
+    return not isinstance(color, tuple) or any(color)
+
+
+def may_vary(scene: Scene, purpose: str) -> bool:
+    """May a parameter that serves `purpose` (`lobes`, `ambient`, `emission`) vary over some surface?"""
+    models = candidates(scene)
+    return models is None or any(paths(model, purpose) for model in models)
+
+
+def sends(light: Light) -> bool:
+    """Does a light send anything?"""
+    return any(light.color())
+
+
+def active_lights(scene: Scene) -> dict[str, Light]:
+    """The lights that send anything, by name."""
+    return {name: light for name, light in scene.named_lights().items() if sends(light)}
+
+
+def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str, Recipe]:
+    """Every buffer this scene could make, by name; `view` and `tile` are given.
+
+    The objects of the numbers `unseen` are left out of it, as far as nothing can tell.
+
+    A recipe binds only those parts of the scene that its buffer depends on: they are what the buffer is known
+    by (`plan.keys`).
+    """
+    rate = rates(scene)
+    wanted = reached_words(scene)
+    smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
+    flat = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rate else {}
+    # polygons that are flat by their normals need no weights where these alone are interpolated
+    of_normals = {"corner_weights": "normal_weights" if set(rate) == {"phong"} else "corner_weights"}
+    whole = {"planar_polygons": "planar_polygons"} if smooth or any(is_baked(scene)) else {}
+    at_samples = AT_SAMPLES.issuperset(rate)
+    grains = tuple(thing.grain for thing in scene.objects)
+    by_uv = {name: name for name in ("uv_tangents", "point_weights")} if None in grains else {}
+    book = [
+        *_geometry(scene, loaded, rate, unseen),
+        Recipe.of(stages.uvs),
+        Recipe.of(stages.polygon_centres),
+        Recipe.of(stages.planar_polygons),
+        Recipe.of(stages.planar_polygons, "curved_polygons", normals="corner_normals"),
+        Recipe.of(partial(stages.samples, scene.seed), "samples"),
+        Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
+        Recipe.of(stages.hits),
+        Recipe.of(stages.facets),
+        Recipe.of(stages.corner_weights, **whole),
+        Recipe.of(stages.corner_weights, "normal_weights", planar_polygons="curved_polygons"),
+        Recipe.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
+        Recipe.of(stages.point_weights),
+        Recipe.of(stages.material),
+        Recipe.of(stages.view_vectors, "v"),
+        Recipe.of(stages.uv_tangents),
+        Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
+        Recipe.of(stages.ray_origins),
+        *_terminator(rate, smooth, of_normals),
+        Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
+        Recipe.of(
+            partial(stages.obscurance_normals, rate),
+            "obscurance_normals",
+            normals="corner_normals",
+            **of_normals,
+        ),
+        *_obscurance(scene, loaded, unseen),
+        Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
+        Recipe.of(stages.emission, **_varying(scene, "emission")),
+        Recipe.of(stages.alpha),
+        Recipe.of(stages.depth),
+        Recipe.of(stages.world_position),
+        Recipe.of(stages.normal),
+        Recipe.of(stages.geometric_normal, planar_polygons="planar_polygons"),
+        Recipe.of(stages.uv),
+        Recipe.of(stages.object_id),
+        Recipe.of(stages.material_id),
+        Recipe.of(stages.triangle_id),
+    ]
+    book += _materials(scene, loaded)
+    eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
+    implied = {"smooth": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
+    for name, light in scene.named_lights().items():
+        book += _light(name, light, eye, at_samples, implied)
+    made = {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+    counts = [view.samples for view in views(scene)]
+    made |= {f"camera:{view.name}": recipe for view, recipe in _framings(scene, unseen)}
+    return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
+
+
+def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Recipe]]:
+    """The views that an object is to fill, and what makes their cameras."""
+    numbers = {name: number for number, name in enumerate(scene.object_names())}
+    every = "every_mesh" if unseen else "meshes"
+    return [
+        (
+            view,
+            Recipe.of(
+                partial(stages.framed, view.camera, view.width / view.height, numbers[view.camera.fit]),
+                f"camera:{view.name}",
+                meshes=every,
+            ),
+        )
+        for view in views(scene)
+        if view.camera.fit is not None
+    ]
+
+
+def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Recipe]:
+    """w, by rays or from the files that its objects' meshes name."""
+    files = tuple(
+        (name, None if number in unseen else file)
+        for number, (name, file) in enumerate(baked_files(scene, loaded))
+    )
+    settings = scene.obscurance or Obscurance()
+    more = {"open_facets": "open_facets"}
+    if any(file for _, file in files):
+        more |= {"baked": "baked", "corner_weights": "corner_weights"}
+    if settings.faces != "count":
+        more["facet_normals"] = "facet_normals"
+    if settings.about == "shading" and set(rates(scene)) & set(SMOOTH):
+        more["obscurance_normals"] = "obscurance_normals"
+    if all_baked(scene) or (scene.obscurance is None and "baked" in more):
+        w = Recipe.of(stages.baked_or_open, "obscurance")
+    else:
+        w = Recipe.of(partial(stages.obscurance, settings), "obscurance", **more)
+    return [
+        Recipe.of(stages.open_facets),
+        Recipe.of(stages.facet_normals),
+        Recipe.of(partial(stages.baked, files), "baked"),
+        w,
+    ]
+
+
+def baked_files(scene: Scene, loaded: Any) -> tuple[tuple[str, Content | None], ...]:
+    """Name of each object and the file of its baked obscurance."""
+    sources = [_source(scene, thing.mesh) for thing in scene.objects]
+    files = [source.obscurance if isinstance(source, MeshFile) else None for source in sources]
+    return tuple(
+        (name, None if file is None else Content(partial(resolve, loaded, file)))
+        for name, file in zip(scene.object_names(), files, strict=True)
+    )
+
+
+def is_baked(scene: Scene) -> list[bool]:
+    """Of each object: does its mesh name baked obscurance?"""
+    return [getattr(_source(scene, thing.mesh), "obscurance", None) is not None for thing in scene.objects]
+
+
+def all_baked(scene: Scene) -> bool:
+    """Is there no surface left to cast obscurance rays from?"""
+    return bool(scene.objects) and all(is_baked(scene))
+
+
+def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int, ...]) -> list[Recipe]:
+    """Meshes, each source once, what is made of them all, and their normals."""
+    sources = [_source(scene, thing.mesh) for thing in scene.objects]
+    found = {
+        mesh_name(scene, thing.mesh): source for thing, source in zip(scene.objects, sources, strict=True)
+    }
+    names = list(found)
+    which = tuple(names.index(mesh_name(scene, thing.mesh)) for thing in scene.objects)
+    normals = tuple(source.normals if isinstance(source, MeshFile) else None for source in sources)
+    how = tuple("flat" if own == "constant" else said for own, said in zip(rate, normals, strict=True))
+    methods = tuple("newell" if said is None else said.polygon for said in normals)
+    parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
+    by_file = tuple(said is None or said.source == "file" for said in normals)
+    flat = tuple(own == "constant" or scene.terminator == "none" for own in rate)
+    every = "every_mesh" if unseen else "meshes"
+    called = tuple(
+        source.file if isinstance(source, MeshFile) else f"object {name}"
+        for source, name in zip(sources, scene.object_names(), strict=True)
+    )
+    computes = tuple(
+        own != "constant" and _computes_normals(source) for own, source in zip(rate, sources, strict=True)
+    )
+    selects = tuple(
+        None
+        if scene.material_of(thing) is not None
+        else (() if thing.fallback is not None else tuple(sorted(scene.materials)), imports(scene, thing))
+        for thing in scene.objects
+    )
+    wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
+    left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
+    return [
+        *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
+        Recipe(every, partial(stages.meshes, which), parts),
+        *left,
+        Recipe.of(
+            partial(stages.standing, tuple(thing.transform for thing in scene.objects)),
+            "standing",
+            meshes=every,
+        ),
+        Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
+        Recipe.of(partial(stages.world, by_file), "world"),
+        Recipe.of(stages.frame),
+        Recipe.of(partial(stages.repairs, called, computes), "repairs"),
+        *([Recipe.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
+        *([Recipe.of(partial(stages.unnamed, called, selects), "unnamed")] if any(selects) else []),
+        Recipe.of(stages.tracer_over, "tracer"),
+        Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
+        Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),
+    ]
+
+
+def _computes_normals(source: Any) -> bool:
+    """Does the description of a mesh file say how normals are made, but not that all are?"""
+    if not isinstance(source, MeshFile) or source.normals.source != "file":
+        return False
+    own, usual = source.normals, Normals()
+    return (own.crease, own.weights) != (usual.crease, usual.weights)
+
+
+def _wants_direction(scene: Scene, thing: Object) -> bool:
+    """Has an object's own material a grain that only uv can direct?"""
+    model = scene.material_of(thing)
+    return thing.grain is None and model is not None and model.has_grain()
+
+
+def _source(scene: Scene, mesh: Any) -> Any:
+    """The description of an object's mesh."""
+    if isinstance(mesh, str):
+        return scene.meshes[mesh] if mesh in scene.meshes else MeshFile(file=mesh)
+    return mesh
+
+
+def mesh_name(scene: Scene, mesh: Any) -> str:
+    """What an object's mesh is called: by its file, else by its name, else by its description."""
+    source = _source(scene, mesh)
+    if isinstance(source, MeshFile):
+        return source.file if "." in source.file else f"./{source.file}"  # apart from names
+    return mesh if isinstance(mesh, str) else repr(source)
+
+
+def _read(loaded: Any, source: Any) -> Any:
+    """What a mesh is made from: the content of its file, or the shape."""
+    if not isinstance(source, MeshFile):
+        return source
+    return Content(partial(resolve, loaded, source.file), companions)
+
+
+def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
+    """Numbers of materials, their models, and what these vary by."""
+    choices: list[Choice] = []
+    models: dict[Token, Any] = {DEFAULT: default_material()}
+    for thing, name in zip(scene.objects, scene.object_names(), strict=True):
+        model = scene.material_of(thing)
+        of_scene = isinstance(thing.material, str) and not thing.override
+        token: Token = ("material", str(thing.material)) if of_scene else ("object", name)
+        if model is not None:
+            models[token] = model
+        fallback: Token | None = None
+        if (other := scene.fallback_of(thing)) is not None:
+            fallback = ("material", thing.fallback) if isinstance(thing.fallback, str) else ("fallback", name)
+            models[fallback] = other
+        library = mesh_name(scene, thing.mesh) if imports(scene, thing) else None
+        choices.append(Choice(None if model is None else token, library, fallback))
+    imported = tuple(choice.library for choice in choices)
+    if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
+        models |= {("material", name): model for name, model in scene.materials.items()}
+    files = {model.file for model in models.values() if hasattr(model, "file")}
+    measured = {file: Content(partial(resolve, loaded, file)) for file in sorted(files)}
+    numbering = partial(stages.numbering, tuple(choices), tuple(sorted(scene.materials)))
+    own = {"meshes": "meshes"} if any(imported) else {}
+    book = [
+        Recipe.of(numbering, "numbering"),
+        Recipe.of(partial(stages.materials_of, models, measured, imported), "materials", **own),
+    ]
+    named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
+    images = stages.Images({path: Content(partial(resolve, loaded, path)) for path in named}, loaded)
+    for purpose in PURPOSES:
+        if may_vary(scene, purpose):
+            read, made = f"{purpose}_textures", f"{purpose}_parameters"
+            book += [
+                Recipe.of(partial(stages.textures, scene.object_names(), images, purpose), read),
+                Recipe.of(stages.parameters, made, textures=read),
+            ]
+    return book
+
+
+def _varied(models: Iterable[IlluminationModel]) -> list[Any]:
+    """Everything that some parameter varies by."""
+    return [each for model in models for each in model.varying().values()]
+
+
+def _varying(scene: Scene, purpose: str) -> dict[str, str]:
+    """The need of a stage that asks for parameters that may vary."""
+    return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
+
+
+def _terminator(rate: Sequence[str], smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Recipe]:
+    """The surface that normals imply, from which shadow rays start; none where every object is flat."""
+    if not smooth:
+        return []
+    surface = partial(stages.smooth_surface, tuple(own == "constant" for own in rate))
+    return [
+        Recipe.of(stages.smooth_parts, **smooth),
+        Recipe.of(surface, "smooth_surface", **smooth, **weights),
+    ]
+
+
+def _light(
+    name: str, light: Light, eye: Mapping[str, str], at_samples: bool, implied: Mapping[str, str]
+) -> list[Recipe]:
+    """What one light takes: where it arrives, its shadow, the response to it.
+
+    `implied` names the smooth surface that shadow rays may start from, if there is one.
+    """
+    lit, reach, shadow = f"lit:{name}", f"reach:{name}", f"shadow:{name}"
+    if not sends(light):
+        dark = partial(stages.black)
+        return [Recipe.of(dark, f"light:{name}"), Recipe.of(partial(stages.no_shadow), shadow)]
+    place = light.placed()
+    color = light.color()
+    way = {"shadow": shadow} if light.shadows else {}
+    arriving = lit
+    opened = []
+    if at_samples and light.shadows:  # what lies in shadow is not evaluated at all
+        arriving, way = f"free:{name}", {}
+        opened = [Recipe.of(partial(stages.free, place), arriving, shadow=shadow)]
+    return [
+        *opened,
+        Recipe.of(partial(stages.lit, place), lit),
+        # where every model is evaluated at the samples, its lit points are those that want shadow rays
+        Recipe.of(partial(stages.reach, place), reach)
+        if not at_samples
+        else Recipe.of(stages.same, reach, lit=lit),
+        Recipe.of(stages.shadow, shadow, reach=reach, **implied)
+        if light.shadows
+        else Recipe.of(stages.no_shadow, shadow),
+        Recipe.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),
+        Recipe.of(stages.lobe_sum, f"light:{name}", direct=f"direct:{name}", **way),
+        Recipe.of(partial(stages.one_lobe, "diffuse"), f"diffuse:{name}", direct=f"direct:{name}", **way),
+        Recipe.of(partial(stages.one_lobe, "specular"), f"specular:{name}", direct=f"direct:{name}", **way),
+        Recipe.of(partial(stages.arriving_light, color), f"unlit:{name}", lit=arriving, **way),
+    ]
+
+
+def _sums(scene: Scene) -> list[Recipe]:
+    """The pictures that are sums over lights, and the beauty."""
+    lights = list(active_lights(scene))
+    open_way = {"obscurance": "obscurance"} if weighs_ambient(scene) else {}
+    ambient = Recipe.of(partial(stages.ambient, scene.ambient.color), "ambient", **open_way)
+
+    def total(makes: str, *parts: str) -> Recipe:
+        return Recipe(makes, stages.total, {"hits": "hits", **{part: part for part in parts}})
+
+    glow = ["emission"] if is_emissive(scene) else []
+    if scene.ambient.form == "coupled":
+        both = ["coupled"]
+        needs = {"ambient_color": "ambient_color", "direct": "direct", "unlit": "unlit", **open_way}
+        coupled = [Recipe("coupled", partial(stages.coupled, scene.ambient.color), needs)]
+    else:
+        both, coupled = (
+            [*(["ambient"] if is_ambient(scene) else []), *(f"light:{name}" for name in lights)],
+            [],
+        )
+    if scene.depth_cue is not None:
+        cued = [Recipe.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
+    else:
+        cued = []
+    return [
+        ambient,
+        *coupled,
+        total("direct", *(f"light:{name}" for name in lights)),
+        total("unlit", *(f"unlit:{name}" for name in lights)),
+        total("diffuse", *(f"diffuse:{name}" for name in lights)),
+        total("specular", *(f"specular:{name}" for name in lights)),
+        total("uncued" if cued else "beauty", *glow, *both),
+        *cued,
+    ]
+
+
+SHAPE = ("object_id", "geometric_normal")
+"""Buffers whose differences say, before any light, which pixels want more samples."""

@@ -1,0 +1,80 @@
+"""Objects beside which a scene is so large that rays start visibly far off the surfaces around them.
+
+A scene is traced in single precision, in radii from its centre, and secondary rays start off their surface by
+a share of the place and of the polygon's edge there (`rays.offsets`): on a floor 10^5 times as large as what
+stands on it by some hundredths of that, and shadows no longer meet what casts them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.geometry.scene_geometry import Standing
+from illumcli.rays.offsets import SHARE
+from illumcli.records import Value
+from illumcli.render_graph.build import View
+from illumcli.visibility.culling import frustum, outside
+
+VISIBLE = 0.005
+"""Share of an object's radius that an offset is seen from: about two pixels where it fills a picture."""
+SMALLEST = 0.05
+"""Share of the picture's height that an object reaches to be looked at so closely."""
+
+
+class Disproportion(Value):
+    """An object beside which rays start too far off, and what makes the scene so large."""
+
+    small: int
+    large: int
+    ratio: float
+    """How many times as far as the one is large the other reaches."""
+    offset: float
+    """How far off rays start there [scene units]."""
+    share: float
+    """Of the small object's radius."""
+
+
+def disproportion(standing: Standing, views: Sequence[View]) -> Disproportion | None:
+    """The object for which it is worst; None where all is well."""
+    size = (standing.high - standing.low) / 2
+    centre = standing.low + size
+    radius = np.linalg.norm(size, axis=1)
+    known = np.flatnonzero(np.isfinite(radius) & (radius > 0))
+    found: list[Disproportion] = []
+    for i in known[_looked_at(standing, views)[known]]:
+        apart = np.abs(centre - centre[i]) - size
+        near = known[(apart[known] <= size[i] + radius[i]).all(axis=1)]
+        place = float(np.linalg.norm(centre[i] - standing.frame.centre))
+        offset = SHARE * (place + float(_edges(radius, standing.polygons)[near].max()))
+        if offset > VISIBLE * radius[i]:
+            reach = np.linalg.norm(centre - centre[i], axis=1) + radius
+            large = int(known[np.argmax(reach[known])])
+            ratio, share = float(reach[large] / radius[i]), offset / float(radius[i])
+            found.append(Disproportion(int(i), large, ratio, offset, share))
+    return max(found, key=lambda each: each.share, default=None)
+
+
+def _edges(radius: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(O,) about how long an object's longest edges are: as it is itself, unless it has many polygons."""
+    return 2 * radius * np.minimum(1, 4 / np.sqrt(np.maximum(polygons, 1)))
+
+
+def _looked_at(standing: Standing, views: Sequence[View]) -> NDArray[np.bool_]:
+    """(O,) Is the object in some view, and not small there?"""
+    frame = standing.frame
+    with np.errstate(invalid="ignore"):
+        low, high = ((corner - frame.centre) / frame.radius for corner in (standing.low, standing.high))
+        centre, radius = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
+        seen = np.zeros(len(low), np.bool_)
+        for view in views:
+            planes = frustum(view.camera, frame, view.width, view.height, None)
+            if view.camera.projection == "perspective":
+                distance = np.linalg.norm(centre - frame.inward(view.camera.position), axis=1)
+                half = distance * np.tan(np.radians(view.camera.fov) / 2)
+            else:
+                half = np.full(len(low), view.camera.extent / 2 / frame.radius)
+            seen |= ~outside(planes, low, high) & (radius >= SMALLEST * half)
+    return seen

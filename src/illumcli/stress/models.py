@@ -1,0 +1,134 @@
+"""Every illumination model with its parameters at the ends of their ranges, at every kind of direction."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import columns, cross, dot, unit
+from illumcli.commands.schema import schema_of
+from illumcli.schema.families import members
+from illumcli.shading.terms import evaluate
+from illumcli.stress.outcome import Row
+
+MEASURED = "file"
+"""A model with this field is a measurement; there is none to stress."""
+
+
+def rows(quick: bool) -> list[Row]:
+    """One row per model."""
+    lanes, draws = (256, 20) if quick else (4096, 400)
+    models = [Model for Model in members("illumcli.models") if MEASURED not in Model.fields()]
+    return [_row(Model, lanes, draws) for Model in models]
+
+
+def _row(Model: type[Any], lanes: int, draws: int) -> Row:
+    random = np.random.default_rng(1)
+    wrong: list[str] = []
+    values = sets = 0
+    for said in parameters(Model, random, draws):
+        model = Model.validated(said)
+        sets += 1
+        for dtype in (np.float32, np.float64):
+            given = directions(sets, lanes, dtype)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                try:
+                    found = evaluate(model.lobes(), given)
+                except (ArithmeticError, RuntimeWarning) as error:
+                    wrong.append(f"{said}: {error}")
+                    continue
+            for name, lobe in found.items():
+                values += lobe.size
+                if lobe.dtype != dtype or not np.isfinite(lobe).all() or lobe.min() < 0:
+                    bad = np.count_nonzero(~np.isfinite(lobe) | (lobe < 0))
+                    wrong.append(f"{said}: {name} wrong in {bad} values of {dtype.__name__}")
+    check = f"{sets} sets of parameters, {values:,} values: finite, not negative"
+    return Row(f"model: {Model.model}", check, wrong[0] if wrong else "-", not wrong)
+
+
+def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Iterator[dict[str, Any]]:
+    """Values for every field: each number at each of its ends with the others at their defaults, then all
+    fields drawn at once from ends, middles and choices."""
+    schema = schema_of(Model)
+    defs = schema.get("$defs", {})
+    tag = {"model": Model.model}
+    own = {
+        name: field
+        for name, field in schema["properties"].items()
+        if name not in ("model", "emission", "ambient")
+    }
+    yield tag
+    for name, field in own.items():
+        for value in _ends(field, defs):
+            yield {**tag, name: value}
+    for _ in range(draws):
+        yield {**tag, **{name: _drawn(field, defs, random) for name, field in own.items()}}
+
+
+def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
+    """The values at the ends of a field's range, or every choice."""
+    if "$ref" in field:
+        inner = defs[field["$ref"].rpartition("/")[2]]
+        if "properties" not in inner:
+            return _ends(inner, defs)
+        fixed = {n: f["const"] for n, f in inner["properties"].items() if "const" in f}
+        free = {n: f for n, f in inner["properties"].items() if "const" not in f}
+        return [fixed] + [{**fixed, n: end} for n, f in free.items() for end in _ends(f, defs)]
+    for several in ("anyOf", "oneOf"):
+        if several in field:
+            chosen = field[several] if "discriminator" in field else field[several][:1]
+            return [end for choice in chosen for end in _ends(choice, defs)]
+    if "const" in field:
+        return [field["const"]]
+    if "enum" in field:
+        return list(field["enum"])
+    if field.get("type") == "boolean":
+        return [False, True]
+    if field.get("type") == "array":
+        ends = _ends(field["items"], defs)
+        return [[end] * 3 for end in ends] + [[ends[0], ends[-1], ends[0]]]
+    low = field.get("minimum", field.get("exclusiveMinimum", 0.0))
+    least = np.nextafter(low, np.inf) if "exclusiveMinimum" in field else low
+    high = field["maximum"]
+    return [float(least), float(high)]
+
+
+def _drawn(field: dict[str, Any], defs: dict[str, Any], random: np.random.Generator) -> Any:
+    ends = _ends(field, defs)
+    value = ends[random.integers(len(ends))]
+    if isinstance(value, float) and random.random() < 0.5:
+        low, high = min(ends), min(max(ends), 1e3)
+        return float(
+            random.uniform(low, high) if random.random() < 0.5 else max(low, high * random.random() ** 8)
+        )
+    return value
+
+
+def directions(seed: int, count: int, dtype: Any) -> dict[str, NDArray[Any]]:
+    """Unit n, t, l, v with n.l > 0: general, grazing to 1e-7, mirrored, along the light, below."""
+    random = np.random.default_rng(seed)
+    n = unit(columns(random.normal(size=(count, 3))))
+    t = unit(cross(n, unit(columns(random.normal(size=(count, 3))))))
+    b = cross(n, t)
+
+    def above() -> NDArray[np.float64]:
+        height = 10.0 ** random.choice([-7, -4, -2, 0, 0], count) * random.random(count)
+        turn, level = random.random(count) * 2 * np.pi, np.sqrt(1 - height * height)
+        return columns(
+            height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
+        )
+
+    l, v = above(), above()
+    kind = random.integers(0, 8, count)
+    mirrored = 2 * dot(n, l)[:, None] * n - l
+    for number, other in enumerate((mirrored, l, -l, n, t, v - 2 * dot(n, v)[:, None] * n)):
+        v[kind == number] = other[kind == number]
+    v = columns(unit(v), np.float64)
+    given = {name: columns(x.astype(dtype)) for name, x in {"n": n, "t": t, "l": l, "v": v}.items()}
+    lit = dot(given["n"], given["l"]) > 0
+    return {name: columns(x[lit]) for name, x in given.items()} | {"light": np.array([1, 0.5, 0.25], dtype)}

@@ -1,0 +1,126 @@
+"""What a stress case found, and where its pictures are made and counted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import IllumError, InputError, LimitError
+from illumcli.records import Value
+
+LAYERS = (
+    "beauty", "ambient", "diffuse", "specular", "lights", "shadows", "obscurance", "alpha", "depth",
+    "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
+    "error",
+)  # fmt: skip
+SIGNED = ("P", "N", "Ng", "uv")
+"""Layers whose values may be below 0; all others are light, shares, distances and numbers."""
+
+Channels = dict[str, NDArray[np.float32]]
+
+
+class Row(Value):
+    """One line of the table."""
+
+    case: str
+    check: str
+    worst: str
+    passed: bool
+
+
+class Room:
+    """A folder in which scenes are rendered, and a count of every value that came out of them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.pictures = self.pixels = self.values = self.not_finite = self.negative = 0
+
+    def file(self, name: str, content: bytes) -> str:
+        """Name of a file with this content, as scenes of this room name it."""
+        (self.folder / name).write_bytes(content)
+        return name
+
+    def picture(
+        self, scene: Mapping[str, Any], layers: Sequence[str] = LAYERS, threads: int = 1
+    ) -> tuple[Channels, bytes]:
+        """Every channel of the scene's image, (H, W) float32 each, and the image file's bytes.
+
+        The scene goes the whole way of `illum render`: file, plan, tiles, an EXR in single precision, which
+        is read back.
+
+        Raises
+        ------
+        IllumError
+            What `illum render` would end with.
+        """
+        from illumcli.commands.render import run
+        from illumcli.images.oiio import read_image
+
+        self.pictures += 1
+        outputs = {"layers": list(layers), "colour": "float"}
+        path = self.folder / f"{self.pictures}.yaml"
+        path.write_text(json.dumps({"version": 1, **scene, "outputs": outputs}))
+        image = self.folder / f"{self.pictures}.exr"
+        run(path, pattern=str(image).replace("{", "{{").replace("}", "}}"), threads=threads, cache=False)
+        channels, data = read_image(image).channels, image.read_bytes()
+        image.unlink()
+        self._count(channels)
+        return channels, data
+
+    def bake(self, scene: Mapping[str, Any], rays: int) -> NDArray[np.float32]:
+        """Obscurance baked at every vertex of the scene, one object after the other.
+
+        Raises
+        ------
+        IllumError
+            What `illum ao-bake` would end with.
+        """
+        from illumcli.baking.bake import Settings, run
+        from illumcli.files.vertex_data import read_npz
+
+        path, baked = self.folder / "bake.yaml", self.folder / "bake.npz"
+        path.write_text(json.dumps({"version": 1, **scene}))
+        run(path, [baked], Settings(samples=rays), threads=1, force=True)
+        w = read_npz(baked).obscurance
+        self.values += w.size
+        self.not_finite += int(np.count_nonzero(~np.isfinite(w)))
+        return w
+
+    def _count(self, channels: Channels) -> None:
+        self.pixels += next(iter(channels.values())).size
+        for name, values in channels.items():
+            self.values += values.size
+            self.not_finite += int(np.count_nonzero(~np.isfinite(values)))
+            if name.rpartition(".")[0] not in SIGNED:
+                self.negative += int(np.count_nonzero(values < 0))
+
+
+def faults(channels: Channels) -> list[str]:
+    """What no picture may have: values not finite, light, shares or distances below 0, shares above 1."""
+    found = []
+    for name, values in channels.items():
+        signed = name.rpartition(".")[0] in SIGNED
+        share = name == "A" or name.startswith(("obscurance", "shadow."))
+        for fact, wrong in (
+            ("not finite", ~np.isfinite(values)),
+            ("below 0", np.zeros(1, bool) if signed else values < 0),
+            ("above 1", values > 1 if share else np.zeros(1, bool)),
+        ):
+            if wrong.any():
+                found.append(f"{name} {fact} in {np.count_nonzero(wrong)} pixels")
+    return found
+
+
+def refusal(error: IllumError) -> str:
+    """The first line of a refusal, and its exit code."""
+    return f"exit {error.exit_code}: {str(error).splitlines()[0]}"
+
+
+def is_refusal(error: IllumError) -> bool:
+    """Was the input refused, before anything was rendered?"""
+    return isinstance(error, InputError | LimitError)

@@ -1,0 +1,123 @@
+"""Size and place: the same scene at any scale, anywhere, gives the same picture."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from illumcli.stress.outcome import Channels, Room, Row
+from illumcli.stress.scenes import Scene, scaled, scene
+
+SCALES = (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
+DISTANCES = (0.0, 1e2, 1e4, 1e6)
+"""In radii from the origin, along a diagonal."""
+LAYERS = ("beauty", "obscurance", "alpha")
+RAYS = 16
+BEYOND = 1e-3
+"""Share of pixels that may differ: their rays pass edges by less than a rounding of the vertices."""
+
+
+def rows(room: Room, quick: bool) -> list[Row]:
+    """The matrix of sizes and distances, powers of two, and bodies that nothing can shade."""
+    pairs = list(product(SCALES, DISTANCES))
+    chosen = pairs[:: 5 if quick else 1]
+    film = {"width": 32, "height": 24, "samples": 1} if quick else {"width": 96, "height": 72, "samples": 1}
+    return [
+        _matrix(room, chosen, film),
+        _baked(room, chosen),
+        _powers_of_two(room, (-20, 7) if quick else range(-20, 21, 4), film),
+        *_convex(room, chosen, film),
+    ]
+
+
+def _matrix(room: Room, pairs: list[tuple[float, float]], film: Scene) -> Row:
+    reference = _view(room, 1.0, 0.0, film)
+    most, where = 0.0, (1.0, 0.0)
+    for size, distance in pairs:
+        share = _beyond(reference, _view(room, size, distance, film))
+        if share > most:
+            most, where = share, (size, distance)
+    check = f"{len(pairs)} pairs of size and distance: |dw| <= 1/{RAYS}, light within 1e-4 of the brightest"
+    worst = (
+        f"{most:.2%} of pixels differ, size {where[0]:g} at {where[1]:g} radii"
+        if most
+        else "no pixel differs"
+    )
+    return Row("size and distance", check, worst, most <= BEYOND)
+
+
+def _view(room: Room, size: float, distance: float, film: Scene) -> Channels:
+    said = {**_there(size, distance), "film": film, "obscurance": {"samples": RAYS}}
+    return room.picture(said, LAYERS)[0]
+
+
+def _baked(room: Room, pairs: list[tuple[float, float]]) -> Row:
+    reference = room.bake(_there(1.0, 0.0), RAYS)
+    most, where = 0.0, (1.0, 0.0)
+    for size, distance in pairs:
+        off = float(np.abs(room.bake(_there(size, distance), RAYS) - reference).max())
+        if off > most:
+            most, where = off, (size, distance)
+    check = f"{len(pairs)} pairs of size and distance: |dw| <= 1/{RAYS} at every vertex"
+    worst = f"|dw| {most:.3g} at most, of {len(reference)} vertices"
+    if most:
+        worst += f", size {where[0]:g} at {where[1]:g} radii"
+    return Row("size and distance, baked", check, worst, bool(most <= 1.01 / RAYS and reference.min() < 0.9))
+
+
+def _there(size: float, distance: float) -> Scene:
+    """Ball and floor of a size, so many radii from the origin; the scene's radius is about 5."""
+    return scaled(size, *(5 * size * distance,) * 3)
+
+
+def _beyond(a: Channels, b: Channels) -> float:
+    """Share of pixels that differ by more than rounding."""
+    wrong = np.abs(a["obscurance.Y"] - b["obscurance.Y"]) > 1.01 / RAYS
+    for name in "RGB":
+        wrong |= np.abs(a[name] - b[name]) > 1e-4 * a[name].max()
+    return float(wrong.mean())
+
+
+def _powers_of_two(room: Room, exponents: range | tuple[int, ...], film: Scene) -> Row:
+    reference = _view(room, 1.0, 0.0, film)
+    different = 0
+    for exponent in exponents:
+        other = _view(room, 2.0**exponent, 0.0, film)
+        different += sum(
+            int(np.count_nonzero(reference[name] != other[name])) for name in ("A", "obscurance.Y")
+        )
+    check = "scaled by powers of two, w and coverage are the same bits"
+    return Row("powers of two", check, f"{different} values differ", different == 0)
+
+
+BODIES: dict[str, Scene] = {
+    "plane": {"mesh": {"shape": "plane", "size": [2, 2]}},
+    "box": {"mesh": {"shape": "box"}},
+    "ball": {"mesh": {"shape": "sphere", "segments": 80, "rings": 40}},
+    "needle 1000:1": {"mesh": {"shape": "sphere"}, "transform": {"scale": [1, 1e-3, 1e-3]}},
+    "cone": {"mesh": {"shape": "cone"}},
+}
+
+
+def _convex(room: Room, pairs: list[tuple[float, float]], film: Scene) -> list[Row]:
+    """Bodies without hollows: w is 1 exactly, at any size and distance."""
+    found = []
+    for name, body in BODIES.items():
+        pixels = shaded = 0
+        for size, distance in pairs:
+            away = size * distance
+            own = body.get("transform", {}).get("scale", [1, 1, 1])
+            placed = {**body, "transform": {"scale": [size * s for s in own], "translate": [away] * 3}}
+            camera = {
+                "position": [away + 0.9 * size, away + 0.7 * size, away + 4 * size], "target": [away] * 3,
+                "fov": 1 if "needle" in name else 35,
+            }  # fmt: skip
+            said = scene(placed, lights=[], camera=camera, film=film, obscurance={"samples": 64})
+            channels, _ = room.picture(said, ("obscurance", "alpha"))
+            seen = channels["A"] == 1
+            pixels += int(np.count_nonzero(seen))
+            shaded += int(np.count_nonzero(channels["obscurance.Y"][seen] != 1))
+        check = f"w = 1 exactly, {len(pairs)} sizes and distances"
+        found.append(Row(f"open: {name}", check, f"{shaded} of {pixels} pixels", shaded == 0 < pixels))
+    return found

@@ -1,0 +1,167 @@
+"""Evaluators of the illumination models: the classes that scenes use, on the terms the renderer forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Lanes, Vectors, dot, rows
+from illumcli.models._base import IlluminationModel
+from illumcli.models.ashikhmin_shirley import AshikhminShirley
+from illumcli.models.kajiya_kay import KajiyaKay
+from illumcli.models.oren_nayar import OrenNayar, oren_nayar_terms
+from illumcli.models.poulin_fournier import PoulinFournier
+from illumcli.models.strauss import Strauss, strauss_fresnel, strauss_geometry, strauss_specular
+from illumcli.models.ward import Ward
+from illumcli.shading import terms
+from illumcli.shading.terms import evaluate
+from illumcli.verification.inputs import Inputs
+
+
+def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) -> Vectors:
+    """(N, 3) all lobes of the model; 0 on lanes that face away from the light, which never reach a model.
+
+    Parameters
+    ----------
+    more : (N, 3) or (3,)
+        Further words of the model: `v`, `t`, and `light`, the light's colour.
+    """
+    out = np.zeros_like(l)
+    lit = np.flatnonzero(dot(n, l) > 0)
+    if lit.size:
+        given = {"n": n, "l": l, **more}
+        given = {name: value if value.ndim == 1 else rows(value, lit) for name, value in given.items()}
+        out[lit] = sum(evaluate(model.lobes(), given).values())
+    return out
+
+
+def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Lanes:
+    """(1,) f_r = response / n.l of a grey model; 0 where light or eye are below the horizon."""
+    n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
+    n_l = dot(n, l)
+    if not (n_l[0] > 0 and dot(n, v)[0] > 0):
+        return np.zeros_like(n_l)
+    return response(model, n=n, l=l, v=v, **more)[:, 0] / n_l
+
+
+def facing(inputs: Inputs) -> bool:
+    """Whether light and eye are both above the horizon."""
+    n = inputs.unit("n")
+    return bool(dot(n, inputs.unit("l"))[0] > 0 and dot(n, inputs.unit("v"))[0] > 0)
+
+
+def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
+    """Terms of the renderer by name, from the case's n, l and v and `more` words."""
+    buffers: dict[str, Any] = {key: inputs.unit(key) for key in ("n", "l", "v")} | more
+    for recipe in terms.steps(names, tuple(buffers)):
+        buffers[recipe.makes] = recipe.make(buffers)
+    return [buffers[name] for name in names]
+
+
+def oren_nayar_full(inputs: Inputs) -> Lanes:
+    return brdf(OrenNayar(diffuse=inputs.color("albedo"), sigma=inputs.number("sigma")), inputs)
+
+
+def oren_nayar_ab(inputs: Inputs) -> Lanes:
+    model = OrenNayar(diffuse=inputs.color("albedo"), sigma=inputs.number("sigma"), form="qualitative")
+    return brdf(model, inputs)
+
+
+def oren_nayar_bounces(inputs: Inputs) -> Lanes:
+    """[f1, f2] as parts of f_r, not clamped."""
+    if not facing(inputs):
+        return np.zeros(2, inputs.dtype)
+    n_l, n_v, sin_l, sin_v, cos_phi = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "cos_phi")
+    one, two = oren_nayar_terms(n_l, n_v, sin_l, sin_v, cos_phi, inputs.lanes("sigma"))
+    rho = inputs.lanes("albedo")
+    return np.concatenate([one * rho, two * rho * rho]) / np.pi
+
+
+def strauss(inputs: Inputs) -> Vectors:
+    """Light times response plus ambient light times what reflects it."""
+    model = Strauss(color=inputs.color("color"), **strauss_parameters(inputs))
+    light, ambient = (np.asarray(inputs.color(key), inputs.dtype) for key in ("light", "ambient"))
+    out = ambient * np.asarray(model.ambient_color(), inputs.dtype)
+    if facing(inputs):
+        out += light * response(model, **{key: inputs.unit(key) for key in ("n", "l", "v")})[0]
+    return out
+
+
+def strauss_terms(inputs: Inputs) -> NDArray[Any]:
+    """[r_d, r_n, F, G_i, G_r, r_j, r_s]."""
+    white = Strauss(color=(1.0, 1.0, 1.0), **strauss_parameters(inputs))
+    s, t = inputs.lanes("smoothness"), inputs.lanes("transparency")
+    kj, kf, kg = (inputs.lanes(key) for key in ("kj", "kf", "kg"))
+    n_l, n_v, sin_l, sin_v, gap_rv = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "gap_rv")
+    specular = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, kj, kf, kg)
+    r_d = np.asarray(white.diffuse_color(), inputs.dtype)[:1]
+    return np.concatenate([r_d, (1 - t) * s**3, *specular])
+
+
+def strauss_parameters(inputs: Inputs) -> dict[str, Any]:
+    """The case's smoothness, metalness, transparency and constants."""
+    return {k: inputs.number(k) for k in ("smoothness", "metalness", "transparency", "kj", "kf", "kg")}
+
+
+def fresnel_of_strauss(inputs: Inputs) -> Lanes:
+    return strauss_fresnel(inputs.lanes("x"), inputs.lanes("kf"))
+
+
+def geometry_of_strauss(inputs: Inputs) -> Lanes:
+    return strauss_geometry(1 - inputs.lanes("x"), inputs.lanes("kg"))
+
+
+def ward(inputs: Inputs) -> Lanes:
+    model = Ward(
+        diffuse=inputs.color("rho_d"),
+        specular=inputs.color("rho_s"),
+        alpha_x=inputs.number("ax"),
+        alpha_y=inputs.number("ay"),
+    )
+    return brdf(model, inputs, t=inputs.tangent())
+
+
+def ashikhmin_shirley(inputs: Inputs) -> Lanes:
+    model = AshikhminShirley(
+        diffuse=inputs.color("Rd"),
+        specular=inputs.color("Rs"),
+        exponent_u=inputs.number("nu"),
+        exponent_v=inputs.number("nv"),
+    )
+    return brdf(model, inputs, t=inputs.tangent())
+
+
+def kajiya_kay(inputs: Inputs) -> Lanes:
+    """A strand on its own: no surface hides the light, so the lobes are asked directly."""
+    model = KajiyaKay(
+        diffuse=inputs.color("kd"), specular=inputs.color("ks"), exponent=inputs.number("exponent")
+    )
+    values = evaluate(model.lobes(), {key: inputs.unit(key) for key in ("t", "l", "v")})
+    return np.asarray(sum(values.values(), np.zeros((1, 3), inputs.dtype)))[:, 0]
+
+
+def aniso_cylinder(inputs: Inputs) -> Lanes:
+    model = PoulinFournier(
+        diffuse=inputs.color("kd"),
+        specular=inputs.color("ks"),
+        exponent=inputs.number("exponent"),
+        slope=inputs.number("theta_s"),
+    )
+    return brdf(model, inputs, t=inputs.tangent())
+
+
+CASES = {
+    "oren_nayar_full": oren_nayar_full,
+    "oren_nayar_ab": oren_nayar_ab,
+    "oren_nayar_terms": oren_nayar_bounces,
+    "strauss": strauss,
+    "strauss_terms": strauss_terms,
+    "strauss_fresnel": fresnel_of_strauss,
+    "strauss_geometry": geometry_of_strauss,
+    "ward": ward,
+    "ashikhmin_shirley": ashikhmin_shirley,
+    "kajiya_kay": kajiya_kay,
+    "aniso_cylinder": aniso_cylinder,
+}

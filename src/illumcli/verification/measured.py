@@ -1,0 +1,39 @@
+"""Evaluators of measured BRDFs: half and difference angles, and cells of the table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Lanes
+from illumcli.models import merl
+from illumcli.verification.inputs import Inputs
+from illumcli.verification.lobes import formed
+
+
+def rusinkiewicz(inputs: Inputs) -> Lanes:
+    """[theta_h, phi_h, theta_d, phi_d] about the tangent."""
+    theta_h, theta_d, phi_d = angles(inputs)
+    t_s, b_s = formed(inputs, "t_s", "b_s", t=inputs.tangent())
+    return np.concatenate([theta_h, np.arctan2(b_s, t_s), theta_d, phi_d])
+
+
+def rusinkiewicz_theta(inputs: Inputs) -> Lanes:
+    """[theta_h, theta_d], which are defined where the azimuths are not."""
+    return np.concatenate(angles(inputs)[:2])
+
+
+def angles(inputs: Inputs) -> tuple[Lanes, Lanes, Lanes]:
+    """theta_h, theta_d and phi_d, as the model looks them up."""
+    nxs, n_s, n, l, v, s_s = formed(inputs, "nxs", "n_s", "n", "l", "v", "s_s")
+    return merl.rusinkiewicz(nxs, n_s, n, l, v, s_s)
+
+
+def merl_index(inputs: Inputs) -> NDArray[Any]:
+    """Cell numbers along theta_h, theta_d, phi_d, and in the whole table."""
+    return np.concatenate(merl.merl_index(*(inputs.lanes(key) for key in ("theta_h", "theta_d", "phi_d"))))
+
+
+CASES = {f.__name__: f for f in (rusinkiewicz, rusinkiewicz_theta, merl_index)}

@@ -1,0 +1,125 @@
+"""Evaluators of Cook-Torrance and its terms: Fresnel, distributions, masking, the shift of colour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Lanes, dot
+from illumcli.models import _fresnel, _microfacet
+from illumcli.models.cook_torrance import CookTorrance
+from illumcli.shading import terms
+from illumcli.verification.inputs import Inputs
+from illumcli.verification.lobes import brdf
+
+PI = float(np.pi)
+
+Facets = tuple[_microfacet.Distribution, bool, float]
+"""A distribution, whether with its printed constants, and what multiple of it the case's D is."""
+
+DISTRIBUTIONS: dict[str, Callable[[Inputs], Facets]] = {
+    "gaussian": lambda d: (_microfacet.Gaussian(m=d.number("m"), c=d.number("c")), False, 1),
+    "beckmann": lambda d: (_microfacet.Beckmann(m=d.number("m")), False, 1),
+    "beckmann_ct1982": lambda d: (_microfacet.Beckmann(m=d.number("m")), True, 1),
+    "beckmann_quarter": lambda d: (_microfacet.Beckmann(m=d.number("m")), True, 1 / 4),
+    "blinn": lambda d: (_microfacet.Blinn(beta=d.number("beta")), True, 1),
+    "blinn_normalised": lambda d: (_microfacet.PowerCosine(exponent=d.number("exponent")), False, 1),
+    "torrance_sparrow": lambda d: (_microfacet.TorranceSparrow(beta=d.number("beta")), True, 1),
+    "trowbridge_reitz": lambda d: (_microfacet.TrowbridgeReitz(beta=d.number("beta")), True, 1),
+    "ggx": lambda d: (_microfacet.GGX(alpha=d.number("alpha")), False, 1),
+}
+REFLECTANCES: dict[str, Callable[[Inputs], _fresnel.Fresnel]] = {
+    "dielectric": lambda f: _fresnel.Dielectric(ior=f.number("eta")),
+    "conductor": lambda f: _fresnel.Conductor(n=f.color("eta"), k=f.color("k")),
+    "schlick": lambda f: _fresnel.Schlick(f0=f.color("f0")),
+    "one": lambda f: _fresnel.Constant(value=(1.0, 1.0, 1.0)),
+}
+UNDER_DGF = {"microfacet_4": 4.0, "printed_pi": PI}
+"""What n.l n.v is multiplied by under D G F."""
+
+
+def ndf(inputs: Inputs) -> Lanes:
+    n, h, d = inputs.unit("n"), inputs.unit("h"), inputs.part("D")
+    if not dot(n, h)[0] > 0:
+        return np.zeros(1, inputs.dtype)
+    n_s, length2 = terms.n_s(n, h), terms.s_s(h)
+    cosine, sin2 = terms.n_h(n_s, length2), terms.sin2_h(terms.nxs(n, h), n_s, length2)
+    if d.value("kind") == "beckmann_slope1d":
+        return _microfacet.beckmann_slope1d(cosine, sin2, d.lanes("m"))
+    distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
+    return share * distribution.density(cosine, sin2, printed)
+
+
+def geometry_vgroove(inputs: Inputs) -> Lanes:
+    n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
+    if not (dot(n, l)[0] > 0 and dot(n, v)[0] > 0):
+        return np.zeros(1, inputs.dtype)
+    return _microfacet.vgroove(terms.n_l(n, l), terms.n_v(n, v), terms.s_s(terms.s(l, v)))
+
+
+def cook_torrance(inputs: Inputs) -> Lanes:
+    """f_r of the model; where a case joins a D and a constant that no scene can, by their ratio."""
+    d, f = inputs.part("D"), inputs.part("F")
+    distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
+    share *= UNDER_DGF["printed_pi" if printed else "microfacet_4"] / inputs.choose("convention", UNDER_DGF)
+    diffuse = CookTorrance(
+        diffuse=inputs.color("albedo"), diffuse_weight=inputs.number("kd"), specular_weight=0.0
+    )
+    specular = CookTorrance(
+        diffuse_weight=0.0,
+        specular_weight=inputs.number("ks"),
+        distribution=distribution,
+        fresnel=f.choose("kind", REFLECTANCES)(f),
+        convention="printed" if printed else "microfacet",
+    )
+    return brdf(diffuse, inputs) + share * brdf(specular, inputs)
+
+
+def fresnel_dielectric(inputs: Inputs) -> Lanes:
+    return _fresnel.dielectric(inputs.lanes("cos"), inputs.lanes("eta"))
+
+
+def fresnel_conductor(inputs: Inputs) -> Lanes:
+    return _fresnel.conductor(inputs.lanes("cos"), inputs.lanes("eta"), inputs.lanes("k"))
+
+
+def fresnel_schlick(inputs: Inputs) -> Lanes:
+    return _fresnel.schlick(inputs.lanes("cos"), inputs.lanes("f0"))
+
+
+def fresnel_sin_tan(inputs: Inputs) -> Lanes:
+    """The form by angles: the dielectric at c = cos(phi)."""
+    return _fresnel.dielectric(np.cos(inputs.lanes("phi")), inputs.lanes("mu"))
+
+
+def eta_from_f0(inputs: Inputs) -> Lanes:
+    return _fresnel.eta_from_f0(inputs.lanes("f0"))
+
+
+def f0_from_eta(inputs: Inputs) -> Lanes:
+    return _fresnel.f0_from_eta(inputs.lanes("eta"), inputs.lanes("k"))
+
+
+def ct_color_shift(inputs: Inputs) -> NDArray[Any]:
+    color0, color90 = (np.asarray(inputs.color(key), inputs.dtype) for key in ("color0", "color90"))
+    return _fresnel.color_shift(inputs.lanes("cos"), inputs.lanes("eta"), color0, color90)
+
+
+CASES = {
+    f.__name__: f
+    for f in (
+        ndf,
+        geometry_vgroove,
+        cook_torrance,
+        fresnel_dielectric,
+        fresnel_conductor,
+        fresnel_schlick,
+        fresnel_sin_tan,
+        eta_from_f0,
+        f0_from_eta,
+        ct_color_shift,
+    )
+}

@@ -1,0 +1,83 @@
+"""Evaluators of the obscurance cases: the falloff itself, and closed forms against the Monte Carlo estimator.
+
+A closed form is built as real geometry and estimated at its receiver by the same code that shades pixels. The
+estimate answers to its own standard error, from independent turns of the sampling pattern.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from illumcli.arrays import F, Lanes, columns
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.scene_geometry import place
+from illumcli.rays.embree import tracer
+from illumcli.rays.offsets import lifted
+from illumcli.rays.sampling import hashed, stream, unit_interval
+from illumcli.verification.inputs import Inputs
+from illumcli.verification.outcome import Estimate
+from illumcli.verification.surroundings import Surroundings, surroundings
+from illumcli.visibility.falloffs._base import Falloff
+from illumcli.visibility.falloffs.exponential import Exponential
+from illumcli.visibility.falloffs.step import Step
+from illumcli.visibility.obscurance import obscurance
+
+PATTERNS = 128
+RAYS = 256  # per pattern
+RESOLUTION = 1 / (64 * RAYS)
+"""No estimate is taken to be better than this: the 16 phases of a pattern resolve r^2 to 1 / (32 RAYS)."""
+
+
+def exponential(inputs: Inputs) -> Exponential:
+    """mu of a case, with or without a range limit."""
+    return Exponential(
+        falloff="exponential", tau=inputs.number("tau"), max_distance=inputs.number_or_none("d_max")
+    )
+
+
+def mu(inputs: Inputs) -> Lanes:
+    falloff = exponential(inputs)
+    return falloff.weight(inputs.lanes("x"), falloff.reach(1.0), 1.0)
+
+
+def ao_visible(inputs: Inputs) -> Estimate:
+    """Every hit blocks."""
+    return estimate(surroundings(inputs), Step(), inputs.id)
+
+
+def ao_dmax(inputs: Inputs) -> Estimate:
+    """Hits nearer than d_max block."""
+    return estimate(surroundings(inputs), Step(max_distance=inputs.number("d_max")), inputs.id)
+
+
+def obscured(inputs: Inputs) -> Estimate:
+    """Hits weigh by their distance."""
+    return estimate(surroundings(inputs), exponential(inputs), inputs.id)
+
+
+def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
+    """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
+    world = place([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
+    ng = columns(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
+    here = np.tile(world.frame.inward(np.zeros(3)), (PATTERNS, 1))
+    corners = around.vertices[around.triangles[0]]
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius
+    origins = lifted(here, ng, np.full(PATTERNS, edge))
+    number = np.arange(PATTERNS, dtype=np.uint32)
+    draws = np.stack(
+        [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
+    )
+    core = tracer(world.vertices, world.triangles)
+    w = obscurance(core, origins, ng, draws, RAYS, falloff, world.frame.radius).astype(np.float64)
+    spread = float(w.std(ddof=1)) / np.sqrt(PATTERNS)
+    return Estimate(float(w.mean()), float(np.hypot(spread, RESOLUTION)))
+
+
+CAST: dict[str, Callable[[Inputs], Estimate]] = {
+    "ao_visible": ao_visible,
+    "ao_dmax": ao_dmax,
+    "obscurance": obscured,
+}
+CASES: dict[str, Callable[[Inputs], Lanes | Estimate]] = {"mu": mu, **CAST}

@@ -1,0 +1,75 @@
+"""Evaluators of the radiometry cases: distance laws, photometry law, Lambert, the ambient equation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from illumcli.arrays import Lanes, Vectors, dot
+from illumcli.lights._attenuation import InverseSquare, InverseSquareFlux, Law, Polynomial
+from illumcli.lights.point import Point
+from illumcli.models.lambert import Lambert
+from illumcli.render_space import Frame
+from illumcli.shading.ambient import ambient_light, coupled
+from illumcli.verification.inputs import Inputs
+from illumcli.verification.lobes import brdf, response
+
+WHITE = (1.0, 1.0, 1.0)
+HERE = Frame((0.0, 0.0, 0.0), 1.0)
+
+
+def polynomial(inputs: Inputs) -> Polynomial:
+    """The law 1 / (c1 + c2 d + c3 d^2) of a case."""
+    return Polynomial(law="polynomial", **{key: inputs.number(key) for key in ("c1", "c2", "c3")})
+
+
+def attenuation(inputs: Inputs) -> Lanes:
+    laws: dict[str, Callable[[], Law]] = {
+        "quadratic": lambda: polynomial(inputs),
+        "inverse_square": lambda: InverseSquare(law="inverse_square"),
+        "inverse_4pi_square": lambda: InverseSquareFlux(law="inverse_square_flux"),
+    }
+    return inputs.choose("kind", laws)().factor(inputs.lanes("d"))
+
+
+def photometry_law(inputs: Inputs) -> Lanes:
+    """E = I <n.l> / d^2."""
+    x, y, z = inputs.vectors("light_position")[0]
+    arriving = Point(light="point", position=(float(x), float(y), float(z))).arriving(
+        inputs.vectors("point"), HERE
+    )
+    cosine = np.maximum(dot(inputs.unit("n"), arriving.l), 0)
+    return inputs.lanes("intensity") * arriving.strength * cosine
+
+
+def lambert_brdf(inputs: Inputs) -> Lanes:
+    return brdf(Lambert(diffuse=inputs.color("albedo")), inputs)
+
+
+def lambert_radiance(inputs: Inputs) -> Lanes:
+    """L = albedo / pi * <n.l> * I / d^2."""
+    law = InverseSquare(law="inverse_square")
+    n, l = inputs.unit("n"), inputs.unit("l")
+    model = Lambert(diffuse=inputs.color("albedo"))
+    irradiance = inputs.lanes("intensity") * law.factor(inputs.lanes("distance"))
+    return response(model, n=n, l=l)[:, 0] * irradiance
+
+
+def lighting_12_75(inputs: Inputs) -> Lanes:
+    """Ambient light times obscurance plus direct light: kept apart, or coupled as one text prints it."""
+    n, kd, w = inputs.unit("n"), inputs.lanes("kd"), inputs.lanes("w")
+    ambient = (inputs.lanes("ka") * inputs.lanes("Ia"))[:, None]
+    law = InverseSquare(law="inverse_square")
+    direct = np.zeros_like(kd)
+    for light in inputs.parts("lights"):
+        irradiance = light.lanes("intensity") * law.factor(light.lanes("distance"))
+        direct += light.lanes("delta") * irradiance * np.maximum(dot(n, light.unit("l")), 0)
+    forms: dict[str, Callable[[], Vectors]] = {
+        "corrected": lambda: ambient_light(ambient, WHITE, w) + kd * direct,
+        "printed": lambda: coupled(ambient, WHITE, (kd * direct)[:, None], direct[:, None], w),
+    }
+    return inputs.choose("form", forms)()[:, 0]
+
+
+CASES = {f.__name__: f for f in (attenuation, photometry_law, lambert_brdf, lambert_radiance, lighting_12_75)}

@@ -1,0 +1,189 @@
+"""Reads reference vectors: cases of inputs, expected values and tolerances, from JSON.
+
+A file is a list of objects with the keys ``id, model, inputs, expected, rtol, atol``, besides what is for
+readers (``source, note, quantity``). `model` is the case type. Directions in `inputs` need not have unit
+length. A result x passes when max_i |x_i - e_i| <= atol + rtol * max_i |e_i|.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import lzma
+from collections.abc import Callable, Collection, Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError, LimitError
+from illumcli.records import Record
+from illumcli.schema.families import suggestion
+
+PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
+"""The vectors that come with the package, computed at 50 digits."""
+
+KEYS = ("id", "model", "inputs", "expected", "rtol", "atol")
+SHOWN = 10
+MOST_BYTES = 1 << 28
+"""Of a file once it is unpacked."""
+OPENERS: dict[str, Callable[..., Any]] = {".xz": lzma.open, ".gz": gzip.open}
+
+
+class Case(Record):
+    """One set of inputs and what must come out."""
+
+    id: str
+    type: str
+    inputs: Mapping[str, Any]
+    expected: NDArray[np.float64]  # (k,)
+    rtol: float
+    atol: float
+
+    @property
+    def scale(self) -> float:
+        """max |e_i|, what relative errors are relative to; 1 where nothing but 0 is expected."""
+        return float(np.abs(self.expected).max()) or 1.0
+
+    @property
+    def allowed(self) -> float:
+        """The largest deviation that passes."""
+        return self.atol + self.rtol * float(np.abs(self.expected).max())
+
+
+def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -> list[Case]:
+    """The cases of a vectors file (`.json`, also as `.xz` or `.gz`), in its order.
+
+    Parameters
+    ----------
+    known : collection of str
+        The case types there is an evaluator for.
+    only : collection of str
+        Keep these types alone; by default all.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a case is malformed, a type is unknown or has no case: all of it at once.
+    """
+    table = sorted(known)
+    strange = [
+        f"--only {name}: no such case type; {suggestion(name, tuple(table))}"
+        for name in only
+        if name not in known
+    ]
+    if strange:
+        raise InputError(strange)
+    entries = _entries(path)
+    problems: list[str] = []
+    cases = [
+        case for number, entry in enumerate(entries, 1) if (case := _case(path, number, entry, problems))
+    ]
+    if only:
+        cases = [case for case in cases if case.type in only]
+    problems += _unknown(path, cases, table)
+    missing = set(only) - {case.type for case in cases}
+    problems += [f"{path}: holds no case of type '{name}'" for name in sorted(missing) if not problems]
+    if not entries:
+        problems.append(f"{path}: holds no case")
+    if problems:
+        raise InputError(_shortened(path, problems))
+    return cases
+
+
+def _entries(path: Path) -> list[Any]:
+    try:
+        with OPENERS.get(path.suffix, open)(path, "rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise LimitError(f"{path}: more than {MOST_BYTES >> 20} MiB of text; check its cases in parts")
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    except (OSError, EOFError, lzma.LZMAError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    try:
+        entries = json.loads(text, parse_constant=_refused)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}:{error.lineno}:{error.colno}: is not JSON: {error.msg}") from None
+    except _NotFiniteError as error:
+        raise InputError(f"{path}: holds {error}, which is not a number of JSON") from None
+    if not isinstance(entries, list):
+        raise InputError(f"{path}: must be a list of cases, is {_kind(entries)}")
+    return entries
+
+
+class _NotFiniteError(ValueError):
+    """NaN or Infinity in the text."""
+
+
+def _refused(word: str) -> float:
+    raise _NotFiniteError(word)
+
+
+def _case(path: Path, number: int, entry: Any, problems: list[str]) -> Case | None:
+    """The case of one entry; None after adding what is wrong with it to `problems`."""
+    place = f"{path}: case {number}"
+    if not isinstance(entry, dict):
+        problems.append(f"{place}: must be an object, is {_kind(entry)}")
+        return None
+    if isinstance(entry.get("id"), str):
+        place += f" ({entry['id']})"
+    missing = [key for key in KEYS if key not in entry]
+    if missing:
+        problems.append(f"{place}: lacks {', '.join(missing)}")
+        return None
+    values = entry["expected"] if isinstance(entry["expected"], list) else [entry["expected"]]
+    wrong = [
+        f"{place}: {key}: must be {kind}, is {_kind(entry[key])}"
+        for key, kind, good in (
+            ("id", "text", isinstance(entry["id"], str)),
+            ("model", "text", isinstance(entry["model"], str)),
+            ("inputs", "an object", isinstance(entry["inputs"], dict)),
+            ("expected", "a number or a list of numbers", bool(values) and all(map(_is_number, values))),
+            ("rtol", "a number of at least 0", _is_number(entry["rtol"]) and entry["rtol"] >= 0),
+            ("atol", "a number of at least 0", _is_number(entry["atol"]) and entry["atol"] >= 0),
+        )
+        if not good
+    ]
+    if wrong:
+        problems.extend(wrong)
+        return None
+    expected = np.array(values, np.float64)
+    return Case(
+        entry["id"], entry["model"], entry["inputs"], expected, float(entry["rtol"]), float(entry["atol"])
+    )
+
+
+def _unknown(path: Path, cases: Iterable[Case], known: list[str]) -> list[str]:
+    strange: dict[str, list[str]] = {}
+    for case in cases:
+        if case.type not in known:
+            strange.setdefault(case.type, []).append(case.id)
+    return [
+        f"{path}: no case type '{name}' ({shorten(ids, SHOWN)}); {suggestion(name, tuple(known))}"
+        for name, ids in strange.items()
+    ]
+
+
+def shorten(names: list[str], count: int) -> str:
+    """The first `count` names and how many more there are."""
+    more = f" and {len(names) - count} more" if len(names) > count else ""
+    return ", ".join(names[:count]) + more
+
+
+def _shortened(path: Path, problems: list[str]) -> list[str]:
+    if len(problems) <= SHOWN:
+        return problems
+    return [*problems[:SHOWN], f"{path}: {len(problems) - SHOWN} more problems"]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _kind(value: Any) -> str:
+    names = {dict: "an object", list: "a list", str: f"the text '{value}'", type(None): "null"}
+    return names.get(type(value), str(value))

@@ -1,0 +1,536 @@
+"""`illum ao-bake`: values, errors, order, files, resumption."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from plyfile import PlyData, PlyElement
+
+from illumcli.baking.bake import Settings, run
+from illumcli.baking.sampling import Caster
+from illumcli.cli import illum
+from illumcli.errors import InputError, OutputError
+from illumcli.files.vertex_data import read_npz
+from illumcli.geometry.normals import corner_normals
+from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.gltf.document import open_document
+from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.schedule import plan
+from illumcli.scene.load import load
+
+CUBE = """
+v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6
+"""
+STEP = """
+v -1 0 -3\nv 1 0 -3\nv 1 0 0\nv -1 0 0\nv 1 1 0\nv -1 1 0\nv 9 9 9
+f 4 3 2 1\nf 4 6 5 3
+"""
+
+
+def bake(path, *outs, **settings):
+    force = settings.pop("force", False)
+    return run(path, list(outs), Settings(**settings), threads=2, force=force)
+
+
+def wavy(tmp_path, side=24):
+    """A wavy sheet in a .ply with a property of its own, and one vertex that no face uses."""
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side)))
+    z = 0.3 * np.sin(5 * x) * np.cos(4 * y)
+    table = np.zeros(side * side + 1, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("mark", "i4")])
+    for name, values in zip("xyz", (x, y, z), strict=True):
+        table[name][:-1] = values
+    table["mark"] = np.arange(len(table))
+    i, j = (g.ravel() for g in np.meshgrid(np.arange(side - 1), np.arange(side - 1), indexing="ij"))
+    a = i * side + j
+    quads = np.stack([a, a + 1, a + side + 1, a + side], axis=1).astype(np.int32)
+    faces = np.empty(len(quads), [("vertex_indices", "i4", (4,))])
+    faces["vertex_indices"] = quads
+    path = tmp_path / "wavy.ply"
+    PlyData(
+        [PlyElement.describe(table, "vertex"), PlyElement.describe(faces, "face")], comments=["mine"]
+    ).write(str(path))
+    return path
+
+
+@pytest.fixture
+def text_mesh(tmp_path):
+    def make(text, name="mesh.obj"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return make
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("away", [0.0, 1.0, 1e3, 1e6])
+def test_a_convex_mesh_is_open_exactly_and_casts_no_ray(text_mesh, tmp_path, scale, away):
+    corners = np.array([line.split()[1:] for line in CUBE.split("\n") if line.startswith("v")], float)
+    moved = corners * scale + away * scale * 3**0.5 * np.array([1, -1, 0.5])
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
+    path = text_mesh("\n".join(lines + [line for line in CUBE.split("\n") if line.startswith("f")]))
+    _, report = bake(path, tmp_path / "out.npz")
+    baked = read_npz(tmp_path / "out.npz")
+    assert (baked.obscurance == 1).all()
+    assert (baked.standard_error == 0).all()
+    assert report.open == 24  # three normals a vertex: its edges are sharp
+    assert sum(report.rays.values()) == 0
+
+
+def test_values_keep_the_order_and_unused_vertices_are_open(text_mesh, tmp_path):
+    _, report = bake(text_mesh(STEP), tmp_path / "out.npz", samples=1024)
+    w = read_npz(tmp_path / "out.npz").obscurance
+    assert len(w) == 7
+    assert report.unreferenced == 1
+    assert w[6] == 1
+    assert w[0] > 0.9  # far from the wall
+    assert (w[:2] > w[2:4]).all()  # at the foot of the wall
+
+
+def test_the_stated_error_is_true(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "truth.npz", samples=16384, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    covered = []
+    for seed in range(6):
+        _, report = bake(path, tmp_path / f"{seed}.npz", samples=64, seed=seed)
+        found = read_npz(tmp_path / f"{seed}.npz")
+        cast = found.standard_error > 0
+        off = found.obscurance - truth
+        covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
+        assert 0.8 < np.sqrt(np.mean(off**2)) / report.rmse < 1.25
+    assert 0.93 < np.mean(covered) < 0.97
+
+
+def test_a_target_error_is_reached_without_bias(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "truth.npz", samples=16384, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    off = []
+    for seed in range(4):
+        _, report = bake(path, tmp_path / f"{seed}.npz", target_error=0.01, seed=seed)
+        off.append(read_npz(tmp_path / f"{seed}.npz").obscurance - truth)
+        assert report.rmse <= 0.01
+        assert len(report.samples) > 1
+    off = np.concatenate(off)
+    assert 0.006 < np.sqrt(np.mean(off**2)) <= 0.0105
+    assert abs(off.mean()) < 3 * off.std() / len(off) ** 0.5
+
+
+def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
+    path = wavy(tmp_path)
+    bake(path, tmp_path / "out.ply", channel="g")
+    old, new = PlyData.read(path), PlyData.read(tmp_path / "out.ply")
+    assert new.byte_order == old.byte_order
+    assert "mine" in new.comments
+    for name in ("x", "y", "z", "mark"):
+        assert np.array_equal(new["vertex"][name], old["vertex"][name])
+        assert new["vertex"][name].dtype == old["vertex"][name].dtype
+    assert np.array_equal(np.stack(new["face"]["vertex_indices"]), np.stack(old["face"]["vertex_indices"]))
+    w = new["vertex"]["obscurance"]
+    assert np.array_equal(w, new["vertex"]["quality"])
+    assert np.array_equal(new["vertex"]["green"], np.rint(w * 255).astype(np.uint8))
+    assert (new["vertex"]["red"] == 255).all()
+
+
+NAMED = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+property float normal
+property float uv
+property float color
+property float heat
+property float Heat
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0 255 0 0 0.1 1 4 7 10
+1 0 0 255 0 0 0.2 2 5 8 11
+0 1 0 255 0 0 0.3 3 6 9 12
+3 0 1 2
+"""
+
+
+def test_properties_with_the_names_of_others_keep_their_values(text_mesh, tmp_path):
+    """A file may call a scalar of its own `normal`, `uv` or `color`."""
+    path = text_mesh(NAMED, "named.ply")
+    outs = [tmp_path / "out.ply", tmp_path / "out.glb"]
+    bake(path, *outs, samples=4)
+    table = PlyData.read(outs[0])["vertex"]
+    assert [table[name][2] for name in ("red", "color", "heat", "Heat")] == [255, 6, 9, 12]
+    assert table["normal"].tolist() == pytest.approx([0.1, 0.2, 0.3])
+    found = read_mesh(outs[1]).attributes
+    np.testing.assert_allclose(found["color"], [[1, 0, 0]] * 3, atol=1e-6)
+    scalars = {name: found[name].tolist() for name in ("_NORMAL_", "_UV_", "_COLOR_", "_HEAT", "_HEAT_")}
+    assert scalars.pop("_NORMAL_") == pytest.approx([0.1, 0.2, 0.3])
+    assert scalars == {"_UV_": [1, 2, 3], "_COLOR_": [4, 5, 6], "_HEAT": [7, 8, 9], "_HEAT_": [10, 11, 12]}
+
+
+def test_an_object_called_own_is_no_occluder_by_that_name(text_mesh, tmp_path):
+    path = text_mesh("version: 1\nobjects: [{name: own, mesh: {shape: sphere}}]\n", "own.yaml")
+    with pytest.raises(InputError, match="--occluders own: an object has that name too; give the object"):
+        bake(path, tmp_path / "a.npz", occluders=("own",))
+
+
+def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
+    path = text_mesh(CUBE.replace("v 1 1 1\n", "v 1 1 1 \n") + "v 0 3 0\nf 4 3 9\nf 8 9 7\n")
+    outs = [tmp_path / f"out.{kind}" for kind in ("npz", "ply", "glb")]
+    bake(path, *outs)
+    mesh, baked = read_mesh(path), read_npz(outs[0])
+    ply, glb = (read_mesh(out) for out in outs[1:])
+    for made in (ply, glb):  # copies for the sharp edges of a cube follow in the GLB
+        np.testing.assert_allclose(made.vertices[: len(mesh.vertices)], mesh.vertices, atol=1e-6)
+    assert np.array_equal(np.asarray(ply.attributes["obscurance"], np.float32), baked.obscurance)
+    assert np.array_equal(ply.starts, mesh.starts)
+    assert np.array_equal(ply.corners, mesh.corners)
+    assert len(glb.vertices) > len(mesh.vertices)
+    w = np.asarray(glb.attributes["_OBSCURANCE"], np.float32)[glb.corners]
+    assert set(w.tolist()) == set(baked.corner_obscurance.tolist())
+
+
+def test_a_glb_keeps_all_it_has(text_mesh, tmp_path):
+    bake(text_mesh(STEP), tmp_path / "first.glb", samples=16, channel="r")
+    bake(tmp_path / "first.glb", tmp_path / "second.glb", samples=64)
+    first, second = read_mesh(tmp_path / "first.glb"), read_mesh(tmp_path / "second.glb")
+    assert np.array_equal(first.attributes["color"], second.attributes["color"])
+    assert not np.array_equal(first.attributes["_OBSCURANCE"], second.attributes["_OBSCURANCE"])
+
+
+def test_a_glb_that_is_written_oddly_keeps_all_it_has(text_mesh, tmp_path):
+    bake(text_mesh(STEP), tmp_path / "plain.glb", samples=16)
+    document = open_document(tmp_path / "plain.glb")
+    data = document.chunk
+    document.json["extras"] = {"mine": 1}
+    document.json["asset"]["extras"] = "notes"
+    document.json["buffers"].append({"byteLength": 4, "uri": "data:;base64,AAAA/w=="})
+
+    def write(path):
+        text = b"\xef\xbb\xbf" + json.dumps(document.json).encode() + b"\0\0"
+        chunks = struct.pack("<I", 4) + b"????1234"
+        chunks += struct.pack("<I", len(text)) + b"JSON" + text
+        chunks += (struct.pack("<I", len(data)) + b"BIN\0" + data) if document.chunk else b""
+        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks + b"more")
+        return path
+
+    bake(write(tmp_path / "odd.glb"), tmp_path / "out.glb", samples=16)
+    made = open_document(tmp_path / "out.glb")
+    assert made.json["extras"] == {"mine": 1}
+    assert made.json["buffers"][1] == document.json["buffers"][1]
+    assert "_OBSCURANCE" in made.json["meshes"][0]["primitives"][0]["attributes"]
+    np.testing.assert_array_equal(
+        read_mesh(tmp_path / "out.glb").vertices, read_mesh(tmp_path / "odd.glb").vertices
+    )
+
+    # a GLB whose first buffer is a file of its own is written anew
+    (tmp_path / "data.bin").write_bytes(data)
+    document.json["buffers"][0]["uri"] = "data.bin"
+    document.chunk = None
+    bake(write(tmp_path / "apart.glb"), tmp_path / "anew.glb", samples=16)
+    anew, odd = (read_mesh(tmp_path / f"{name}.glb").vertices for name in ("anew", "odd"))
+    assert "extras" not in open_document(tmp_path / "anew.glb").json
+    np.testing.assert_allclose(anew[: len(odd)], odd)  # copies for the edge, which is sharp, follow
+
+
+def test_copies_of_a_vertex_with_one_normal_get_the_same_value(tmp_path):
+    mesh = read_mesh(wavy(tmp_path))
+    triangles = mesh.corners.reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].ravel()
+    made = corner_normals(mesh)
+    normals = np.zeros_like(mesh.vertices)
+    normals[mesh.corners] = made.normals[made.index]
+    points = mesh.vertices[triangles]
+    lines = ["v {!r} {!r} {!r}".format(*p) for p in points.tolist()]
+    lines += ["vn {:.7g} {:.7g} {:.7g}".format(*n) for n in normals[triangles].tolist()]
+    loose = tmp_path / "loose.obj"
+    faces = [" ".join(f"{i + k}//{i + k}" for k in (1, 2, 3)) for i in range(0, len(points), 3)]
+    loose.write_text("\n".join(lines + [f"f {face}" for face in faces]))
+    _, report = bake(loose, tmp_path / "loose.npz")
+    w = read_npz(tmp_path / "loose.npz").obscurance
+    _, place = np.unique(points, axis=0, return_inverse=True)
+    assert report.copies == len(points) - place.max() - 1
+    for k in range(place.max() + 1):
+        assert np.ptp(w[place.ravel() == k]) == 0
+
+
+def test_back_faces_do_as_told(text_mesh, tmp_path):
+    # a floor under a lid that shows its back
+    path = text_mesh("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -9 .5 -9\nv 9 .5 -9\nv 9 .5 9\nv -9 .5 9\n"
+                     "f 4 3 2 1\nf 8 7 6 5\n")  # fmt: skip
+    found = {}
+    for faces in ("count", "ignore", "one_sided"):
+        bake(path, tmp_path / f"{faces}.npz", faces=faces)
+        found[faces] = read_npz(tmp_path / f"{faces}.npz").obscurance[:4]
+    assert (found["count"] < 0.1).all()
+    assert (found["ignore"] == 1).all()
+    assert (found["one_sided"] == 1).all()
+
+
+def test_a_ground_closes_what_stands_on_it(text_mesh, tmp_path):
+    bake(text_mesh(CUBE), tmp_path / "out.npz", ground="y", samples=1024)
+    w = read_npz(tmp_path / "out.npz").obscurance
+    low = np.array([1, 1, 0, 0, 1, 1, 0, 0], bool)
+    assert (w[low] < 0.4).all()
+    np.testing.assert_allclose(w[~low], 2 / 3, atol=0.02)  # the mean of an open top and two walls on a floor
+
+
+def test_a_scene_hides_its_objects_from_each_other_or_not(text_mesh, tmp_path):
+    text_mesh(CUBE, "cube.obj")
+    scene = tmp_path / "two.yaml"
+    scene.write_text(
+        "version: 1\nobjects:\n- {name: a, mesh: cube.obj}\n"
+        "- {name: b, mesh: cube.obj, transform: {translate: [2.2, 0, 0]}}\n"
+    )
+    bake(scene, tmp_path / "all.npz")
+    bake(scene, tmp_path / "own.npz", occluders=("own",))
+    bake(scene, tmp_path / "named.npz", occluders=("a",))
+    both, own, named = (read_npz(tmp_path / f"{n}.npz").obscurance for n in ("all", "own", "named"))
+    assert len(both) == 16
+    assert both[:8].min() < 0.99
+    assert (own == 1).all()
+    assert (named[:8] == 1).all()
+    assert np.array_equal(named[8:], both[8:])
+    with pytest.raises(InputError, match="no object of that name"):
+        bake(scene, tmp_path / "none.npz", occluders=("c",))
+
+
+def test_a_fit_is_right_in_the_middle_of_large_triangles(text_mesh, tmp_path):
+    # a wide floor with a small lid over its middle: its vertices see nothing of the lid
+    lid = "v -9 0 -9\nv 9 0 -9\nv 9 0 9\nv -9 0 9\nv 0 0 0\nv -1 .2 -1\nv 1 .2 -1\nv 1 .2 1\nv -1 .2 1\n"
+    path = text_mesh(lid + "f 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\nf 6 7 8 9\n")
+    bake(path, tmp_path / "at.npz", samples=4096)
+    bake(path, tmp_path / "fit.npz", samples=65536, method="fit")
+    at, fit = (read_npz(tmp_path / f"{n}.npz") for n in ("at", "fit"))
+    assert at.obscurance[4] < 0.1
+    # the lid covers 1/81 of the floor; a value of 0.04 at the middle would darken a third of it
+    assert fit.obscurance[4] > 0.6
+    assert (fit.standard_error[:5] > 0).all()
+
+
+def test_smooth_falloffs_see_distance(text_mesh, tmp_path):
+    path = text_mesh(STEP)
+    bake(path, tmp_path / "step.npz")
+    falloff = {"falloff": "linear", "max_distance": "1r"}
+    bake(path, tmp_path / "soft.npz", falloff=falloff, bent_normal=True)
+    step, soft = (read_npz(tmp_path / f"{n}.npz") for n in ("step", "soft"))
+    assert (soft.obscurance[:4] > step.obscurance[:4]).all()
+    bent = soft.bent_normal
+    np.testing.assert_allclose(np.linalg.norm(bent[:6], axis=1), 1, rtol=1e-5)
+    assert bent[2, 2] < -0.1  # away from the wall
+
+
+def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
+    path, out = wavy(tmp_path), tmp_path / "out.npz"
+    monkeypatch.setattr("illumcli.baking.sampling.RAYS", 1 << 12)
+    run(path, [tmp_path / "one.npz"], Settings(), threads=1)
+    cast, rays = Caster._run, []
+
+    def breaks(self, what, pieces, ask):
+        for number, found in cast(self, what, pieces, ask):
+            rays.append(what)
+            if rays.count("values") == 12:
+                raise KeyboardInterrupt
+            yield number, found
+
+    monkeypatch.setattr(Caster, "_run", breaks)
+    with pytest.raises(KeyboardInterrupt):
+        run(path, [out], Settings(), threads=2)
+    assert not out.exists()
+    assert len(list(tmp_path.glob(".*.unfinished"))) == len(list(tmp_path.glob(".*"))) == 1
+    monkeypatch.setattr(Caster, "_run", cast)
+    _, report = run(path, [out], Settings(), threads=2)
+    _, whole = run(path, [tmp_path / "two.npz"], Settings(), threads=2)
+    assert (report.resumed, whole.resumed) == (11 * (1 << 12), 0)
+    assert report.rays == whole.rays
+    assert out.read_bytes() == (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+    assert list(tmp_path.glob(".*")) == []
+
+
+@pytest.mark.parametrize("kind", ["npz", "ply", "glb"])
+def test_the_same_is_kept_and_another_refused(text_mesh, tmp_path, kind):
+    path, out = text_mesh(STEP), tmp_path / f"out.{kind}"
+    _, first = bake(path, out, samples=16)
+    _, again = bake(path, out, samples=16)
+    assert (first.written, first.kept) == ([str(out)], [])
+    assert (again.written, again.kept) == ([], [str(out)])
+    with pytest.raises(OutputError, match="--force"):
+        bake(path, out, samples=32)
+    assert bake(path, out, samples=32, force=True)[1].written == [str(out)]
+
+
+def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
+    path = text_mesh(STEP)
+    for arguments, said in (
+        (["-o", "x.png"], "no writer"),
+        (["-o", "x.npz", "--tau", "2"], "--tau belongs to"),
+        (["-o", "x.npz", "--falloff", "linear"], "--max-distance"),
+        (["-o", "x.npz", "--samples", "4", "--target-error", "0.1"], "exclude each other"),
+        (["-o", "x.npz", "--max-distance", "2m"], "is no distance"),
+    ):
+        done = CliRunner().invoke(illum, ["ao-bake", str(path), *arguments])
+        assert done.exit_code != 0
+        assert said in done.output + str(done.exception)
+
+
+def test_the_command_prints_files_and_writes_a_report(text_mesh, tmp_path):
+    path, out = text_mesh(STEP), tmp_path / "deep" / "out.npz"
+    report = tmp_path / "report.json"
+    done = CliRunner().invoke(
+        illum, ["ao-bake", str(path), "-o", str(out), "--max-distance", "0.5r", "--report", str(report)]
+    )
+    assert done.exit_code == 0
+    assert done.stdout == f"{out}\n"
+    said = json.loads(report.read_text())
+    assert said["rmse"] > 0
+    assert said["unreferenced"] == 1
+    about = read_npz(out).about
+    assert about["parameters"]["falloff"] == {"falloff": "step", "max_distance": "0.5r"}
+
+
+# A floor and a wall that share the edge x = 0, smooth over it: the normal there leans by 45 degrees.
+VALLEY = """
+v 0 0 -500\nv 0 0 0\nv 0 0 500\nv 500 0 -500\nv 500 0 0\nv 500 0 500\nv 0 500 -500\nv 0 500 0\nv 0 500 500
+vn 1 1 0
+"""
+FACES = {
+    "quads": "f 1//1 2//1 5//1 4//1\nf 2//1 3//1 6//1 5//1\nf 1//1 7//1 8//1 2//1\nf 2//1 8//1 9//1 3//1\n",
+    "triangles": "f 1//1 2//1 4//1\nf 2//1 5//1 4//1\nf 2//1 3//1 5//1\nf 3//1 6//1 5//1\n"
+    "f 1//1 7//1 8//1 2//1\nf 2//1 8//1 9//1\nf 2//1 9//1 3//1\n",
+}
+
+
+@pytest.mark.parametrize("faces", FACES)
+def test_w_at_a_hollow_edge_is_what_pictures_tend_to(text_mesh, tmp_path, faces):
+    """About a normal that leans by t to the open side w at the foot of an endless wall is (1 + sin t) / 2:
+    what points below floor or wall is mirrored there."""
+    found = []
+    for seed in range(40):
+        bake(text_mesh(VALLEY + FACES[faces]), tmp_path / "out.npz", seed=seed, force=True)
+        found.append(read_npz(tmp_path / "out.npz").obscurance[1])
+    w = np.array(found, float)
+    assert abs(w.mean() - (1 + 0.5**0.5) / 2) < 4.5 * w.std(ddof=1) / len(w) ** 0.5
+
+
+ROOM = "v 0 0 0\nv 2 0 0\nv 2 0 2\nv 0 0 2\nv 0 1 0\nv 2 3 0\nv 0 1 2\nf 1 5 6 2\nf 1 4 7 5\n"
+
+
+def test_values_do_not_depend_on_how_a_polygon_is_cut(text_mesh, tmp_path):
+    found = []
+    for name, floor in (("a", "f 4 3 2 1\n"), ("b", "f 4 3 2\nf 4 2 1\n"), ("c", "f 4 3 1\nf 3 2 1\n")):
+        scene = text_mesh(
+            "version: 1\nobscurance: {about: geometric}\nobjects: [{mesh: {file: room.obj}}]\n", "room.yaml"
+        )
+        text_mesh(ROOM + floor, "room.obj")
+        bake(scene, tmp_path / f"{name}.npz", samples=4096)
+        found.append(read_npz(tmp_path / f"{name}.npz"))
+    for other in found[1:]:
+        error = np.hypot(found[0].standard_error, other.standard_error)
+        assert (np.abs(other.obscurance - found[0].obscurance) <= 4 * error).all()
+
+
+def test_copies_at_a_pole_of_degenerate_quads_agree(text_mesh, tmp_path):
+    """A hollow cone: two corners of each quad lie at the tip, and the cut leaves one without area."""
+    angle = 2 * np.pi * np.arange(12) / 12
+    lines = [f"v 0 -1 0\nv 0 -1 0\nv {np.cos(a)} 0 {np.sin(a)}\nv {np.cos(b)} 0 {np.sin(b)}"
+             for a, b in zip(angle, np.roll(angle, -1), strict=True)]  # fmt: skip
+    faces = [f"f {4 * k + 1} {4 * k + 2} {4 * k + 4} {4 * k + 3}" for k in range(12)]
+    bake(text_mesh("\n".join(lines + faces)), tmp_path / "out.npz", samples=1024)
+    baked = read_npz(tmp_path / "out.npz")
+    tips = np.arange(48) % 4 < 2
+    assert (baked.obscurance < 0.99).all()
+    assert (np.abs(baked.obscurance[tips] - baked.obscurance[tips].mean()) < 0.02).all()
+
+
+HARD = CUBE + (
+    "vn 0 0 -1\nvn 0 0 1\nvn 0 -1 0\nvn 0 1 0\nvn -1 0 0\nvn 1 0 0\n"
+    "v -9 -1 -9\nv 9 -1 -9\nv 9 -1 9\nv -9 -1 9\n"
+)
+
+
+@pytest.fixture
+def hard_cube(text_mesh):
+    """A cube whose faces have their own normals, on a floor."""
+    lines = HARD.replace("f ", "# ").split("\n")
+    quads = [line.split()[1:] for line in CUBE.split("\n") if line.startswith("f")]
+    faces = [" ".join(f"{v}//{k + 1}" for v in quad) for k, quad in enumerate(quads)]
+    return text_mesh("\n".join([*lines, *(f"f {face}" for face in faces), "f 12//4 11//4 10//4 9//4"]))
+
+
+def test_a_vertex_on_a_hard_edge_has_a_value_for_each_normal(hard_cube, tmp_path):
+    outs = [tmp_path / name for name in ("out.npz", "out.glb", "out.ply")]
+    _, report = bake(hard_cube, *outs, samples=1024)
+    baked, mesh = read_npz(outs[0]), read_mesh(hard_cube)
+    at = baked.corner_obscurance.reshape(-1, 4)
+    assert (at[3] == 1).all()  # the top
+    low = mesh.vertices[mesh.corners.reshape(-1, 4), 1] < 0
+    assert (np.abs(at[[0, 1, 4, 5]] - 0.5)[low[[0, 1, 4, 5]]] < 0.2).all()  # the foot of a side
+    mean = np.bincount(mesh.corners, baked.corner_obscurance) / np.bincount(mesh.corners)  # all right angles
+    np.testing.assert_allclose(baked.obscurance, mean, rtol=1e-6)
+    assert report.left_out == ["mesh: normals that differ between the polygons of a vertex"]
+
+    # GLB: the file's own vertices first, then a copy for every other normal
+    glb, ply = read_mesh(outs[1]), read_mesh(outs[2])
+    assert len(ply.vertices) == 12
+    assert len(glb.vertices) == 28
+    np.testing.assert_allclose(glb.vertices[:12], mesh.vertices, atol=1e-6)
+    corner = np.asarray(glb.attributes["_OBSCURANCE"], np.float32)[glb.corners]
+    assert set(corner.tolist()) == set(baked.corner_obscurance.tolist())
+    assert glb.normals is not None
+
+
+def test_split_gives_a_ply_a_vertex_for_each_normal(hard_cube, tmp_path):
+    _, report = bake(hard_cube, tmp_path / "out.ply", split=True)
+    bake(hard_cube, tmp_path / "out.npz")
+    made, baked = read_mesh(tmp_path / "out.ply"), read_npz(tmp_path / "out.npz")
+    assert report.left_out == []
+    assert len(made.vertices) == 28
+    assert np.array_equal(np.asarray(made.attributes["obscurance"], np.float32)[made.corners],
+                          baked.corner_obscurance)  # fmt: skip
+    with pytest.raises(InputError, match=r"--split belongs to \.ply"):
+        bake(hard_cube, tmp_path / "other.npz", split=True)
+
+
+def test_a_picture_reads_the_values_of_corners(hard_cube, text_mesh, tmp_path):
+    bake(hard_cube, tmp_path / "cube.npz", samples=1024)
+    text = (
+        "version: 1\ncamera: {position: [0, 9, 0.01], target: [0, 0, 0], fov: 8}\n"
+        "film: {width: 9, height: 9}\nambient: 1\nobscurance: {samples: 4}\n"
+        "objects: [{name: mesh, mesh: {file: mesh.obj, obscurance: cube.npz}}]\n"
+    )
+    scene = load(text_mesh(text, "scene.yaml"))
+    steps = plan(scene.scene, scene, ["obscurance"])
+    rows = bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally())
+    w = np.concatenate([band.layers["obscurance"] for band in rows])
+    np.testing.assert_allclose(w, 1, atol=1e-6)  # the top, whose vertices have 0.7 in the mean
+
+
+def test_flat_normals_of_faces_that_are_turned_round_point_outwards(hard_cube, text_mesh, tmp_path):
+    lines = hard_cube.read_text().split("\n")
+    turned = ["f " + " ".join(reversed(line.split()[1:])) if line.startswith("f") else line for line in lines]
+    text_mesh("\n".join(turned[:-1]), "turned.obj")  # without the floor
+    objects = "objects: [{mesh: {file: turned.obj}}]\n"
+    scene = text_mesh("version: 1\nobscurance: {about: geometric}\n" + objects, "turned.yaml")
+    bake(scene, tmp_path / "out.npz", bent_normal=True)
+    baked, mesh = read_npz(tmp_path / "out.npz"), read_mesh(tmp_path / "turned.obj")
+    assert (baked.obscurance == 1).all()
+    np.testing.assert_allclose(baked.corner_bent_normal, mesh.normals[mesh.corner_normals], atol=1e-6)
+
+
+def test_a_mesh_that_is_turned_inside_out_is_told(text_mesh, tmp_path):
+    _, report = bake(text_mesh(CUBE), tmp_path / "right.npz")
+    assert report.warnings == []
+    inside_out = "\n".join(
+        "f " + " ".join(reversed(line.split()[1:])) if line.startswith("f") else line
+        for line in CUBE.split("\n")
+    )
+    _, report = bake(text_mesh(inside_out), tmp_path / "out.npz")
+    assert "the polygons seem to face inwards" in report.warnings[0]

@@ -1,0 +1,200 @@
+"""Views of BRDFs: their numbers against closed forms, their options, their files."""
+
+from __future__ import annotations
+
+import csv
+import sys
+
+import numpy as np
+import pytest
+
+from illumcli.brdf import VIEWS, described, run
+from illumcli.brdf.views import lit_plane, lit_sphere, lobe, polar_slice, slice_angles
+from illumcli.errors import IllumError, InputError, OutputError
+from illumcli.images.oiio import read_image
+from illumcli.schema.families import tags
+
+
+def only(name, *overrides):
+    (model,) = described([name], overrides).values()
+    return model
+
+
+def test_a_slice_of_lambert_is_its_albedo_over_pi():
+    model = only("lambert", "diffuse=[0.2, 0.4, 0.6]")
+    for times_cos, scale in ((False, 1), (True, np.cos(np.radians(50)))):
+        angles, found = polar_slice(model, 50, times_cos)
+        np.testing.assert_allclose(
+            found, np.tile(np.array([0.2, 0.4, 0.6]) / np.pi * scale, (len(angles), 1))
+        )
+    assert angles[0] == pytest.approx(-90, abs=0.3)
+    assert angles[-1] == pytest.approx(90, abs=0.3)
+
+
+def test_a_slice_finds_the_narrowest_highlight_at_the_mirror_direction():
+    angles, found = polar_slice(
+        only("phong", "exponent=1e6", "normalised=true", "diffuse=0", "specular=1"), 40
+    )
+    at = np.argmax(found[:, 0])
+    assert angles[at] == 40
+    assert found[at, 0] == pytest.approx((1e6 + 2) / (2 * np.pi), rel=1e-9)
+    assert np.count_nonzero(found[:, 0] > found[at, 0] / 2) > 10  # a shape, not a spike
+
+
+def test_the_light_stands_at_negative_angles():
+    angles, found = polar_slice(only("oren_nayar", "sigma=0.6"), 60)  # brighter towards the light
+    assert found[np.searchsorted(angles, -60), 0] > 1.3 * found[np.searchsorted(angles, 60), 0]
+
+
+def test_a_lobe_covers_the_hemisphere_and_holds_the_slice():
+    model = only("ward", "form=duer")
+    way, found = lobe(model, 40)
+    np.testing.assert_allclose(np.linalg.norm(way, axis=-1), 1)
+    assert way[..., 2].min() > 0
+    assert way[-1, :, 2].max() < 1e-5  # ends at the horizon all round
+    angles, slices = polar_slice(model, 40)
+    np.testing.assert_allclose(found[0, 0], slices[np.searchsorted(angles, 40)])
+
+
+def test_a_lit_sphere_shows_lambert_as_white_as_its_albedo():
+    ball = lit_sphere(only("lambert", "diffuse=0.5"), 128)
+    assert ball.shape == (128, 128, 4)
+    assert ball[..., 3].mean() == pytest.approx(np.pi / 4 * 0.98**2, abs=2e-3)
+    assert ball[..., 0].max() == pytest.approx(0.5, rel=1e-3)
+    y, x = np.unravel_index(np.argmax(ball[..., 0]), ball.shape[:2])
+    assert x < 64 > y  # the light comes from the upper left
+
+
+def test_a_ward_highlight_lies_across_the_grain():
+    def shape(picture):
+        y, x = np.nonzero(picture[..., 0] > picture[..., 0].max() / 2)
+        return np.ptp(x), np.ptp(y)
+
+    wide, tall = shape(lit_sphere(only("ward", "diffuse=0", "alpha_x=0.05", "alpha_y=0.3")))
+    assert tall > 2 * wide
+    wide, tall = shape(lit_sphere(only("ward", "diffuse=0", "alpha_x=0.3", "alpha_y=0.05")))
+    assert wide > 2 * tall
+
+
+def test_a_lit_plane_mirrors_its_lamp_in_the_middle():
+    floor = lit_plane(only("phong", "diffuse=0", "specular=1", "exponent=50"), 96)
+    assert floor.shape == (48, 96, 4)
+    np.testing.assert_allclose(floor[:, 30:66], floor[:, 65:29:-1], atol=1e-12)
+    assert 46 <= np.argmax(floor[..., 0].sum(axis=0)) <= 49
+
+
+@pytest.mark.parametrize("name", [name for name in tags("illumcli.models") if name != "merl"])
+def test_every_model_has_finite_views(name):
+    model = only(name)
+    for angle in (0, 45, 89.9):
+        assert np.isfinite(polar_slice(model, angle)[1]).all()
+    assert np.isfinite(lobe(model, 30, steps=20)[1]).all()
+    assert np.isfinite(lit_sphere(model, 32)).all()
+    assert np.isfinite(lit_plane(model, 32)).all()
+
+
+# --- what is asked for ---------------------------------------------------------------------------------
+
+
+def test_parameters_are_meant_for_all_for_one_by_name_or_by_number():
+    models = described(
+        ["oren_nayar", "lambert", "oren_nayar"],
+        ["diffuse=0.1", "lambert.diffuse=0.2", "3.sigma=0.7", "oren_nayar.form=qualitative"],
+    )
+    assert list(models) == ["oren_nayar 1", "lambert", "oren_nayar 3"]
+    first, second, third = models.values()
+    assert (first.diffuse, first.sigma, first.form) == ((0.1,) * 3, 0.3, "qualitative")
+    assert second.diffuse == (0.2,) * 3
+    assert third.sigma == 0.7
+
+
+def test_parts_of_parameters_are_reached():
+    model = only("cook_torrance", "distribution.D=ggx", "distribution.alpha=0.1")
+    assert model.distribution.alpha == 0.1
+
+
+def test_every_fault_is_said_at_once():
+    with pytest.raises(InputError) as caught:
+        described(["lambrt", "oren_nayar"], ["oren_nayar.sigma=9", "oren_nayar.sgma=1", "sigam=0.1"])
+    assert caught.value.problems == (
+        "no model 'lambrt'; did you mean 'lambert'?",
+        "-D oren_nayar.sigma=9: must be at most 1.5708, is 9",
+        "-D oren_nayar.sgma=1: unknown key 'sgma'; did you mean 'sigma'?",
+        "-D sigam=0.1: no model or parameter 'sigam'; did you mean 'sigma'?",
+    )
+
+
+def test_what_a_model_needs_is_said():
+    with pytest.raises(InputError, match="merl: missing key 'file'"):
+        described(["merl"])
+
+
+# --- files ---------------------------------------------------------------------------------------------
+
+
+def test_the_table_holds_the_slices_to_the_last_digit(tmp_path):
+    path = tmp_path / "slices.csv"
+    assert run(["lambert", "phong"], table=path, angles=(20.0, 60.0)) == ([path], [])
+    with path.open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["model", "incidence", "view", "f.R", "f.G", "f.B"]
+    assert len(rows) == 1 + 2 * (len(slice_angles(20)) + len(slice_angles(60)))
+    mine = np.array([row[3:] for row in rows if row[:2] == ["phong", "60"]], float)
+    np.testing.assert_array_equal(mine, polar_slice(only("phong"), 60)[1])
+
+
+def test_pictures_have_a_column_per_model_and_are_the_same_twice(tmp_path):
+    one, again, two = (tmp_path / f"{name}.png" for name in ("one", "again", "two"))
+    for path in (one, again):
+        run(["phong"], output=path, chosen=("polar", "sphere", "plane"))
+    run(["phong", "ward"], output=two, chosen=("polar",), log=True)
+    assert one.read_bytes() == again.read_bytes()
+    assert read_image(two).width == 2 * read_image(one).width
+    assert min(read_image(path).channels["G"].std() for path in (one, two)) > 0.05
+
+
+def test_an_svg_holds_every_view(tmp_path):
+    path = tmp_path / "all.svg"
+    run(["blinn_phong"], output=path, chosen=VIEWS)
+    text = path.read_text()
+    assert text.startswith("<?xml")
+    assert text.count("<image") == 2  # sphere and plane
+    first = path.read_bytes()
+    assert run(["blinn_phong"], output=path, chosen=VIEWS) == ([path], [path])
+    assert path.read_bytes() == first
+
+
+def test_black_models_are_drawn_too(tmp_path):
+    run(["lambert"], ["diffuse=0"], tmp_path / "black.png", chosen=("polar", "lobe"))
+
+
+def test_no_other_file_is_replaced_unasked(tmp_path):
+    path = tmp_path / "slices.csv"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match="--force"):
+        run(["lambert"], table=path)
+    assert path.read_text() == "mine"
+    run(["lambert"], table=path, force=True)
+    assert path.read_text().startswith("model,")
+
+
+def test_only_png_and_svg_are_drawn(tmp_path):
+    with pytest.raises(InputError, match=r"is written as \.png or \.svg"):
+        run(["lambert"], output=tmp_path / "x.pdf")
+
+
+def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(IllumError, match=r"pip install 'illumcli\[plot\]'"):
+        run(["lambert"], output=tmp_path / "x.png", table=tmp_path / "x.csv")
+    assert list(tmp_path.iterdir()) == []
+    run(["lambert"], table=tmp_path / "x.csv")
+
+
+def test_the_command_prints_its_files_and_needs_no_pyplot(illum, tmp_path):
+    done = illum("brdf", "lambert", "phong", "-D", "phong.exponent=9", "--view", "polar", "--csv", "x.csv")
+    assert done.stdout == "x.csv\n", done.stderr
+    done = illum("brdf", "lambert", "--view", "sphere")
+    assert done.stdout == "brdf.png\n", done.stderr
+    assert (tmp_path / "brdf.png").read_bytes().startswith(b"\x89PNG")
+    assert "matplotlib.pyplot" not in sys.modules  # drawn in this process by the tests above

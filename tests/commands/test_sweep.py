@@ -1,0 +1,294 @@
+"""`illum sweep` as a user meets it: which variants, their names, the bytes of single renders, going on."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+
+import pytest
+
+from illumcli.commands.sweep import Files, Settings, at_frame, axis_of, run, split, variants_of
+from illumcli.errors import InputError, LimitError, OutputError
+from illumcli.images.oiio import read_image
+
+SCENE = """
+version: 1
+film: {width: 32, height: 24, samples: 2}
+ambient: 0.2
+obscurance: {samples: 4}
+materials:
+  clay: {model: blinn_phong, diffuse: [0.6, 0.4, 0.3], specular: 0.3}
+objects:
+  - {mesh: {shape: sphere}, material: clay}
+  - {mesh: {shape: plane, size: [8, 8]}, transform: {translate: [0, -1, 0]}}
+lights:
+  - {light: point, name: key, position: [3, 4, 5], intensity: 30}
+outputs: {files: ["{scene}.png"]}
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "ball.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("a=1,2,3", ["1", "2", "3"]),
+        ("a=0:1:5", ["0", "0.25", "0.5", "0.75", "1"]),
+        ("a=1:100:3log", ["1", "10", "100"]),
+        ("a=0.1:0.3:3", ["0.1", "0.2", "0.3"]),
+        ("a=5:5:1", ["5"]),
+        ("a=[1,2,3],[4,5,6]", ["[1,2,3]", "[4,5,6]"]),
+        ("a={law: none, c: [1,2]},null", ["{law: none, c: [1,2]}", "null"]),
+        ("a='x,y',z", ["'x,y'", "z"]),
+    ],
+)
+def test_values_of_an_axis(text, values):
+    assert list(axis_of(text).values) == values
+
+
+NINES = "9" * 20
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"frames": f"0:{NINES}"}, "frames are counted up to"),
+        ({"frames": f"{NINES}:{NINES}"}, "frames are counted up to"),
+        ({"frames": f"0:{'9' * 5000}"}, "frames are counted up to"),
+        ({"frames": f"0:1:{NINES}"}, "frames are counted up to"),
+        ({"frames": "0:9007199254740993"}, "frames are counted up to"),
+        ({"frames": "0:9007199254740992"}, "9007199254740993 variants are more than 100000"),
+        ({"texts": [f"a=0:1:{'9' * 5000}"]}, "the count must be from 1 to 100000"),
+        ({"texts": ["a=0:1e999:3"]}, "both ends must be finite numbers"),
+        ({"texts": [f"{name}=0:1:90000" for name in "abcdef"]}, "variants are more than 100000"),
+        ({"texts": ["a=" + "[" * 9000 + "frame" + "]" * 9000], "frames": "0:1"}, "nested deeper than 32"),
+    ],
+)
+def test_more_than_any_sweep_has_is_refused_in_a_short_line(words, said):
+    with pytest.raises(InputError, match=re.escape(said)) as caught:
+        variants_of(**{"texts": [], **words})
+    assert len(str(caught.value)) < 200
+
+
+def test_tables_of_variants_have_limits(tmp_path, monkeypatch):
+    table = tmp_path / "rows.csv"
+    table.write_text("a\n" + "1" * 200_000 + "\n")
+    with pytest.raises(InputError, match=r"rows\.csv: cannot be read: field larger"):
+        variants_of([], rows=table)
+    monkeypatch.setattr("illumcli.commands.sweep.MOST_BYTES", 10)
+    with pytest.raises(LimitError, match="larger than 10 bytes"):
+        variants_of([], rows=table)
+
+
+@pytest.mark.parametrize(
+    ("words", "pattern", "said"),
+    [
+        (
+            {"texts": ["film.exposure=" + ",".join("0" * 50_000)]},
+            None,
+            "50000 variants (1, 2, 3, ",
+        ),
+        ({"texts": ["film.exposure=1,2,1"]}, "{film.exposure}.png", "2 variants (1, 3); they are equal;"),
+        ({"texts": ["film.exposure=0:1:90000"]}, "{scene}.png", "put a field that tells them apart"),
+        ({"texts": ["seed=1,2"], "frames": "0:9"}, "{seed}.png", "the name of 10 variants"),
+        ({"texts": ["seed=1,2"]}, "{layer}.png", "the name of 2 variants"),
+    ],
+)
+def test_names_that_are_equal_by_their_pattern_are_told_without_reading_a_scene(
+    tmp_path, words, pattern, said
+):
+    with pytest.raises(InputError, match=re.escape(said)):
+        run(tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), Settings(pattern=pattern))
+
+
+def test_equal_values_that_go_with_others_are_variants(scene, tmp_path):
+    variants = variants_of(["film.exposure=0,0", "seed=1,2"], together=True)
+    done = run(scene, variants, Settings(pattern=str(tmp_path / "{seed}.png")))
+    assert len(done.outcomes) == 2
+
+
+@pytest.mark.parametrize("text", ["a", "=1", "a=1,,2", "a=0:1:3log", "a=0:1:0", "a=-1:1:4log"])
+def test_an_axis_that_says_nothing_is_refused(text):
+    with pytest.raises(InputError):
+        axis_of(text)
+
+
+def test_grid_zip_rows_and_frames(tmp_path):
+    def values(*args, **more):
+        return [dict(variant.values) for variant in variants_of(*args, **more)]
+
+    assert values(["a=1,2", "b=x,y"]) == [
+        {"a": "1", "b": "x"}, {"a": "1", "b": "y"}, {"a": "2", "b": "x"}, {"a": "2", "b": "y"}
+    ]  # fmt: skip
+    assert values(["a=1,2", "b=x,y", "c=5"], together=True) == [
+        {"a": "1", "b": "x", "c": "5"}, {"a": "2", "b": "y", "c": "5"}
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="--zip wants as many or one"):
+        variants_of(["a=1,2", "b=1,2,3"], together=True)
+    rows = tmp_path / "rows.csv"
+    rows.write_text('a,b\n1,"[1,2,3]"\n\n2,x\n')
+    assert values(["c=7"], rows=rows) == [
+        {"a": "1", "b": "[1,2,3]", "c": "7"},
+        {"a": "2", "b": "x", "c": "7"},
+    ]
+    rows.write_text("a,b\n1\n")
+    with pytest.raises(InputError, match="row 2 has 1 cells"):
+        variants_of([], rows=rows)
+    moving = variants_of(["a=[cos(frame*0), frame/2, 3]"], frames="2:6:2")
+    assert [(v.frame, v.values["a"]) for v in moving] == [
+        (2, "[1, 1, 3]"),
+        (4, "[1, 2, 3]"),
+        (6, "[1, 3, 3]"),
+    ]
+    for wrong in ("3:1", "1", "0:4:0", "a:b"):
+        with pytest.raises(InputError):
+            variants_of([], frames=wrong)
+
+
+def test_formulas_compute_and_do_nothing_else():
+    assert at_frame("a", "sqrt(frame)", 9) == "3"
+    assert at_frame("a", "[1, [frame, max(frame, 4)]]", 3) == "[1, [3, 4]]"
+    assert at_frame("a", "framework", 3) == "framework"
+    for wrong in ("frame.real", "__import__('os') + frame", "1/(frame-3)", "frame +"):
+        with pytest.raises(InputError, match="a="):
+            at_frame("a", wrong, 3)
+
+
+def test_commas_inside_brackets_and_quotes_part_nothing():
+    assert split("f(a,b),[c,d],'e,f',g") == ["f(a,b)", "[c,d]", "'e,f'", "g"]
+
+
+def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
+    done = illum("sweep", scene, "-D", "materials.clay.exponent=4:256:3log", "-D", "ambient=0.1,0.6",
+                 "--table", "t.csv", "--sheet", "s.png", "--reference", "1",
+                 "--report", "r.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    names = done.stdout.split()
+    assert names[:2] == ["ball-4-0.1.png", "ball-4-0.6.png"]
+    assert len(names) == 6
+    for exponent, ambient in ((4, 0.6), (256, 0.1)):
+        single = illum("render", scene, "--no-cache", "-D", f"materials.clay.exponent={exponent}",
+                       "-D", f"ambient={ambient}", "-o", "one.png", "--force")  # fmt: skip
+        assert single.returncode == 0, single.stderr
+        swept = tmp_path / f"ball-{exponent}-{ambient}.png"
+        assert swept.read_bytes() == (tmp_path / "one.png").read_bytes()
+    with (tmp_path / "t.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["state"] for row in rows] == ["rendered"] * 6
+    assert [row["rays"] != "0" for row in rows] == [True] + [False] * 5
+    assert float(rows[0]["rmse"]) == 0
+    assert float(rows[1]["rmse"]) > 0
+    assert read_image(tmp_path / "s.png").width > 256
+    assert [each["values"]["ambient"] for each in json.loads((tmp_path / "r.json").read_text())][:2] == [
+        "0.1",
+        "0.6",
+    ]
+
+
+def test_a_sweep_goes_on_where_it_stopped(illum, scene, tmp_path):
+    axis = "materials.clay.specular=0.1,0.2,0.3"
+    assert illum("sweep", scene, "-D", axis).returncode == 0
+    (tmp_path / "ball-0.2.png").unlink()
+    held = {path.name: (path.stat().st_ino, os.utime(path, (1e9, 1e9))) for path in tmp_path.glob("*.png")}
+    again = illum("sweep", scene, "-D", axis, "--table", "t.csv")
+    assert again.stdout.split() == ["ball-0.1.png", "ball-0.2.png", "ball-0.3.png"]
+    assert again.stderr.count("kept") == 2
+    for name, (inode, _) in held.items():  # the same file, dated now
+        assert (tmp_path / name).stat().st_ino == inode
+        assert (tmp_path / name).stat().st_mtime > scene.stat().st_mtime
+    assert [line.split(",")[5] for line in (tmp_path / "t.csv").read_text().split()] == [
+        "state", "kept", "rendered", "kept"
+    ]  # fmt: skip
+
+
+def test_a_failed_sweep_leaves_a_whole_sheet_as_it_is(illum, scene, tmp_path):
+    axis = "materials.clay.specular=0.1,0.2"
+    assert illum("sweep", scene, "-D", axis, "--sheet", "s.png").returncode == 0
+    whole = (tmp_path / "s.png").read_bytes()
+    (tmp_path / "ball-0.4.png").mkdir()
+    more = "materials.clay.specular=0.3,0.4"
+    done = illum("sweep", scene, "-D", more, "--sheet", "s.png", "--force")
+    assert done.returncode == 5
+    assert (tmp_path / "s.png").read_bytes() == whole
+    assert "s.png: stays as it is" in done.stderr
+    # one that lacks pictures is replaced by a better one
+    assert illum("sweep", scene, "-D", more, "--sheet", "half.png").returncode == 5
+    half = (tmp_path / "half.png").read_bytes()
+    (tmp_path / "ball-0.4.png").rmdir()
+    assert illum("sweep", scene, "-D", more, "--sheet", "half.png").returncode == 0
+    assert (tmp_path / "half.png").read_bytes() != half
+
+
+def test_pictures_that_vanish_before_the_table_is_written_are_exit_5(scene, tmp_path):
+    def gone(outcome):
+        for path in outcome.paths:
+            path.unlink()
+
+    variants = variants_of(["materials.clay.specular=0.1,0.2"])
+    files = Files(table=tmp_path / "t.csv")
+    settings = Settings(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
+    with pytest.raises(OutputError, match="others took it away"):
+        run(scene, variants, settings, files, written=gone)
+
+
+def test_a_moving_light_casts_its_own_rays_alone(illum, scene, tmp_path):
+    moving = "lights.key.position=[3*cos(frame), 4, 3*sin(frame)]"
+    done = illum("sweep", scene, "--frames", "0:3", "-D", moving, "--no-cache", "--report", "r.json")
+    assert done.stdout.split() == [f"ball.{k:04d}.png" for k in range(4)]
+    rays = [each["rays"] for each in json.loads((tmp_path / "r.json").read_text())]
+    assert set(rays[0]) == {"hits", "obscurance", "shadow:key"}
+    assert all(set(each) == {"shadow:key"} for each in rays[1:])
+
+
+def test_what_has_an_effect_in_some_variant_is_not_told(scene, tmp_path):
+    """Without ambient light the obscurance weighs nothing; the same key with the film's filter never does."""
+    variants = variants_of(
+        ["ambient=0,0.2", "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"]
+    )
+    done = run(scene, variants, Settings(pattern=str(tmp_path / "{ambient}.png"), cache=False))
+    assert len(done.warnings) == 1
+    assert "a single sample looks" in done.warnings[0]
+
+
+def test_faults_of_values_are_told_first_and_the_other_variants_are_done(illum, scene, tmp_path):
+    words = ("sweep", scene, "-D", "materials.clay.exponent=-1,4,x")
+    stopped = illum(*words, "--stop-at-first")
+    assert stopped.returncode == 2
+    assert not list(tmp_path.glob("*.png"))
+    done = illum(*words, "--table", "t.csv", "--report", "r.json")
+    assert (done.returncode, done.stdout) == (2, "ball-4.png\n")
+    assert done.stderr.splitlines() == [
+        "exponent -1: -D materials.clay.exponent=-1: must be at least 0, is -1",
+        "exponent x: -D materials.clay.exponent=x: must be a number, is text 'x'",
+        "2 of 3 variants failed",
+    ]
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert [row["state"] for row in rows] == ["failed", "rendered", "failed"]
+    assert [row["content"] == "incomplete" for row in rows] == [True, False, True]
+    assert "must be at least 0" in json.loads((tmp_path / "r.json").read_text())[0]["error"]
+
+    mended = illum("sweep", scene, "-D", "materials.clay.exponent=-1,4", "--table", "t.csv")
+    assert mended.returncode == 5
+    assert "t.csv: a different file is there" in mended.stderr
+
+
+def test_names_that_clash_are_told_before_anything_is_rendered(illum, scene, tmp_path):
+    clash = illum("sweep", scene, "-D", "ambient=0.1,0.2", "-o", "same.png")
+    assert clash.returncode == 2
+    assert "same.png: the name of 2 variants" in clash.stderr
+
+
+def test_a_variant_that_fails_is_told_and_the_others_go_on(illum, scene, tmp_path):
+    (tmp_path / "bad.obj").write_text("f 1 2 3\n")
+    done = illum("sweep", scene, "-D", "objects.0.mesh={shape: sphere},bad.obj,{shape: box}", "-o", "{frame}-"
+                 "{objects.0.mesh}.png")  # fmt: skip
+    assert done.returncode == 2
+    assert len(list(tmp_path.glob("*.png"))) == 2
+    assert "1 of 3 variants failed" in done.stderr

@@ -1,0 +1,33 @@
+"""Pixels asked for one by one are those of the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from illumcli.render_graph.execute import Tally, at_pixels, bands, run_once
+from illumcli.render_graph.schedule import plan
+from illumcli.scene.load import load
+
+SCENE = """
+version: 1
+film: {width: 24, height: 18, samples: 4}
+ambient: 1
+obscurance: {samples: 8}
+objects: [{mesh: {shape: torus}}, {mesh: {shape: disc, radius: 4}, shading: constant}]
+lights: [{light: point, position: [3, 4, 5], intensity: 30}]
+"""
+
+
+def test_scattered_pixels_are_those_of_the_picture(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE)
+    loaded = load(path)
+    steps = plan(loaded.scene, loaded, ["beauty", "obscurance", "depth"])
+    shared, view = run_once(steps, Tally()), steps.views[0]
+    whole = list(bands(steps, shared, view, 2, Tally()))
+    x, y = np.array([23, 0, 11, 12, 3]), np.array([0, 17, 9, 9, 4])
+    some = at_pixels(steps, shared, view, x, y, 2, Tally())
+    for name in ("beauty", "obscurance", "depth"):
+        picture = np.concatenate([band.layers[name] for band in whole])
+        np.testing.assert_array_equal(some[name], picture[y, x])
+    assert some["beauty"].any()

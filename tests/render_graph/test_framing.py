@@ -1,0 +1,118 @@
+"""Cameras whose picture an object is to fill."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from illumcli.accuracy.sampled import subject
+from illumcli.cache.store import Store, default_folder
+from illumcli.commands import plan as plan_job
+from illumcli.commands.render import run
+from illumcli.commands.sweep import Settings, variants_of
+from illumcli.commands.sweep import run as sweep
+from illumcli.errors import InputError
+from illumcli.images.oiio import read_image
+from illumcli.rays.camera import MARGIN
+from illumcli.render_graph.cached import Artifacts
+from illumcli.render_graph.execute import Tally
+from illumcli.render_graph.framing import framed
+from illumcli.render_graph.schedule import plan
+from illumcli.scene.load import load
+
+SCENE = """
+version: 1
+film: {width: 60, height: 40, samples: 1}
+camera: {position: [0.4, 0.3, 0.9], target: [0, 0, 0], fit: rod, fov: 30}
+meshes: {rod: {shape: box, size: [0.2, 3, 0.2]}}
+objects:
+  - {name: rod, mesh: rod, transform: {translate: [7, 0, -2]}}
+  - {name: floor, mesh: {shape: disc, radius: 30}, transform: {translate: [0, -1.6, 0]}}
+  - {name: far, mesh: {shape: sphere}, transform: {translate: [-900, 0, 0]}}
+ambient: 0.5
+outputs: {files: ["{scene}.{camera}.exr"], layers: [object_id]}
+"""
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "s.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def rows_and_columns(path, number=1):
+    """First and last row, then column, of an object's pixels."""
+    ids = read_image(path).channels["objectId.Y"]
+    found = np.nonzero(ids == number)
+    return [(int(each.min()), int(each.max())) for each in found]
+
+
+@pytest.mark.parametrize("more", [[], ["camera.fov=70"], ["camera={projection: orthographic, fit: rod}"]])
+def test_all_of_the_object_is_in_the_picture_and_fills_it(scene, more):
+    (path,), _ = run(scene, more, cache=False)
+    rows, columns = rows_and_columns(path)
+    assert rows[0] in (1, 2, 3)
+    assert rows[1] in (36, 37, 38)
+    assert rows[0] + rows[1] == pytest.approx(39, abs=2)
+    assert columns[0] + columns[1] == pytest.approx(59, abs=2)
+    assert rows[1] - rows[0] + 1 == pytest.approx(40 * (1 - MARGIN), abs=1.5)
+
+
+def test_several_cameras_are_each_placed(scene):
+    scene.write_text(
+        SCENE.replace("camera: {", "cameras: {wide: {width: 80, height: 20, ").replace(
+            "fov: 30}", "fov: 30}, plain: {position: [7, 0, 9], target: [7, 0, 0]}}"
+        )
+    )
+    wide, plain = run(scene, cache=False)[0]
+    assert rows_and_columns(wide)[0][0] in (0, 1)
+    assert read_image(plain).width == 60
+
+
+def test_an_object_that_nobody_sees_is_left_out_of_the_placed_view(scene):
+    _, report = run(scene, ["ambient=0"], cache=False)
+    assert report.skipped["object:far"]
+
+
+def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
+    words = ["film.width=600", "film.height=400", "film.samples=4"]
+    cold = json.loads(plan_job.run(scene, words, as_json=True))
+    assert "hits" not in cold[0]["reused"]
+    run(scene, words)
+    warm = json.loads(plan_job.run(scene, words, as_json=True))
+    assert "hits" in warm[0]["reused"]
+    assert "camera:main" not in warm[0]["skipped"]
+    loaded = load(scene, words)
+    made = plan(loaded.scene, loaded)
+    store = Store(default_folder(), 1 << 30)
+    placed = framed(made, Artifacts(store), Tally(), at_hand=True).views[0].camera
+    assert placed == framed(made, Artifacts(), Tally()).views[0].camera
+
+
+def test_a_sweep_places_its_cameras(scene, tmp_path):
+    variants = variants_of(["camera.fov=10,50"])
+    done = sweep(scene, variants, Settings(pattern="{camera.fov}.exr", cache=False))
+    assert [outcome.error for outcome in done.outcomes] == [None, None]
+    for name in ("10", "50"):
+        rows, _ = rows_and_columns(tmp_path / f"{name}.exr")
+        assert rows[1] - rows[0] + 1 == pytest.approx(40 * (1 - MARGIN), abs=1.5)
+
+
+def test_a_view_that_is_measured_is_placed_too(scene):
+    loaded = load(scene)
+    own = subject(loaded, "beauty")
+    assert own.view.camera == framed(plan(loaded.scene, loaded), Artifacts(), Tally()).views[0].camera
+
+
+def test_fit_names_an_object(scene):
+    with pytest.raises(InputError, match=r"s.yaml:4:56: camera.fit: no object 'rodd'; did you mean 'rod'\?"):
+        load_with(scene, "fit: rod,", "fit: rodd,")
+
+
+def load_with(path, old, new):
+    path.write_text(path.read_text().replace(old, new))
+    return load(path)

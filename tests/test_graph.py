@@ -1,0 +1,61 @@
+"""The planner's order, on generated graphs."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from illumcli.graph import Recipe, order, required
+
+
+@st.composite
+def books(draw):
+    """Recipes b0..bn, each needing only earlier ones, told in any order."""
+    count = draw(st.integers(1, 25))
+    needs = [draw(st.sets(st.integers(0, i - 1), max_size=4)) if i else set() for i in range(count)]
+    recipes = [Recipe(f"b{i}", int, {f"b{j}": f"b{j}" for j in need}) for i, need in enumerate(needs)]
+    return {recipe.makes: recipe for recipe in draw(st.permutations(recipes))}
+
+
+@given(books(), st.data())
+def test_needs_come_first_and_nothing_else_runs(book, data):
+    outputs = data.draw(st.lists(st.sampled_from(sorted(book)), min_size=1))
+    steps = [step.makes for step in order(book, outputs)]
+    assert len(set(steps)) == len(steps)
+    reached = set(outputs)
+    for name in reversed(steps):
+        assert name in reached
+        assert set(book[name].needs.values()) <= set(steps[: steps.index(name)])
+        reached |= set(book[name].needs.values())
+    assert steps == [step.makes for step in order(book, outputs)]
+
+
+def test_given_buffers_need_no_recipe():
+    book = {"a": Recipe("a", int, {"x": "tile"})}
+    assert [step.makes for step in order(book, ["a"], ["tile"])] == ["a"]
+
+
+def test_a_buffer_nobody_makes_is_named():
+    with pytest.raises(KeyError, match="tile"):
+        order({"a": Recipe("a", int, {"x": "tile"})}, ["a"])
+
+
+def test_a_circle_is_shown():
+    book = {"a": Recipe("a", int, {"x": "b"}), "b": Recipe("b", int, {"x": "a"})}
+    with pytest.raises(ValueError, match="a -> b -> a"):
+        order(book, ["a"])
+
+
+def test_needs_are_the_parameters_without_default_or_binding():
+    def stage(scene, hits, shadow=None):
+        return scene, hits, shadow
+
+    assert required(stage) == ("scene", "hits")
+    bound = partial(stage, "a scene")
+    assert Recipe.of(bound, "x").needs == {"hits": "hits"}
+    recipe = Recipe.of(bound, "x", hits="seen", shadow="shadow:key")
+    assert recipe.needs == {"hits": "seen", "shadow": "shadow:key"}
+    assert recipe.make({"seen": 1, "shadow:key": 2}) == ("a scene", 1, 2)

@@ -6,8 +6,9 @@ import random
 
 import pytest
 
+from illumcli.accuracy import convergence, convergence_report
 from illumcli.baking import bake as ao_bake
-from illumcli.commands import render
+from illumcli.commands import render, render_all, sweep
 from illumcli.errors import OutputError
 
 
@@ -30,7 +31,54 @@ def bake(folder, name):
     return make
 
 
-OUTPUTS = {"a.exr": picture, "a.png": picture, "a.npz": bake, "a.ply": bake, "a.glb": bake}
+def report(folder, name):
+    def make(force=False):
+        changes = ("film.width=24", "film.height=16")
+        settings = render_all.Settings(changes, str(folder / "o.exr"), cache=False, force=force)
+        ignore = lambda *words: None  # noqa: E731
+        kept = render_all.run(
+            [folder / "scene.yaml"], settings, folder / name, progress=ignore, written=ignore, tell=ignore
+        )
+        return [str(folder / name)] if kept else []
+
+    return make
+
+
+def swept(folder, name):
+    """The table or report of a sweep."""
+
+    def make(force=False):
+        pattern = str(folder / "o" / "{ambient}.png")
+        settings = sweep.Settings(pattern, only=("beauty",), cache=False, force=force, threads=1)
+        files = sweep.Files(**{name.partition(".")[0]: folder / name})
+        variants = sweep.variants_of(["ambient=0.1,0.2", "film.width=16", "film.height=12"])
+        return list(map(str, sweep.run(folder / "scene.yaml", variants, settings, files).kept))
+
+    return make
+
+
+def curves(folder, name):
+    """The table or drawing of `converge`, of a small measurement."""
+    if not name.endswith(".csv"):
+        pytest.importorskip("matplotlib")
+    found = convergence.run(folder / "scene.yaml", first=4, last=8, samplers=("spiral",), repeats=1, width=16)
+    contents = [run.content for curve in found.curves for point in curve.points for run in point.runs]
+
+    def make(force=False):
+        path = folder / name
+        table, picture = (path, None) if path.suffix == ".csv" else (None, path)
+        outputs = convergence_report.Outputs(table, picture, force)
+        outputs.check(contents)
+        outputs.write(found)
+        return list(map(str, outputs.kept))
+
+    return make
+
+
+OUTPUTS = {
+    "a.exr": picture, "a.png": picture, "a.npz": bake, "a.ply": bake, "a.glb": bake, "a.json": report,
+    "table.csv": swept, "report.json": swept, "c.csv": curves, "c.svg": curves, "c.png": curves,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
@@ -50,4 +98,6 @@ def test_a_damaged_output_is_refused_and_made_anew_by_force(folder, name, count)
             make()
         assert path.read_bytes() == damaged
     make(force=True)
-    assert path.read_bytes() == whole
+    # tables, reports and curves hold seconds
+    assert path.suffix in (".csv", ".json", ".svg") or name == "c.png" or path.read_bytes() == whole
+    assert make() == [str(path)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 
@@ -12,15 +11,21 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files import outputs
 from illumcli.files.atomic import beside
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
+from illumcli.files.seal import BLANK, sealed_csv, sealed_json, sealed_text
 from illumcli.images.writer import ImageWriter
 
+
+def table(*contents):
+    return sealed_csv(["a", "content", "seconds"], [(1, content, 0.5) for content in contents])
+
+
 TWO = {
-    "t.csv": "a,content,seconds\n1,one,0.5\n2,two,0.7\n",
-    "t.json": json.dumps([{"content": "one", "seconds": 3}, {"content": "two"}]),
+    "t.csv": table("one", "two"),
+    "t.json": sealed_json([{"content": "one", "seconds": 3}, {"content": "two"}], in_a_list=True),
 }
 ONE = {
-    "t.json": json.dumps({"content": "one"}),
-    "t.svg": "<svg><dc:identifier>one</dc:identifier></svg>",
+    "t.json": sealed_json([{"content": "one"}], in_a_list=False),
+    "t.svg": sealed_text(f"<svg><dc:identifier>one</dc:identifier>{BLANK}</svg>"),
 }
 
 
@@ -60,7 +65,7 @@ def test_images_say_their_content(tmp_path, suffix):
 
 def test_what_was_incomplete_is_replaced(tmp_path):
     path = tmp_path / "t.csv"
-    path.write_text(TWO["t.csv"].replace("two", INCOMPLETE))
+    path.write_text(table("one", INCOMPLETE))
     assert not is_kept(path, ["one", "two"])
     assert not is_kept(path, ["one", INCOMPLETE])
     with pytest.raises(OutputError):

@@ -7,11 +7,11 @@ import random
 import numpy as np
 import pytest
 
-from illumcli.files.seal import is_sealed
+from illumcli.files.seal import BLANK, is_sealed, sealed_csv, sealed_json, sealed_text
 from illumcli.files.vertex_data import Baked, Shape, write_glb, write_npz, write_ply
 from illumcli.images.writer import ImageWriter
 
-FORMATS = ("half.exr", "mixed.exr", "8.png", "16.png", "npz", "ply", "glb")
+FORMATS = ("half.exr", "mixed.exr", "8.png", "16.png", "npz", "ply", "glb", "csv", "json", "svg")
 
 
 def write(path, rows=5, seed=0):
@@ -27,6 +27,15 @@ def write(path, rows=5, seed=0):
             channels["Y"] = "uint"
         with ImageWriter(path, 40, rows, channels, {"illum:content": "abc"}) as image:
             image.write_band(0, band)
+        return path
+    if path.suffix in (".csv", ".json", ".svg"):
+        found = [{"content": f"{number:x}", "seconds": number / 7} for number in range(rows)]
+        text = {
+            ".csv": lambda: sealed_csv(["content", "seconds"], [tuple(each.values()) for each in found]),
+            ".json": lambda: sealed_json(found, in_a_list=rows > 1),
+            ".svg": lambda: sealed_text(f"<svg><li>{BLANK}</li>{found}</svg>"),
+        }
+        path.write_text(text[path.suffix]())
         return path
     corners, starts = np.array([0, 1, 2], np.int32), np.array([0, 3], np.int32)
     vertices = draw.random((3 * rows, 3))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import os
@@ -13,7 +12,7 @@ from illumcli.accuracy.convergence import Convergence, Curve
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix, refuse_unwritable
-from illumcli.files.seal import sealed_png
+from illumcli.files.seal import BLANK, sealed_csv, sealed_png, sealed_text
 from illumcli.render_graph.keys import digest
 
 COLUMNS = (
@@ -80,20 +79,17 @@ def _times(factor: float) -> str:
 
 def as_csv(found: Convergence) -> str:
     """A line per picture."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for curve in found.curves:
-        for p in curve.points:
-            for run in p.runs:
-                writer.writerow(
-                    (
-                        found.scene, found.camera, found.layer, found.width, found.height, found.vary,
-                        curve.sampler, p.pixel, p.obscurance, p.count, run.repeat, run.seed, run.content,
-                        run.rays, f"{run.seconds:.6f}", f"{run.rmse:.9g}", f"{found.reference.rmse:.9g}",
-                    )
-                )  # fmt: skip
-    return out.getvalue()
+    rows = [
+        (
+            found.scene, found.camera, found.layer, found.width, found.height, found.vary, curve.sampler,
+            p.pixel, p.obscurance, p.count, run.repeat, run.seed, run.content, run.rays,
+            f"{run.seconds:.6f}", f"{run.rmse:.9g}", f"{found.reference.rmse:.9g}",
+        )
+        for curve in found.curves
+        for p in curve.points
+        for run in p.runs
+    ]  # fmt: skip
+    return sealed_csv(COLUMNS, rows)
 
 
 def drawn(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str:
@@ -199,6 +195,10 @@ def write_picture(path: Path, found: Convergence, content: str) -> None:
         over_count.legend()
         figure.suptitle(f"{found.scene}, {found.width} x {found.height}")
         out = io.BytesIO()
-        about = {"Date": None, "Identifier": content} if kind == "svg" else {"illum:content": content}
+        of_svg = {"Date": None, "Identifier": content, "Keywords": BLANK}
+        about = of_svg if kind == "svg" else {"illum:content": content}
         figure.savefig(out, format=kind, dpi=150, metadata=about)
-    write_bytes(path, sealed_png(out.getvalue()) if kind == "png" else out.getvalue())
+    if kind == "png":
+        write_bytes(path, sealed_png(out.getvalue()))
+    else:
+        write_text(path, sealed_text(out.getvalue().decode()))

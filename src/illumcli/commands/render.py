@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import platform
@@ -23,6 +22,7 @@ from illumcli.commands.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.outputs import is_kept, refresh
+from illumcli.files.seal import sealed_json
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
 from illumcli.geometry.repairs import Repairs
@@ -512,5 +512,5 @@ def versions() -> dict[str, str]:
 
 
 def report_text(entries: Sequence[Mapping[str, Any]]) -> str:
-    """One entry, or a list of several, as JSON; each says its `content`."""
-    return json.dumps(entries[0] if len(entries) == 1 else entries, indent=1) + "\n"
+    """One entry, or a list of several, as JSON; each says its `content`, the first the file's hash."""
+    return sealed_json(entries, in_a_list=len(entries) > 1)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +13,7 @@ from illumcli.cache.fingerprint import file_digest
 from illumcli.commands.render import channels
 from illumcli.errors import InputError, OutputError
 from illumcli.files.outputs import INCOMPLETE, is_kept, is_whole, refresh, refuse_suffix
+from illumcli.files.seal import sealed_csv, sealed_json
 from illumcli.memory import refuse_beyond
 from illumcli.records import Record, Value
 from illumcli.render_graph.keys import digest
@@ -73,7 +71,7 @@ class ToWrite(Value):
                 sheet(outcomes, files.sheet, content)
         if files.report is not None and files.report not in self.kept:
             entries = report_data(outcomes, self._contents(outcomes))
-            write_text(files.report, json.dumps(entries, indent=1) + "\n")
+            write_text(files.report, sealed_json(entries, in_a_list=True))
         for path in self.kept:
             refresh(path)
         return spared
@@ -219,11 +217,8 @@ def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Refer
         own = [outcome.paths[0] for outcome in outcomes if outcome.number == reference.number]
         against = written_colors(own[0])[0] if own else reference.pixels
     measures = ["mean"] + (["rmse", "largest"] if reference is not None else [])
-    out = io.StringIO()
-    lines = csv.writer(out, lineterminator="\n")
-    lines.writerow(
-        ["variant", "frame", *paths, "file", "content", "state", "seconds", "rays", "reused", *measures]
-    )
+    columns = ["variant", "frame", *paths, "file", "content", "state", "seconds", "rays", "reused", *measures]
+    rows = []
     for outcome, content in zip(outcomes, contents, strict=True):
         report = outcome.report
         state = "failed" if report is None else "rendered" if report.written else "kept"
@@ -240,8 +235,8 @@ def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Refer
             if against is not None:
                 apart = difference(against, picture)
                 row += [f"{apart.rmse:.9g}", f"{apart.largest:.9g}"]
-        lines.writerow(row)
-    return out.getvalue()
+        rows.append(row)
+    return sealed_csv(columns, rows)
 
 
 def sheet(outcomes: Sequence[Outcome], path: Path, content: str) -> None:

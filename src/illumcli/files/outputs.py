@@ -2,7 +2,7 @@
 
 Every file names the content that it was made from, or those that its rows and entries were made from. Equal
 contents give equal files, but for what differs from run to run: seconds, rays, what was reused. So a file is
-told to be the same without making it anew.
+told to be the same without making it anew, and it holds its own hash, so that it is known to be whole.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from illumcli.files.seal import is_sealed
 
 INCOMPLETE = "incomplete"
 """The content of what failed: a file that holds it may be replaced."""
-_SEALED = (".png", ".exr", ".npz", ".ply", ".glb")
 _OR_CHANGED = ", or one that was changed or damaged since it was written"
 _SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
 
@@ -79,7 +78,7 @@ def refresh(path: Path) -> None:
 def stored_contents(path: Path) -> list[str]:
     """The contents that a file of ours names; empty where it is none, or is not what was written."""
     try:
-        if path.suffix.lower() in _SEALED and not is_sealed(path):
+        if not is_sealed(path):
             return []
         match path.suffix.lower():
             case ".csv":

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import _bench
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -38,10 +38,10 @@ class Run:
     def __init__(self, scene: Path, *overrides: str) -> None:
         loaded = load(scene, (*SIZE, *overrides))
         self.steps = plan(loaded.scene, loaded, ["beauty"])
-        self.shared = run_once(self.steps, Tally())
+        self.shared = run_once(self.steps, RenderStats())
 
     def __call__(self) -> None:
-        self.tally = Tally()
+        self.tally = RenderStats()
         made = list(bands(self.steps, self.shared, self.steps.views[0], 1, self.tally))
         self.beauty = np.concatenate([band.layers["beauty"] for band in made])
 

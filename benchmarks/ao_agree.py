@@ -28,7 +28,7 @@ from illumcli.files.vertex_data import read_npz
 from illumcli.graph import order
 from illumcli.rays.interaction import Hits, facets
 from illumcli.render_graph.build import recipes
-from illumcli.scene.load import Loaded, load
+from illumcli.scene.load import SceneFile, load
 
 POINTS = 20 if SMALL else 2000
 RAYS = 64 if SMALL else 256
@@ -40,7 +40,7 @@ MADE = ("world", "tracer", "corner_normals")
 class Pictures:
     """A mesh's surface, asked at points as a picture asks its samples."""
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: SceneFile) -> None:
         self.book = recipes(loaded.scene, loaded)
         given = ("hits", "facets", "obscurance_draws", "view", "tile")
         self.steps = order(self.book, [*MADE, "obscurance"], given)

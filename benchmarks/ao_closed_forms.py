@@ -24,7 +24,7 @@ from illumcli.arrays import F, columns
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place
 from illumcli.rays.embree import Tracer
-from illumcli.rays.offsets import lifted
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.obscurance import CAST, exponential
 from illumcli.verification.surroundings import surroundings
@@ -88,7 +88,7 @@ def covered(each: Found, law: Errors, samples: int) -> tuple[float, ...]:
     """Share of the scrambles whose interval holds the truth, by three laws; mean square error, and stated."""
     off = np.abs(each.scrambles.w - each.truth)
     own = Errors.of_pairs(each.a, each.b, samples)
-    stated, alone = (rule.at(each.scrambles.unevenness, samples) for rule in (law, own))
+    stated, alone = (rule.at(each.scrambles.neighbor_variation, samples) for rule in (law, own))
     square = np.mean(off**2)
     shares = [np.mean(off <= 1.96 * error + BUILT) for error in (stated, alone, square**0.5)]
     return (*map(float, shares), float(square), float(np.mean(np.square(stated, dtype=float))))
@@ -111,8 +111,8 @@ def estimated(case: Any, samples: int) -> Found:
 
     def cast(count: int) -> Estimates:
         ng = columns(np.tile([0.0, 0.0, 1.0], (count, 1)), F)
-        here = np.tile(world.frame.inward(np.zeros(3)), (count, 1))
-        origins = lifted(here, ng, np.full(count, edge))
+        here = np.tile(world.frame.from_world(np.zeros(3)), (count, 1))
+        origins = offset_ray_origins(here, ng, np.full(count, edge))
         method = Method(samples, falloff, world.frame.radius)
         return estimates(tracer, Hemispheres(ng, origins), rng.random((2, count)), method)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
 from illumcli.baking.points import vertex_points
-from illumcli.baking.sampling import Caster
+from illumcli.baking.sampling import BakeSampler
 from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64, 256, 1024)
@@ -30,7 +30,7 @@ VERTICES = 800
 
 def caster(
     path: Path, sampler: str = "spiral", seed: int = 0, ground: str | None = None
-) -> tuple[Caster, np.ndarray]:
+) -> tuple[BakeSampler, np.ndarray]:
     """The bake of a mesh alone, and the points that cast rays."""
     loaded = bare(path, ())
     scene = loaded.scene
@@ -41,7 +41,7 @@ def caster(
     method = Method(256, settings.obscurance().falloff, world.frame.radius, sampler)
     threads = len(os.sched_getaffinity(0))
     quiet = lambda what, done, of: None  # noqa: E731
-    made = Caster(vertices.points, occluders_of(scene, world, settings), method, seed, threads, quiet)
+    made = BakeSampler(vertices.points, occluders_of(scene, world, settings), method, seed, threads, quiet)
     return made, np.flatnonzero(~made.open())
 
 
@@ -68,7 +68,7 @@ def main() -> None:
                 errors[sampler].append(float(np.sqrt(np.mean(off**2))))
                 if sampler == "spiral":
                     law = bake.errors(lanes, np.full(len(lanes), count), 7)
-                    said = law.at(found.unevenness, count)
+                    said = law.at(found.neighbor_variation, count)
                     covered = np.mean(np.abs(off) <= 1.96 * said)
             s, r, o = (errors[name][-1] for name in ("spiral", "random", "owen"))
             row = f"{count:5d} {s:10.5f} {r:10.5f}  {s / r:.3f}       {o / r:.3f} {law.rmse:.5f}"

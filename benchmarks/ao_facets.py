@@ -21,7 +21,7 @@ from _bench import SMALL, header
 from illumcli.arrays import F, columns, dot, length, rows, unit
 from illumcli.baking.bake import bare
 from illumcli.graph import order
-from illumcli.rays.interaction import Facets, Hits, facets
+from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
 from illumcli.visibility.falloffs.step import Step
@@ -43,7 +43,7 @@ def shared_edges(triangles: np.ndarray) -> np.ndarray:
     return np.stack([at[first], at[first + 1]], axis=1)
 
 
-def beside(world: Any, side: np.ndarray) -> tuple[Hits, Facets]:
+def beside(world: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
     """Points just inside triangles, beside the middle of a side, seen from in front."""
     triangle, k = np.divmod(side, 3)
     weights = np.full((len(side), 3), (1 - INSIDE) / 2, F)
@@ -80,7 +80,7 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     method = Method(RAYS, Step(), world.frame.radius)
     found = []
     for seed, (_, facet, normal) in enumerate([*sides, sides[0]]):
-        own = Facets(*(rows(values, few) for values in vars(facet).values()))
+        own = SurfaceInteraction(*(rows(values, few) for values in vars(facet).values()))
         origins, draws = ray_origins(own), np.random.default_rng(seed).random((2, len(few)))
         about = Hemispheres(own.ng, origins), Hemispheres(rows(normal, few), origins, own.ng)
         found.append([estimates(made["tracer"], over, draws, method).w for over in about])

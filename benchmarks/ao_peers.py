@@ -33,7 +33,7 @@ from ao_error import caster
 from illumcli.arrays import F
 from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
 from illumcli.baking.points import vertex_points
-from illumcli.baking.sampling import Caster
+from illumcli.baking.sampling import BakeSampler
 from illumcli.rays.sampling import GOLDEN
 from illumcli.visibility.obscurance import Method, turned_frame
 
@@ -119,19 +119,19 @@ def illum(path: Path, truth: np.ndarray) -> Baker:
         points = vertex_points(surfaces).points
         method = Method(rays, settings.obscurance().falloff, world.frame.radius)
         quiet = lambda what, done, of: None  # noqa: E731
-        made = Caster(points, occluders_of(loaded.scene, world, settings), method, 0, THREADS, quiet)
+        made = BakeSampler(points, occluders_of(loaded.scene, world, settings), method, 0, THREADS, quiet)
         lanes = np.flatnonzero(~made.open())
         samples = np.full(len(lanes), rays)
         w = np.ones(len(points.number))
         found = made.cast("values", lanes, samples, 0)
         w[lanes] = found.w
-        made.errors(lanes, samples, 1 << 20).at(found.unevenness, rays)
+        made.errors(lanes, samples, 1 << 20).at(found.neighbor_variation, rays)
         return w
 
     return Baker("illum", bake, truth)
 
 
-def peers(path: Path, own: Caster, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
+def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
     """Those that are installed."""
     loaded = bare(path, ())
     world = surfaces_of(loaded.scene, loaded)[0].world
@@ -151,14 +151,14 @@ def peers(path: Path, own: Caster, few: np.ndarray, truth: np.ndarray) -> list[B
     return found
 
 
-def starts(own: Caster) -> np.ndarray:
+def starts(own: BakeSampler) -> np.ndarray:
     """(M, 3) one of the places around each point from which rays start."""
     every = np.arange(len(own.points.number))
     over = own.points.hemispheres(every, np.zeros(len(every)))
     return over.origins[:: over.starts]
 
 
-def even(own: Caster, few: np.ndarray) -> np.ndarray:
+def even(own: BakeSampler, few: np.ndarray) -> np.ndarray:
     """What libigl tends to: the share of the hemisphere, without the cosine, that is open."""
     k = np.arange(REFERENCE)
     z = (k + 0.5) / REFERENCE

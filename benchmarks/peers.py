@@ -60,7 +60,7 @@ def placed_bunny(folder: Path) -> Path:
     mesh = read_mesh(folder / source) if source.endswith(".obj") else Teapot(shape="teapot").mesh()
     matrix = assemble.transform_matrix(Transform(fit=1.0), mesh)
     world = assemble.place([mesh], [matrix])
-    points = world.frame.outward(world.vertices.astype(np.float64))
+    points = world.frame.to_world(world.vertices.astype(np.float64))
     normals = assemble.world_normals(world, [corner_normals(mesh)])
     own = np.zeros((len(points), 3), np.float32)
     own[world.triangles] = normals.values[normals.index[world.corners]]

@@ -35,7 +35,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     """The world and the questions of every band of tiles, as the renderer asks them."""
     loaded = load(path)
     steps = plan(loaded.scene, loaded, ["obscurance"])
-    shared = execute.run_once(steps, execute.Tally())
+    shared = execute.run_once(steps, execute.RenderStats())
     asked: list[Question] = []
     own = {name: getattr(Tracer, name) for name in ("closest", "distance", "occluded")}
 
@@ -59,7 +59,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
                 for x in range(0, view.width, side)
             ]
             x, rows = (np.concatenate(part) for part in zip(*(tile.pixels() for tile in tiles), strict=True))
-            execute.at_pixels(steps, shared, view, x, rows, threads, execute.Tally())
+            execute.at_pixels(steps, shared, view, x, rows, threads, execute.RenderStats())
             yield shared["world"], asked[:]
             asked.clear()
     finally:

@@ -23,7 +23,7 @@ from illumcli.render_graph import build as recipes
 from illumcli.render_graph import stages
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, without
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.shading import direct
@@ -73,7 +73,7 @@ def everywhere(light, frame, position, n=None):
         reached &= arriving.dot(n, got.l) > 0
     strength = np.where(reached, got.strength, 0).astype(np.float32)
     lane = np.arange(len(position), dtype=np.int32)
-    return arriving.Lit(lane, len(position), got.l, got.distance, strength)
+    return arriving.LitPoints(lane, len(position), got.l, got.distance, strength)
 
 
 def asked(light, frame, points, shadow):
@@ -81,7 +81,7 @@ def asked(light, frame, points, shadow):
     lit = everywhere(light, frame, points.position, points.n)
     free = np.flatnonzero(shadow)
     lane, l, distance, strength = (rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength))
-    return arriving.Lit(lane, lit.count, l, distance, strength)
+    return arriving.LitPoints(lane, lit.count, l, distance, strength)
 
 
 def dimmed(light, frame, points, shadow):
@@ -142,7 +142,7 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
 
     loaded = load(path, skip.overrides)
     made = plan(loaded.scene, loaded, layers)
-    tally = Tally()
+    tally = RenderStats()
     made = without(made, loaded, unseen_objects(made, Artifacts(), tally))
     with patch.object(direct, "response", counted), patch.object(direct, "evaluate", counted_lobes):
         shared = run_once(made, tally)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from illumcli.graph import Recipe, order, required
+from illumcli.graph import Node, order, required
 
 
 @st.composite
@@ -16,7 +16,7 @@ def books(draw):
     """Recipes b0..bn, each needing only earlier ones, told in any order."""
     count = draw(st.integers(1, 25))
     needs = [draw(st.sets(st.integers(0, i - 1), max_size=4)) if i else set() for i in range(count)]
-    recipes = [Recipe(f"b{i}", int, {f"b{j}": f"b{j}" for j in need}) for i, need in enumerate(needs)]
+    recipes = [Node(f"b{i}", int, {f"b{j}": f"b{j}" for j in need}) for i, need in enumerate(needs)]
     return {recipe.makes: recipe for recipe in draw(st.permutations(recipes))}
 
 
@@ -34,17 +34,17 @@ def test_needs_come_first_and_nothing_else_runs(book, data):
 
 
 def test_given_buffers_need_no_recipe():
-    book = {"a": Recipe("a", int, {"x": "tile"})}
+    book = {"a": Node("a", int, {"x": "tile"})}
     assert [step.makes for step in order(book, ["a"], ["tile"])] == ["a"]
 
 
 def test_a_buffer_nobody_makes_is_named():
     with pytest.raises(KeyError, match="tile"):
-        order({"a": Recipe("a", int, {"x": "tile"})}, ["a"])
+        order({"a": Node("a", int, {"x": "tile"})}, ["a"])
 
 
 def test_a_circle_is_shown():
-    book = {"a": Recipe("a", int, {"x": "b"}), "b": Recipe("b", int, {"x": "a"})}
+    book = {"a": Node("a", int, {"x": "b"}), "b": Node("b", int, {"x": "a"})}
     with pytest.raises(ValueError, match="a -> b -> a"):
         order(book, ["a"])
 
@@ -55,7 +55,7 @@ def test_needs_are_the_parameters_without_default_or_binding():
 
     assert required(stage) == ("scene", "hits")
     bound = partial(stage, "a scene")
-    assert Recipe.of(bound, "x").needs == {"hits": "hits"}
-    recipe = Recipe.of(bound, "x", hits="seen", shadow="shadow:key")
+    assert Node.of(bound, "x").needs == {"hits": "hits"}
+    recipe = Node.of(bound, "x", hits="seen", shadow="shadow:key")
     assert recipe.needs == {"hits": "seen", "shadow": "shadow:key"}
     assert recipe.make({"seen": 1, "shadow:key": 2}) == ("a scene", 1, 2)

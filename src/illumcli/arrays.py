@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 F = np.float32
 
-Lanes: TypeAlias = NDArray[np.floating[Any]]  # (N,)
+Floats: TypeAlias = NDArray[np.floating[Any]]  # (N,)
 Vectors: TypeAlias = NDArray[np.floating[Any]]  # (N, 3)
 Ids: TypeAlias = NDArray[np.int32]  # (N,)
 
@@ -45,7 +45,7 @@ def repeated(vectors: Vectors, count: int) -> Vectors:
     return np.repeat(vectors.T, count, axis=1).T
 
 
-def dot(a: Vectors, b: Vectors) -> Lanes:
+def dot(a: Vectors, b: Vectors) -> Floats:
     """(N,) a . b per lane; column sums in a fixed order, so no lane depends on its neighbours."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
@@ -58,7 +58,7 @@ def cross(a: Vectors, b: Vectors) -> Vectors:
     return out
 
 
-def length(a: Vectors) -> Lanes:
+def length(a: Vectors) -> Floats:
     """(N,) Euclidean length per lane; 0 and overflow as the precision of `a` has them."""
     return np.sqrt(dot(a, a))
 
@@ -69,7 +69,7 @@ def unit(a: Vectors) -> Vectors:
     return a * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
 
 
-def mirror(l: Vectors, n: Vectors, n_l: Lanes) -> Vectors:
+def mirror(l: Vectors, n: Vectors, n_l: Floats) -> Vectors:
     """(N, 3) r = 2 (n . l) n - l, `l` mirrored at `n`."""
     return (2 * n_l)[:, None] * n - l
 

@@ -10,7 +10,7 @@ from typing import Any
 from illumcli.records import Value
 
 
-class Recipe(Value):
+class Node(Value):
     """A function, the buffer it makes, and the buffer behind each of its parameters."""
 
     makes: str
@@ -18,7 +18,7 @@ class Recipe(Value):
     needs: Mapping[str, str]  # parameter -> buffer
 
     @classmethod
-    def of(cls, function: Callable[..., Any], makes: str | None = None, **renamed: str) -> Recipe:
+    def of(cls, function: Callable[..., Any], makes: str | None = None, **renamed: str) -> Node:
         """A recipe whose needs are the function's own parameter names, `renamed` where given.
 
         A parameter with a default is needed only when `renamed` names its buffer.
@@ -48,7 +48,7 @@ def _parameters(function: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(p.name for p in parameters if p.default is p.empty)
 
 
-def order(book: Mapping[str, Recipe], outputs: Iterable[str], given: Iterable[str] = ()) -> list[Recipe]:
+def order(book: Mapping[str, Node], outputs: Iterable[str], given: Iterable[str] = ()) -> list[Node]:
     """The recipes that `outputs` reach, each after all it needs; `given` buffers need no recipe.
 
     Raises
@@ -56,17 +56,15 @@ def order(book: Mapping[str, Recipe], outputs: Iterable[str], given: Iterable[st
     KeyError
         A buffer that no recipe makes.
     ValueError
-        Recipes that need each other in a circle.
+        Nodes that need each other in a circle.
     """
-    done, steps = set(given), []  # type: set[str], list[Recipe]
+    done, steps = set(given), []  # type: set[str], list[Node]
     for name in outputs:
         _visit(name, book, done, [], steps)
     return steps
 
 
-def _visit(
-    name: str, book: Mapping[str, Recipe], done: set[str], path: list[str], steps: list[Recipe]
-) -> None:
+def _visit(name: str, book: Mapping[str, Node], done: set[str], path: list[str], steps: list[Node]) -> None:
     """Add the recipe of `name` behind all it needs; `path` led here.
 
     Not a function inside `order`: one that calls itself there is a reference cycle, and keeps the book and

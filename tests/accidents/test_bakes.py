@@ -14,7 +14,7 @@ from contextlib import suppress
 import pytest
 
 from illumcli.baking.bake import Settings, prepared, run
-from illumcli.baking.sampling import Caster
+from illumcli.baking.sampling import BakeSampler
 from illumcli.files.journal import place
 
 RAYS = 1 << 10
@@ -45,7 +45,7 @@ def bake(mesh, out, seed=0, **more):
 
 def interrupted(monkeypatch, after, at=lambda piece: None):
     """From now on a bake is interrupted after so many pieces; `at` is called with the number of each."""
-    whole, done = Caster._run, []
+    whole, done = BakeSampler._run, []
 
     def breaks(self, what, pieces, ask):
         for found in whole(self, what, pieces, ask):
@@ -56,7 +56,7 @@ def interrupted(monkeypatch, after, at=lambda piece: None):
                 done.append(found)
             yield found
 
-    monkeypatch.setattr(Caster, "_run", breaks)
+    monkeypatch.setattr(BakeSampler, "_run", breaks)
     return whole
 
 
@@ -68,12 +68,12 @@ def test_two_bakes_to_one_file_never_get_each_others_values(mesh, tmp_path, monk
     for count in range(1, 11):
         out = tmp_path / f"{count}.npz"
         bake(mesh, tmp_path / "whole.npz", seed=2, force=True)
-        whole = Caster._run
+        whole = BakeSampler._run
 
         def other(piece, count=count, out=out, whole=whole):
             # in the middle of the first bake the second starts and is killed, too
             if piece == count:
-                monkeypatch.setattr(Caster, "_run", whole)
+                monkeypatch.setattr(BakeSampler, "_run", whole)
                 interrupted(monkeypatch, 1)
                 with suppress(KeyboardInterrupt):
                     bake(mesh, out, seed=2)
@@ -81,26 +81,26 @@ def test_two_bakes_to_one_file_never_get_each_others_values(mesh, tmp_path, monk
         interrupted(monkeypatch, count + 20, other)
         with suppress(KeyboardInterrupt):
             bake(mesh, out, seed=1)
-        monkeypatch.setattr(Caster, "_run", whole)
+        monkeypatch.setattr(BakeSampler, "_run", whole)
         bake(mesh, out, seed=2)
         assert out.read_bytes() == (tmp_path / "whole.npz").read_bytes(), count
 
 
 def test_an_equal_bake_that_runs_already_is_neither_disturbed_nor_waited_for(mesh, tmp_path, monkeypatch):
     out, twin = tmp_path / "out.npz", tmp_path / "twin.npz"
-    whole = Caster._run
+    whole = BakeSampler._run
     said = []
 
     def other(piece):
         if piece == 5:
-            monkeypatch.setattr(Caster, "_run", whole)
+            monkeypatch.setattr(BakeSampler, "_run", whole)
             said.append(bake(mesh, out))
             os.rename(out, twin)
 
     interrupted(monkeypatch, 10, other)
     with pytest.raises(KeyboardInterrupt):
         bake(mesh, out)
-    monkeypatch.setattr(Caster, "_run", whole)
+    monkeypatch.setattr(BakeSampler, "_run", whole)
     assert said[0].resumed == 0
     assert any("in use" in line for line in said[0].warnings)
     assert bake(mesh, out).resumed == 10 * RAYS
@@ -116,7 +116,7 @@ def test_a_bake_taken_up_again_gives_the_same_file(mesh, tmp_path, monkeypatch, 
         whole = interrupted(monkeypatch, after)
         with pytest.raises(KeyboardInterrupt):
             bake(mesh, out)
-        monkeypatch.setattr(Caster, "_run", whole)
+        monkeypatch.setattr(BakeSampler, "_run", whole)
     assert bake(mesh, out).resumed == 24 * RAYS
     assert out.read_bytes() == (tmp_path / f"whole.{kind}").read_bytes()
     assert hidden(tmp_path) == []
@@ -130,7 +130,7 @@ def test_damaged_pieces_are_made_again(mesh, tmp_path, monkeypatch):
         whole = interrupted(monkeypatch, 12)
         with pytest.raises(KeyboardInterrupt):
             bake(mesh, out)
-        monkeypatch.setattr(Caster, "_run", whole)
+        monkeypatch.setattr(BakeSampler, "_run", whole)
         (kept,) = tmp_path.glob(".*.unfinished")
         data = bytearray(kept.read_bytes())
         at = draw.randrange(len(data))
@@ -146,7 +146,7 @@ def test_what_a_kill_between_the_rename_and_the_end_leaves_is_removed(mesh, tmp_
     whole = interrupted(monkeypatch, 5)
     with pytest.raises(KeyboardInterrupt):
         bake(mesh, out)
-    monkeypatch.setattr(Caster, "_run", whole)
+    monkeypatch.setattr(BakeSampler, "_run", whole)
     (kept,) = tmp_path.glob(".*.unfinished")
     left = kept.read_bytes()
     bake(mesh, out)
@@ -162,7 +162,7 @@ def test_a_journal_that_nobody_takes_up_goes_with_the_next_bake_of_its_output(me
         whole = interrupted(monkeypatch, 5)
         with pytest.raises(KeyboardInterrupt):
             bake(mesh, path, seed=1)
-        monkeypatch.setattr(Caster, "_run", whole)
+        monkeypatch.setattr(BakeSampler, "_run", whole)
     assert len(hidden(tmp_path)) == 2
     bake(mesh, out, seed=2)
     (kept,) = tmp_path.glob(".*.unfinished")  # of the other output

@@ -294,7 +294,7 @@ def changed(said, how):
             place["shape"] = [1, *place["shape"]] if "value" not in about else place["shape"]
             place["dtype"] = "<f4" if place["dtype"] == "<i4" else "|u1"
     elif how == "class" and isinstance(value, dict) and "class" in value:
-        value["class"] = "Repair" if value["class"] != "Repair" else "Frame"
+        value["class"] = "Repair" if value["class"] != "Repair" else "RenderSpace"
     elif how == "unknown class" and isinstance(value, dict):
         about["value"] = {"class": "os.system", "fields": {}}
     elif how == "field" and isinstance(value, dict) and "fields" in value:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from illumcli.cache.fingerprint import Content, file_digest
+from illumcli.cache.fingerprint import FileFingerprint, file_digest
 from illumcli.errors import InputError
 
 
-def content(path: Path, *others: Path) -> Content:
-    return Content(lambda: path, lambda found: others) if others else Content(lambda: path)
+def content(path: Path, *others: Path) -> FileFingerprint:
+    return FileFingerprint(lambda: path, lambda found: others) if others else FileFingerprint(lambda: path)
 
 
 def test_equal_contents_are_equal_whatever_their_names_and_dates(tmp_path):

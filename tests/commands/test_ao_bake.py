@@ -11,14 +11,14 @@ from click.testing import CliRunner
 from plyfile import PlyData, PlyElement
 
 from illumcli.baking.bake import Settings, run
-from illumcli.baking.sampling import Caster
+from illumcli.baking.sampling import BakeSampler
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
 from illumcli.files.vertex_data import read_npz
 from illumcli.geometry.normals import corner_normals
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -332,7 +332,7 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
     path, out = wavy(tmp_path), tmp_path / "out.npz"
     monkeypatch.setattr("illumcli.baking.sampling.RAYS", 1 << 12)
     run(path, [tmp_path / "one.npz"], Settings(), threads=1)
-    cast, rays = Caster._run, []
+    cast, rays = BakeSampler._run, []
 
     def breaks(self, what, pieces, ask):
         for number, found in cast(self, what, pieces, ask):
@@ -341,12 +341,12 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
                 raise KeyboardInterrupt
             yield number, found
 
-    monkeypatch.setattr(Caster, "_run", breaks)
+    monkeypatch.setattr(BakeSampler, "_run", breaks)
     with pytest.raises(KeyboardInterrupt):
         run(path, [out], Settings(), threads=2)
     assert not out.exists()
     assert len(list(tmp_path.glob(".*.unfinished"))) == len(list(tmp_path.glob(".*"))) == 1
-    monkeypatch.setattr(Caster, "_run", cast)
+    monkeypatch.setattr(BakeSampler, "_run", cast)
     _, report = run(path, [out], Settings(), threads=2)
     _, whole = run(path, [tmp_path / "two.npz"], Settings(), threads=2)
     assert (report.resumed, whole.resumed) == (11 * (1 << 12), 0)
@@ -508,7 +508,7 @@ def test_a_picture_reads_the_values_of_corners(hard_cube, text_mesh, tmp_path):
     )
     scene = load(text_mesh(text, "scene.yaml"))
     steps = plan(scene.scene, scene, ["obscurance"])
-    rows = bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally())
+    rows = bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats())
     w = np.concatenate([band.layers["obscurance"] for band in rows])
     np.testing.assert_allclose(w, 1, atol=1e-6)  # the top, whose vertices have 0.7 in the mean
 

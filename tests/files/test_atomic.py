@@ -13,7 +13,7 @@ import pytest
 
 from illumcli.errors import OutputError
 from illumcli.files import atomic
-from illumcli.files.atomic import Part, write_bytes, write_text
+from illumcli.files.atomic import AtomicFile, write_bytes, write_text
 from illumcli.images.writer import ImageWriter
 
 
@@ -37,7 +37,7 @@ def test_missing_folders_are_made(tmp_path):
 def test_old_file_stays_until_the_new_one_is_whole(tmp_path):
     target = tmp_path / "a.txt"
     target.write_text("old")
-    with Part(target) as part:
+    with AtomicFile(target) as part:
         part.path.write_text("new")
         assert target.read_text() == "old"
         assert len(parts(tmp_path)) == 1
@@ -63,7 +63,7 @@ def test_whatever_stops_the_writer_leaves_no_debris(tmp_path, stop):
     (tmp_path / "a.txt").write_text("old")
 
     def stopped():
-        with Part(tmp_path / "a.txt") as part:
+        with AtomicFile(tmp_path / "a.txt") as part:
             part.path.write_text("half of")
             raise stop
 
@@ -131,7 +131,7 @@ def test_refused_system_calls_are_output_errors(tmp_path, monkeypatch, call, num
 def test_full_disk_while_writing_is_an_output_error(tmp_path):
 
     def fill():
-        with Part(tmp_path / "a.txt"), open("/dev/full", "w") as full:
+        with AtomicFile(tmp_path / "a.txt"), open("/dev/full", "w") as full:
             full.write("text")
 
     with pytest.raises(OutputError, match="No space left on device; free some space"):
@@ -140,13 +140,13 @@ def test_full_disk_while_writing_is_an_output_error(tmp_path):
 
 
 def test_error_of_another_file_stays_what_it_is(tmp_path):
-    with pytest.raises(FileNotFoundError), Part(tmp_path / "a.txt"):
+    with pytest.raises(FileNotFoundError), AtomicFile(tmp_path / "a.txt"):
         (tmp_path / "missing").read_text()
     assert os.listdir(tmp_path) == []
 
 
 def test_parts_that_nobody_holds_are_removed_and_no_others(tmp_path):
-    target, other = tmp_path / "a.txt", Part(tmp_path / "b.txt")
+    target, other = tmp_path / "a.txt", AtomicFile(tmp_path / "b.txt")
     (live,) = parts(tmp_path)
     dead = [atomic.beside(tmp_path / name, "0123abcd.part") for name in ("a.txt", "c.txt")]
     mine = tmp_path / ".a.txt.part"
@@ -188,7 +188,7 @@ def test_the_part_of_a_live_process_is_kept_whatever_its_host_and_number_seem(tm
 def test_the_mode_of_a_replaced_file_is_kept(tmp_path, mode):
     (tmp_path / "a.txt").write_text("old")
     (tmp_path / "a.txt").chmod(mode)
-    with Part(tmp_path / "a.txt") as part:
+    with AtomicFile(tmp_path / "a.txt") as part:
         (name,) = parts(tmp_path)
         assert (tmp_path / name).stat().st_mode & 0o077 == 0
         part.path.write_text("new")
@@ -216,7 +216,7 @@ def test_a_link_that_takes_the_place_of_a_part_is_not_followed(tmp_path, name):
 
     def write():
         if name == "a.txt":
-            with Part(tmp_path / name) as part:
+            with AtomicFile(tmp_path / name) as part:
                 swap()
                 part.path.write_text("new")
             return
@@ -293,14 +293,14 @@ def test_a_signal_that_falls_before_the_block_leaves_no_file_either(tmp_path, mo
 
     monkeypatch.setattr(os, "open", created_then_stopped)
     with pytest.raises(KeyboardInterrupt):
-        atomic.Part(tmp_path / "a.txt")
+        atomic.AtomicFile(tmp_path / "a.txt")
     assert len(os.listdir(tmp_path)) == 1
     atomic.discard_open()
     assert os.listdir(tmp_path) == []
 
 
 def test_a_part_that_is_gone_already_is_discarded_too(tmp_path):
-    part = Part(tmp_path / "a.txt")
+    part = AtomicFile(tmp_path / "a.txt")
     (tmp_path / parts(tmp_path)[0]).unlink()
     part.discard()
     assert not [path for path in atomic._open if path.parent == tmp_path]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from illumcli.lights.spot import Spot
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 
-FRAME = Frame((0.0, 0.0, 0.0), 1.0)
+FRAME = RenderSpace((0.0, 0.0, 0.0), 1.0)
 HEIGHT = 1000.0
 ANGLES = (1e-6, 1e-4, 0.01, 0.1, 1.0, 30.0, 89.0)  # degrees
 

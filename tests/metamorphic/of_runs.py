@@ -17,7 +17,7 @@ from illumcli.commands import render, sweep
 from illumcli.images.oiio import read_image
 from illumcli.render_graph import cached as artifacts
 from illumcli.render_graph.cached import Memory
-from illumcli.render_graph.execute import Tally, at_pixels, run_once
+from illumcli.render_graph.execute import RenderStats, at_pixels, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, pictures, same
@@ -64,7 +64,7 @@ def a_crop_is_part_of_the_whole(case: Case, random: Random, studio: Studio) -> N
     x0, y0 = random.randrange(view.width), random.randrange(view.height)
     x1, y1 = random.randint(x0 + 1, view.width), random.randint(y0 + 1, view.height)
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)))
-    tally = Tally()
+    tally = RenderStats()
     part = at_pixels(steps, run_once(steps, tally), view, x, y, 1, tally)
     shape = (y1 - y0, x1 - x0, -1)
     same(

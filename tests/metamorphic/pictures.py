@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from illumcli.cache.store import Store
 from illumcli.render_graph.cached import Artifacts, Memory
 from illumcli.render_graph.culling import unseen_objects, without
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
@@ -39,11 +39,11 @@ def pictures(
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, layers)
     first = Artifacts(store, memory)
-    steps = without(made, loaded, unseen_objects(made, first, Tally(), threads))
+    steps = without(made, loaded, unseen_objects(made, first, RenderStats(), threads))
     out: Pictures = {}
     for view in steps.views:
         artifacts = Artifacts(store, memory, reused=dict(first.reused), made=first.made)
-        narrowed, tally = reusing(steps, view, artifacts), Tally()
+        narrowed, tally = reusing(steps, view, artifacts), RenderStats()
         shared = run_once(narrowed, tally, artifacts, threads)
         rows = list(bands(narrowed, shared, view, threads, tally, side=side, artifacts=artifacts))
         for name in rows[0].layers:

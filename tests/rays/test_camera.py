@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from illumcli.rays.camera import CLOSEST, MARGIN, axes, camera_rays, film_points, framing
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Filter, Orthographic, Perspective
 
-UNIT = Frame((0.0, 0.0, 0.0), 1.0)
+UNIT = RenderSpace((0.0, 0.0, 0.0), 1.0)
 
 
 def test_the_centre_looks_at_the_target_and_corners_open_by_the_field_of_view():

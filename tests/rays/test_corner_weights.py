@@ -13,7 +13,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import CornerVectors, place, polygon_centres, rotation
 from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
-from illumcli.rays.interaction import Facets, quadratic
+from illumcli.rays.interaction import SurfaceInteraction, quadratic
 
 F = np.float32
 TURNED = rotation(0, 33) @ rotation(1, 12) @ rotation(2, 71)
@@ -309,7 +309,9 @@ def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across(
         first = np.zeros(len(width), np.int32)
         weights = corner_weights(world, planar_polygons(world), first, u.astype(F), v.astype(F))
         normals = CornerVectors(columns(lean[None], F), np.zeros(4, np.int32))
-        facets = Facets(at, columns(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_))
+        facets = SurfaceInteraction(
+            at, columns(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_)
+        )
         bent = lean - (width * (1 - width) * 3 * 1.2)[:, None] * [1, 0, 0]
         wanted = bent / np.linalg.norm(bent, axis=1)[:, None]
         np.testing.assert_allclose(quadratic(world, normals, weights, facets), wanted, atol=2e-6)

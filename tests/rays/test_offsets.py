@@ -7,7 +7,7 @@ import pytest
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.rays.embree import Tracer
-from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
+from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.stress.rays import grazing, icosphere, surface_points, world_of
 
 F = np.float32
@@ -51,7 +51,7 @@ def false_hits(bodies, rays_per_body):
     for vertices, faces in bodies.values():
         tracer = Tracer(vertices.astype(F), faces)
         p, n, edge = outward_points(vertices, faces, 20_000, rng)
-        origins = lifted(p, n.astype(F), edge.astype(F)).astype(F)
+        origins = offset_ray_origins(p, n.astype(F), edge.astype(F)).astype(F)
         for _ in range(rays_per_body // len(p)):
             hits += int(np.count_nonzero(tracer.occluded(origins, leaving(n, rng).astype(F))))
     return hits
@@ -76,7 +76,7 @@ def test_a_plate_a_millionth_above_the_floor_still_shades_it(height):
     n = np.tile(F([0, 0, 1]), (4000, 1))
     d = rng.normal(size=(4000, 3))
     d[:, 2] = np.abs(d[:, 2]) + 0.05
-    origins = lifted(p, n, np.full(4000, F(2.83))).astype(F)
+    origins = offset_ray_origins(p, n, np.full(4000, F(2.83))).astype(F)
     assert Tracer(vertices, faces).occluded(origins, d.astype(F)).all()
 
 
@@ -102,4 +102,4 @@ def test_a_needle_turned_out_of_its_axes_does_not_hit_itself():
     tracer = Tracer(world.vertices, world.triangles)
     position, facet = surface_points(world, 50_000, seed=0)
     up = grazing(facet.ng.astype(float), seed=0)
-    assert not tracer.occluded(lifted(position, facet.ng, facet.edge), up).any()
+    assert not tracer.occluded(offset_ray_origins(position, facet.ng, facet.edge), up).any()

@@ -130,18 +130,18 @@ def render(setup):
     lit = (n * l).sum(1) > 0
     radius = np.linalg.norm(np.ptp(setup.vertices, axis=0)) / 2
     # Hanika's point: the mean of the projections on the corners' tangent planes, where that lies outside
-    lifted = position.copy()
+    offset_ray_origins = position.copy()
     for k in range(3):
         normal = setup.normals[corner[:, k]] * np.where(behind, -1, 1)[:, None]
         below = np.minimum(((position - setup.vertices[corner[:, k]]) * normal).sum(1), 0)
-        lifted -= (weight[:, k] * below)[:, None] * normal
+        offset_ray_origins -= (weight[:, k] * below)[:, None] * normal
     # lit is what the polygon's own ray says, or the ray from that point where nothing lies on the way to it
     # and nothing of the other body stands nearby
     tiny = SELF * radius
-    start, height = position + tiny * ng, np.linalg.norm(lifted - position, axis=1)
+    start, height = position + tiny * ng, np.linalg.norm(offset_ray_origins - position, axis=1)
     own, *_ = intersect(setup, start, l, tiny, distance - tiny)
-    implied, *_ = intersect(setup, lifted + tiny * ng, l, tiny, distance - tiny)
-    up = (lifted - position) / np.maximum(height, 1e-300)[:, None]
+    implied, *_ = intersect(setup, offset_ray_origins + tiny * ng, l, tiny, distance - tiny)
+    up = (offset_ray_origins - position) / np.maximum(height, 1e-300)[:, None]
     way, *_ = intersect(setup, start, up, tiny, height - tiny)
     along = unit(l - np.minimum((l * ng).sum(1), 0)[:, None] * ng)
     width = np.linalg.norm(np.ptp(setup.vertices[corner], axis=1), axis=1)

@@ -9,7 +9,7 @@ import pytest
 
 from illumcli.commands.render import run
 from illumcli.errors import InputError
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
@@ -45,7 +45,7 @@ def rendered(path, only=ALL, threads=1, side=None, overrides=()):
     """Layers, and what was done."""
     loaded = load(path, overrides)
     steps = plan(loaded.scene, loaded, only)
-    tally = Tally()
+    tally = RenderStats()
     made = list(bands(steps, run_once(steps, tally), steps.views[0], threads, tally, side=side))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally
 

@@ -11,7 +11,7 @@ import pytest
 from illumcli.cache.store import Store
 from illumcli.render_graph import cached as policy
 from illumcli.render_graph.cached import Artifacts, Memory, decode, encode
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.keys import Keys
 from illumcli.render_graph.schedule import content_key, plan, read_by_others, reusing
 from illumcli.scene.load import load
@@ -88,7 +88,7 @@ def picture(path, *overrides, store=None, memory=None, only=ALL, threads=1, side
     """Layers, what was made, rays, what was reused."""
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
-    artifacts, tally = Artifacts(store, memory), Tally()
+    artifacts, tally = Artifacts(store, memory), RenderStats()
     narrowed = reusing(made, made.views[0], artifacts)
     shared = run_once(narrowed, tally, artifacts)
     parts = list(bands(narrowed, shared, made.views[0], threads, tally, side=side, artifacts=artifacts))
@@ -227,7 +227,7 @@ def test_damage_costs_time_and_no_bit(scene, store):
 def test_an_interrupted_picture_keeps_nothing_of_its_tiles(scene, store):
     loaded = load(scene)
     made = plan(loaded.scene, loaded, ["beauty"])
-    artifacts, tally = Artifacts(store), Tally()
+    artifacts, tally = Artifacts(store), RenderStats()
     narrowed = reusing(made, made.views[0], artifacts)
     shared = run_once(narrowed, tally, artifacts)
     rows = bands(narrowed, shared, made.views[0], 1, tally, side=8, artifacts=artifacts)
@@ -294,7 +294,7 @@ def test_memory_gives_up_what_does_not_fit(scene):
 def test_buffers_come_back_as_they_were(scene):
     loaded = load(scene)
     made = plan(loaded.scene, loaded, ["beauty"])
-    world = run_once(made, Tally())["world"]
+    world = run_once(made, RenderStats())["world"]
     arrays = []
     said = encode(world, arrays, {})
     assert sum(array.nbytes for array in arrays) < 1.05 * sum(

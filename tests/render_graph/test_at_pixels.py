@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.render_graph.execute import Tally, at_pixels, bands, run_once
+from illumcli.render_graph.execute import RenderStats, at_pixels, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -23,10 +23,10 @@ def test_scattered_pixels_are_those_of_the_picture(tmp_path):
     path.write_text(SCENE)
     loaded = load(path)
     steps = plan(loaded.scene, loaded, ["beauty", "obscurance", "depth"])
-    shared, view = run_once(steps, Tally()), steps.views[0]
-    whole = list(bands(steps, shared, view, 2, Tally()))
+    shared, view = run_once(steps, RenderStats()), steps.views[0]
+    whole = list(bands(steps, shared, view, 2, RenderStats()))
     x, y = np.array([23, 0, 11, 12, 3]), np.array([0, 17, 9, 9, 4])
-    some = at_pixels(steps, shared, view, x, y, 2, Tally())
+    some = at_pixels(steps, shared, view, x, y, 2, RenderStats())
     for name in ("beauty", "obscurance", "depth"):
         picture = np.concatenate([band.layers[name] for band in whole])
         np.testing.assert_array_equal(some[name], picture[y, x])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -31,7 +31,7 @@ def rendered(tmp_path):
     def render(*overrides):
         loaded = load(path, overrides)
         steps = plan(loaded.scene, loaded)
-        made = list(bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally()))
+        made = list(bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats()))
         layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
         return layers, {step.makes for step in steps.tile}
 

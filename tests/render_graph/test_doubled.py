@@ -9,7 +9,7 @@ import pytest
 
 from illumcli.commands.plan import table
 from illumcli.commands.render import run
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.replicates import LUMINANCE
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
@@ -37,7 +37,7 @@ def scene(tmp_path):
 def layers(path, *overrides, only=("beauty", "error")):
     """Layer -> (H, W, channels), and the rays by step."""
     loaded = load(path, overrides)
-    steps, tally = plan(loaded.scene, loaded, only), Tally()
+    steps, tally = plan(loaded.scene, loaded, only), RenderStats()
     made = list(bands(steps, run_once(steps, tally), steps.views[0], 2, tally))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally.rays
 

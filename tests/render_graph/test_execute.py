@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.graph import Recipe
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.graph import Node
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import Plan, plan
 from illumcli.render_graph.stages import FEWEST, tiles
 from illumcli.scene.load import load
@@ -48,7 +48,7 @@ def picture(tmp_path_factory):
     def render(*only, threads=1, side=None, overrides=(), **more):
         loaded = load(path, overrides)
         steps = plan(loaded.scene, loaded, only)
-        tally = Tally()
+        tally = RenderStats()
         shared = run_once(steps, tally, threads=threads)
         made = list(bands(steps, shared, steps.views[0], threads, tally, side=side, **more))
         names = made[0].layers
@@ -118,12 +118,12 @@ def only_once(*steps):
 def test_what_does_not_need_each_other_is_made_at_once():
     both = Barrier(2, timeout=20)
     steps = only_once(
-        Recipe("a", lambda: 1, {}),
-        Recipe("b", lambda a: (both.wait(), a + 1)[1], {"a": "a"}),
-        Recipe("c", lambda a: (both.wait(), a + 2)[1], {"a": "a"}),
-        Recipe("d", lambda b, c: b + c, {"b": "b", "c": "c"}),
+        Node("a", lambda: 1, {}),
+        Node("b", lambda a: (both.wait(), a + 1)[1], {"a": "a"}),
+        Node("c", lambda a: (both.wait(), a + 2)[1], {"a": "a"}),
+        Node("d", lambda b, c: b + c, {"b": "b", "c": "c"}),
     )
-    tally = Tally()
+    tally = RenderStats()
     assert list(run_once(steps, tally, threads=2).items()) == [("a", 1), ("b", 2), ("c", 3), ("d", 5)]
     assert set(tally.seconds) == set("abcd")
 
@@ -141,9 +141,9 @@ def test_of_several_faults_the_plans_first_is_told():
         late.set()
         raise InputError("second")
 
-    steps = only_once(Recipe("a", first, {}), Recipe("b", second, {}), Recipe("c", len, {"b": "b"}))
+    steps = only_once(Node("a", first, {}), Node("b", second, {}), Node("c", len, {"b": "b"}))
     with pytest.raises(InputError, match="first"):
-        run_once(steps, Tally(), threads=2)
+        run_once(steps, RenderStats(), threads=2)
     assert order == ["second", "first"]
 
 
@@ -186,7 +186,7 @@ outputs: {layers: [beauty, lights, object_id, material_id, depth]}
         (tmp_path / "s.yaml").write_text(own)
         loaded = load(tmp_path / "s.yaml")
         steps = plan(loaded.scene, loaded)
-        (band,) = bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally())
+        (band,) = bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats())
         made.append([band.layers[layer.name] for layer in steps.layers])
     for a, b in zip(*made, strict=True):
         np.testing.assert_array_equal(a, b)
@@ -199,7 +199,7 @@ def test_a_file_without_suffix_is_not_taken_for_a_mesh_of_that_name(tmp_path):
     (tmp_path / "ball").write_text("")
     loaded = load(tmp_path / "s.yaml")
     with pytest.raises(InputError, match="ball"):
-        run_once(plan(loaded.scene, loaded), Tally())
+        run_once(plan(loaded.scene, loaded), RenderStats())
 
 
 def test_layers_add_up_to_the_beauty(whole):
@@ -271,7 +271,7 @@ def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
 def test_worked_examples_of_the_texts(root, scene, overrides, value):
     loaded = load(root / "scenes" / f"{scene}.yaml", overrides)
     steps = plan(loaded.scene, loaded)
-    tally = Tally()
+    tally = RenderStats()
     made = list(bands(steps, run_once(steps, tally), steps.views[0], 1, tally))
     beauty = np.concatenate([band.layers["beauty"] for band in made])
     centre = beauty[beauty.shape[0] // 2, beauty.shape[1] // 2]
@@ -293,7 +293,7 @@ lights: [{light: directional, direction: [0, -1, 0], irradiance: 2}]
     )
     loaded = load(path)
     steps = plan(loaded.scene, loaded)
-    tally = Tally()
+    tally = RenderStats()
     (band,) = bands(steps, run_once(steps, tally), steps.views[0], 1, tally)
     np.testing.assert_allclose(band.layers["beauty"], 0.3 * 0.5 + 0.4 * 2 + 2, rtol=1e-6)
 

@@ -17,7 +17,7 @@ from illumcli.errors import InputError
 from illumcli.images.oiio import read_image
 from illumcli.rays.camera import MARGIN
 from illumcli.render_graph.cached import Artifacts
-from illumcli.render_graph.execute import Tally
+from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.framing import framed
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
@@ -89,8 +89,8 @@ def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
     loaded = load(scene, words)
     made = plan(loaded.scene, loaded)
     store = Store(default_folder(), 1 << 30)
-    placed = framed(made, Artifacts(store), Tally(), at_hand=True).views[0].camera
-    assert placed == framed(made, Artifacts(), Tally()).views[0].camera
+    placed = framed(made, Artifacts(store), RenderStats(), at_hand=True).views[0].camera
+    assert placed == framed(made, Artifacts(), RenderStats()).views[0].camera
 
 
 def test_a_sweep_places_its_cameras(scene, tmp_path):
@@ -105,7 +105,7 @@ def test_a_sweep_places_its_cameras(scene, tmp_path):
 def test_a_view_that_is_measured_is_placed_too(scene):
     loaded = load(scene)
     own = subject(loaded, "beauty")
-    assert own.view.camera == framed(plan(loaded.scene, loaded), Artifacts(), Tally()).views[0].camera
+    assert own.view.camera == framed(plan(loaded.scene, loaded), Artifacts(), RenderStats()).views[0].camera
 
 
 def test_fit_names_an_object(scene):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -32,7 +32,7 @@ def picture(folder, mesh, rate, *layers):
     (folder / "scene.yaml").write_text(SCENE.format(rate=rate))
     loaded = load(folder / "scene.yaml")
     steps = plan(loaded.scene, loaded, layers)
-    tally = Tally()
+    tally = RenderStats()
     made = list(bands(steps, run_once(steps, tally), steps.views[0], 1, tally))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in layers}
 
@@ -114,7 +114,7 @@ def test_the_winding_alone_says_where_computed_normals_point(tmp_path):
     (tmp_path / "scene.yaml").write_text(scene)
     loaded = load(tmp_path / "scene.yaml")
     steps = plan(loaded.scene, loaded, ("normal", "geometric_normal"))
-    made = list(bands(steps, run_once(steps, Tally()), steps.views[0], 1, Tally()))
+    made = list(bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats()))
     n, ng = (np.concatenate([band.layers[name] for band in made]) for name in ("normal", "geometric_normal"))
     seen = np.linalg.norm(ng, axis=-1) > 0.99
     np.testing.assert_allclose(n[seen], ng[seen], atol=1e-5)

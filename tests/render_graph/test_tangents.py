@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -29,8 +29,8 @@ def highlight(tmp_path):
         path.write_text(SCENE.format(more=more, mesh=mesh))
         loaded = load(path)
         steps = plan(loaded.scene, loaded)
-        shared = run_once(steps, Tally())
-        parts = [band.layers["beauty"] for band in bands(steps, shared, steps.views[0], 1, Tally())]
+        shared = run_once(steps, RenderStats())
+        parts = [band.layers["beauty"] for band in bands(steps, shared, steps.views[0], 1, RenderStats())]
         return np.concatenate(parts)[..., 0]
 
     return render

@@ -18,7 +18,7 @@ from illumcli.geometry.scene_geometry import stand
 from illumcli.render_graph import cached as policy
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, why_all, without
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
@@ -55,12 +55,12 @@ def pictures(path, overrides=(), only=ALL, leave_out=True, store=None):
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
     first = Artifacts(store)
-    numbers = unseen_objects(made, first, Tally()) if leave_out else ()
+    numbers = unseen_objects(made, first, RenderStats()) if leave_out else ()
     out = {}
     for view in made.views:
         artifacts = Artifacts(store, made=first.made)
         narrowed = reusing(without(made, loaded, numbers), view, artifacts)
-        tally = Tally()
+        tally = RenderStats()
         shared = run_once(narrowed, tally, artifacts)
         parts = list(bands(narrowed, shared, view, 1, tally, artifacts=artifacts))
         for name in parts[0].layers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
@@ -19,7 +19,7 @@ def picture(root):
             root / "scenes" / f"{name}.yaml", ["film.samples=1", "film.background=null", *overrides]
         )
         steps = plan(loaded.scene, loaded, ["beauty", "object_id"])
-        made = list(bands(steps, run_once(steps, Tally()), steps.views[camera], 2, Tally()))
+        made = list(bands(steps, run_once(steps, RenderStats()), steps.views[camera], 2, RenderStats()))
         return {layer: np.concatenate([band.layers[layer] for band in made]) for layer in made[0].layers}
 
     return render

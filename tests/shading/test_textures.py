@@ -17,7 +17,7 @@ from illumcli.images.writer import ImageWriter
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar
 from illumcli.render_graph import cached as artifacts
-from illumcli.render_graph.execute import Tally, bands, run_once
+from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
@@ -145,8 +145,8 @@ def picture():
     def render(path, *only, side=None, overrides=()):
         loaded = load(path, overrides)
         steps = plan(loaded.scene, loaded, only)
-        shared = run_once(steps, Tally())
-        made = list(bands(steps, shared, steps.views[0], 1, Tally(), side=side))
+        shared = run_once(steps, RenderStats())
+        made = list(bands(steps, shared, steps.views[0], 1, RenderStats(), side=side))
         layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
         repairs = {}
         for buffer in shared.values():
@@ -291,7 +291,7 @@ def test_what_a_mesh_lacks_is_said_before_anything_is_rendered(scene, tmp_path, 
     (tmp_path / "sheet.ply").write_text(PLY)
     loaded = load(scene(material, mesh))
     with pytest.raises(InputError, match="object") as caught:
-        run_once(plan(loaded.scene, loaded), Tally())
+        run_once(plan(loaded.scene, loaded), RenderStats())
     assert caught.value.problems == (said,)
 
 
@@ -299,7 +299,7 @@ def test_a_missing_texture_is_named_with_its_place(scene, print_):
     path = scene("{model: lambert, diffuse: {texture: prnt.png}}")
     loaded = load(path)
     with pytest.raises(InputError, match=r"scene.yaml:7:\d+: .*prnt.png; did you mean 'print.png'"):
-        run_once(plan(loaded.scene, loaded), Tally())
+        run_once(plan(loaded.scene, loaded), RenderStats())
     assert check([path])[2]
 
 

@@ -72,7 +72,7 @@ def test_faults_name_what_no_picture_may_have():
 
 
 def test_a_scene_that_fails_is_a_row_and_not_the_end(tmp_path, monkeypatch):
-    room = outcome.Room(tmp_path)
+    room = outcome.Sandbox(tmp_path)
     monkeypatch.setattr(scenes, "MUST_RENDER", {"broken": lambda room: {"film": {"width": -1}}})
     monkeypatch.setattr(scenes, "MUST_REFUSE", {"fine": lambda room: {"film": {"width": 4, "height": 4}}})
     broken, fine = scenes.rows(room, quick=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.rays.embree import Tracer
-from illumcli.rays.offsets import lifted
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.schema.families import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
@@ -41,7 +41,7 @@ def estimates(tracer, point, normal, falloff, samples=64, scrambles=400, radius=
     rng = np.random.default_rng(11)
     p = np.tile(np.asarray(point, float), (scrambles, 1))
     n = np.tile(np.asarray(normal, F), (scrambles, 1))
-    origins = lifted(p, n, np.full(scrambles, F(3)))
+    origins = offset_ray_origins(p, n, np.full(scrambles, F(3)))
     return obscurance(tracer, origins, n, rng.random((2, scrambles)), samples, falloff, radius)
 
 
@@ -99,7 +99,7 @@ def test_points_do_not_depend_on_their_company():
     rng = np.random.default_rng(2)
     p = np.column_stack([rng.uniform(-0.5, 0.5, (1000, 2)), np.zeros(1000)])
     n, draws = np.tile(UP.astype(F), (1000, 1)), rng.random((2, 1000))
-    origins = lifted(p, n, np.full(1000, F(3)))
+    origins = offset_ray_origins(p, n, np.full(1000, F(3)))
     whole = obscurance(tracer, origins, n, draws, 48, Step(), 1.0)
     part = obscurance(tracer, origins[300:317], n[300:317], draws[:, 300:317], 48, Step(), 1.0)
     assert np.array_equal(whole[300:317], part)
@@ -134,7 +134,7 @@ def tilted(tracer, tilts, sampler="spiral", samples=64, scrambles=400, bent=Fals
     t = np.radians(np.broadcast_to(tilts, scrambles))
     n = np.asfortranarray(np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1).astype(F))
     ng = np.asfortranarray(np.tile(UP.astype(F), (scrambles, 1)))
-    over = Hemispheres(n, lifted(np.zeros((scrambles, 3)), ng, np.full(scrambles, F(3))), ng)
+    over = Hemispheres(n, offset_ray_origins(np.zeros((scrambles, 3)), ng, np.full(scrambles, F(3))), ng)
     return estimated(
         tracer, over, rng.random((2, scrambles)), Method(samples, Step(), 1.0, sampler), bent=bent
     )
@@ -172,7 +172,9 @@ def test_tilted_points_do_not_depend_on_their_company():
     t = np.radians(tilts)
     n = np.asfortranarray(np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1).astype(F))
     ng = np.asfortranarray(np.tile(UP.astype(F), (400, 1)))
-    over = Hemispheres(n, lifted(np.zeros((400, 3)), ng, np.full(400, F(3))), ng).take(slice(120, 133))
+    over = Hemispheres(n, offset_ray_origins(np.zeros((400, 3)), ng, np.full(400, F(3))), ng).take(
+        slice(120, 133)
+    )
     assert np.array_equal(
         whole[120:133], estimated(tracer, over, draws[:, 120:133], Method(64, Step(), 1.0)).w
     )

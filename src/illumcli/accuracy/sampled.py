@@ -17,10 +17,10 @@ from illumcli.layers import Layer
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
 from illumcli.render_graph.build import View, recipes
-from illumcli.render_graph.execute import Tally, at_pixels, bands
+from illumcli.render_graph.execute import RenderStats, at_pixels, bands
 from illumcli.render_graph.framing import placed
 from illumcli.render_graph.schedule import Plan, plan
-from illumcli.scene.load import Loaded
+from illumcli.scene.load import SceneFile
 from illumcli.scene.spec import Scene
 
 Sampler: TypeAlias = Literal["spiral", "owen", "random"]
@@ -43,7 +43,7 @@ class Sampling(Value):
 class Subject(Record):
     """A view of a scene and one of its layers, with the buffers that no sampling changes."""
 
-    loaded: Loaded
+    loaded: SceneFile
     view: View
     layer: Layer
     threads: int
@@ -78,7 +78,7 @@ class Subject(Record):
     def picture(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
         """(H, W, channels) the layer at a sampling, the rays it took, and the seconds."""
         steps, view = self.planned(sampling)
-        tally, start = Tally(), time.perf_counter()
+        tally, start = RenderStats(), time.perf_counter()
         rows = [band.layers for band in bands(steps, self.shared, view, self.threads, tally)]
         seconds = time.perf_counter() - start
         return np.concatenate([row[self.layer.name] for row in rows]), sum(tally.rays.values()), seconds
@@ -88,7 +88,7 @@ class Subject(Record):
     ) -> tuple[NDArray[np.float64], int]:
         """(K, channels) the layer at K pixels, and the rays it took."""
         steps, view = self.planned(sampling)
-        tally = Tally()
+        tally = RenderStats()
         made = at_pixels(steps, self.shared, view, x, y, self.threads, tally)
         return made[self.layer.name].astype(np.float64), sum(tally.rays.values())
 
@@ -101,7 +101,11 @@ class Subject(Record):
 
 
 def subject(
-    loaded: Loaded, name: str, threads: int | None = None, camera: str | None = None, width: int | None = None
+    loaded: SceneFile,
+    name: str,
+    threads: int | None = None,
+    camera: str | None = None,
+    width: int | None = None,
 ) -> Subject:
     """A scene's layer, ready to be sampled.
 

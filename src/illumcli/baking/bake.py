@@ -19,7 +19,7 @@ from illumcli import __version__
 from illumcli.arrays import F, columns, cross, rows, unit
 from illumcli.baking.outputs import shapes_of
 from illumcli.baking.points import Surfaces, Vertices, vertex_points
-from illumcli.baking.sampling import MOST_SAMPLES, Caster, Occluders
+from illumcli.baking.sampling import MOST_SAMPLES, BakeSampler, Occluders
 from illumcli.baking.values import baked_values
 from illumcli.commands.limits import expected_memory, refuse_memory
 from illumcli.commands.render import peak_memory
@@ -39,17 +39,17 @@ from illumcli.files.vertex_data import (
     write_ply,
 )
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import CornerVectors, World
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.graph import order
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record, Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.keys import code, digest
-from illumcli.scene.load import MESH_SUFFIXES, Loaded, load
+from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.visibility.obscurance import Method
-from illumcli.visibility.open_hemisphere import Horizon
+from illumcli.visibility.open_hemisphere import ClusterTree
 
 Progress = Callable[[str, int, int], None]
 
@@ -252,7 +252,7 @@ def _about(work: Work, settings: Settings, report: Report) -> dict[str, Any]:
     }
 
 
-def surfaces_of(scene: Scene, loaded: Loaded) -> tuple[Surfaces, Repairs]:
+def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The scene's meshes in their places, made as a render makes them, and the normals that w is taken about;
     what was put right."""
     buffers: dict[str, Any] = {}
@@ -277,7 +277,7 @@ def check_outputs(outputs: Sequence[Path]) -> None:
         raise InputError(problems)
 
 
-def bare(path: Path, overrides: Sequence[str]) -> Loaded:
+def bare(path: Path, overrides: Sequence[str]) -> SceneFile:
     """A scene of one mesh file alone, as it stands."""
     found = load(path, overrides)
     about = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
@@ -330,7 +330,7 @@ def bake(
         clock.lap(report, "cast")
         return baked_values(made.vertices, made.w, made.error, None)
     vertices = vertex_points(surfaces)
-    caster = Caster(vertices.points, occluders, method, settings.seed, threads, progress)
+    caster = BakeSampler(vertices.points, occluders, method, settings.seed, threads, progress)
     say_vertices(report, vertices)
     clock.lap(report, "points")
     is_open = caster.open()
@@ -358,7 +358,7 @@ def bake(
     count, points = np.unique(samples, return_counts=True)
     report.samples = dict(zip(count.tolist(), points.tolist(), strict=True))
     w, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
-    w[lanes], error[lanes] = found.w, errors.at(found.unevenness, samples)
+    w[lanes], error[lanes] = found.w, errors.at(found.neighbor_variation, samples)
     bent = None
     if found.bent is not None:
         bent = vertices.points.n.copy()
@@ -383,7 +383,7 @@ def say_dark(report: Report, w: NDArray[np.float32]) -> None:
         )
 
 
-def occluders_of(scene: Scene, world: World, settings: Settings) -> list[Occluders]:
+def occluders_of(scene: Scene, world: SceneGeometry, settings: Settings) -> list[Occluders]:
     """What hides the vertices of each object: the scene, the object itself, or it and objects by name."""
     names = scene.object_names()
     if "own" in settings.occluders and "own" in names:
@@ -406,7 +406,7 @@ def occluders_of(scene: Scene, world: World, settings: Settings) -> list[Occlude
     return found
 
 
-def _occluders(world: World, things: tuple[int, ...], settings: Settings) -> Occluders:
+def _occluders(world: SceneGeometry, things: tuple[int, ...], settings: Settings) -> Occluders:
     triangles = world.triangles
     if len(things) < len(world.placed):
         triangles = triangles[np.isin(world.objects, things)]
@@ -417,7 +417,7 @@ def _occluders(world: World, things: tuple[int, ...], settings: Settings) -> Occ
     if settings.faces != "count":
         corner = [columns(rows(vertices, triangles[:, k]), np.float64) for k in range(3)]
         facets = columns(unit(cross(corner[1] - corner[0], corner[2] - corner[0])), F)
-    return Occluders(Tracer(vertices, triangles), Horizon(vertices, triangles), facets)
+    return Occluders(Tracer(vertices, triangles), ClusterTree(vertices, triangles), facets)
 
 
 def _with_ground(
@@ -440,7 +440,7 @@ def write(
     path: Path,
     outputs: Sequence[Path],
     scene: Scene,
-    world: World,
+    world: SceneGeometry,
     baked: Baked,
     settings: Settings,
     report: Report,

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.baking.points import AreaPoints, Surfaces, Vertices, area_points, vertex_points
-from illumcli.baking.sampling import Caster, Occluders
-from illumcli.geometry.scene_geometry import World
+from illumcli.baking.sampling import BakeSampler, Occluders
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.records import Record
 from illumcli.visibility.obscurance import Method
 
@@ -61,7 +61,7 @@ def fitted(
     count = len(vertices.points.number) * method.samples // per_point
     area = area_points(surfaces, max(count, PARTS), seed)
     own = Method(per_point, method.falloff, method.radius, method.sampler, method.faces)
-    caster = Caster(area, occluders, own, seed, threads, progress)
+    caster = BakeSampler(area, occluders, own, seed, threads, progress)
     is_open = caster.open()
     lanes = np.flatnonzero(~is_open)
     found = caster.cast("values", lanes, np.full(len(lanes), per_point), 0)
@@ -88,7 +88,7 @@ class System(Record):
     count: int
 
     @classmethod
-    def of(cls, world: World, area: AreaPoints, vertices: Vertices) -> System:
+    def of(cls, world: SceneGeometry, area: AreaPoints, vertices: Vertices) -> System:
         """The blocks: area times products of barycentric weights, and a little smoothing along edges."""
         corner = np.maximum(vertices.row[world.corners], 0)
         weights = barycentric(area)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from illumcli.files.vertex_data import STANDARD, Baked, Shape, free_name
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import Placed, World, cofactors
+from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry, cofactors
 from illumcli.records import Record
 
 
 def shapes_of(
-    names: Sequence[str], world: World, baked: Baked, divided: bool, left_out: list[str]
+    names: Sequence[str], world: SceneGeometry, baked: Baked, divided: bool, left_out: list[str]
 ) -> tuple[list[Shape], Baked]:
     """The objects as they are written, and the values of their vertices; `divided` where vertices with
     several normals, uv or values are."""
@@ -48,7 +48,7 @@ def shapes_of(
     return made, split_values(baked, meshes, parts) if divided else baked
 
 
-def corner_tables(placed: Placed) -> dict[str, NDArray[np.float64] | None]:
+def corner_tables(placed: PlacedMesh) -> dict[str, NDArray[np.float64] | None]:
     """What every corner of an object's file has, by name, (C, k), normals in scene directions; None where
     some corner has it not."""
     mesh, linear = placed.mesh, placed.matrix[:3, :3]
@@ -69,7 +69,7 @@ def per_vertex(mesh: Mesh, values: NDArray[np.float64]) -> bool:
 
 
 def shape_of(
-    name: str, world: World, number: int, tables: Mapping[str, NDArray[np.float64]], own: Copies
+    name: str, world: SceneGeometry, number: int, tables: Mapping[str, NDArray[np.float64]], own: Copies
 ) -> Shape:
     """An object in its place, with what its vertices have."""
     placed = world.placed[number]

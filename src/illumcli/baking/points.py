@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
-from illumcli.geometry.scene_geometry import CornerVectors, World
+from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.rays.interaction import facets, with_facet
-from illumcli.rays.offsets import lifted
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
 from illumcli.records import Record
 from illumcli.visibility.obscurance import Hemispheres
@@ -33,20 +33,20 @@ MOST_COPIES = 31
 class Surfaces(Record):
     """The meshes of a bake in their places, and how they are shaded."""
 
-    world: World
+    world: SceneGeometry
     normals: CornerVectors  # unit shading normals of every corner
 
 
 class Points(Record):
     """M points that cast rays."""
 
-    world: World
+    world: SceneGeometry
     n: Vectors  # (M, 3) float32 unit shading normals
     position: Vectors  # (M, 3) float32 in radii
     number: NDArray[np.uint32]  # (M,) what their random numbers are keyed by
     thing: Ids  # (M,) object
 
-    def hemispheres(self, lanes: NDArray[np.int64], offset: Lanes) -> Hemispheres:
+    def hemispheres(self, lanes: NDArray[np.int64], offset: Floats) -> Hemispheres:
         """Where the rays of some points start, and about what.
 
         Parameters
@@ -68,9 +68,9 @@ class Triangles(Record):
     """What a start needs of each of T triangles, float32; normals and heights without area are 0."""
 
     ng: Vectors  # (T, 3) unit
-    edge: Lanes  # (T,) longest edge, for slivers more (`offsets.effective_edge`), in radii
-    height: Lanes  # (T,) the least, in radii
-    area: Lanes  # (T,) twice the area, in radii^2
+    edge: Floats  # (T,) longest edge, for slivers more (`offsets.effective_edge`), in radii
+    height: Floats  # (T,) the least, in radii
+    area: Floats  # (T,) twice the area, in radii^2
 
 
 class Wedges(Record):
@@ -88,7 +88,7 @@ class VertexPoints(Points):
     wedges: Wedges
     triangles: Triangles
 
-    def hemispheres(self, lanes: NDArray[np.int64], offset: Lanes) -> Hemispheres:
+    def hemispheres(self, lanes: NDArray[np.int64], offset: Floats) -> Hemispheres:
         # the wedges of these points, and how many of the evenly spaced starts fall into each
         first, end = self.wedges.first[lanes], self.wedges.first[lanes + 1]
         count = end - first
@@ -127,7 +127,7 @@ class VertexPoints(Points):
         reach = np.minimum(INSIDE * np.sqrt(np.minimum(dot(ahead, ahead), dot(back, back))), height / 4)
         normal = ng.astype(np.float64)
         along = unit(ahead - dot(ahead, normal)[:, None] * normal) * reach[:, None]
-        return lifted(corner, ng, edge), columns(along, F), columns(cross(normal, along), F), ng
+        return offset_ray_origins(corner, ng, edge), columns(along, F), columns(cross(normal, along), F), ng
 
     def above(self, clear: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if not len(self.number):
@@ -208,14 +208,14 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     )
 
 
-def _corners(world: World) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def _corners(world: SceneGeometry) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """(C,) vertex number of every polygon corner, and (P + 1,) first corner of every polygon and the end."""
     vertex = [placed.mesh.corners + np.int32(placed.first_vertex) for placed in world.placed]
     starts = [placed.mesh.starts[1:] + np.int64(placed.first_corner) for placed in world.placed]
     return np.concatenate([np.zeros(0, np.int32), *vertex]), np.concatenate([np.zeros(1, np.int64), *starts])
 
 
-def _triangles(world: World) -> Triangles:
+def _triangles(world: SceneGeometry) -> Triangles:
     every = np.arange(len(world.triangles), dtype=np.int32)
     zero = np.zeros(len(every), F)
     facet = facets(world, every, zero, zero, np.zeros((len(every), 3), F))
@@ -228,7 +228,7 @@ def _triangles(world: World) -> Triangles:
 
 
 def _wedges(
-    world: World, vertex: NDArray[np.int32], starts: NDArray[np.int64], triangles: Triangles
+    world: SceneGeometry, vertex: NDArray[np.int32], starts: NDArray[np.int64], triangles: Triangles
 ) -> tuple[NDArray[np.int64], Ids, NDArray[np.int32], NDArray[np.float64]]:
     """The wedges of all corners: (K,) corner, (K,) triangle, (K, 3) vertices, (K,) angle.
 
@@ -265,7 +265,7 @@ def _wedges(
     return owner, of, vertices, angle
 
 
-def _angles(world: World, vertex: NDArray[np.int32], ng: Vectors) -> NDArray[np.float64]:
+def _angles(world: SceneGeometry, vertex: NDArray[np.int32], ng: Vectors) -> NDArray[np.float64]:
     """(K,) from the next corner to the previous one about the normal, from 0 to a whole turn [rad]."""
     corner, following, last = (columns(rows(world.vertices, vertex[:, k]), np.float64) for k in range(3))
     ahead, back = following - corner, last - corner
@@ -274,7 +274,7 @@ def _angles(world: World, vertex: NDArray[np.int32], ng: Vectors) -> NDArray[np.
 
 
 def _elsewhere(
-    world: World,
+    world: SceneGeometry,
     vertex: NDArray[np.int32],
     starts: NDArray[np.int64],
     polygon: NDArray[np.int64],
@@ -294,7 +294,7 @@ def _elsewhere(
 
 
 def _runs_forwards(
-    world: World, triangle: Ids, starts: NDArray[np.int64], polygon: NDArray[np.int64]
+    world: SceneGeometry, triangle: Ids, starts: NDArray[np.int64], polygon: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """(K,) True where a triangle's corners follow each other as those of its polygon, False where an object
     is mirrored and they run the other way round."""
@@ -320,7 +320,7 @@ def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], ND
 
 
 def _points_of(
-    world: World, thing: Ids, vertex: NDArray[np.int32], n: Vectors
+    world: SceneGeometry, thing: Ids, vertex: NDArray[np.int32], n: Vectors
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(K,) the point that each side belongs to, and the first side of every point, in ascending order.
 
@@ -371,7 +371,7 @@ def _numbers(vertex: NDArray[np.int32], count: int) -> NDArray[np.uint32]:
     return (vertex + rank * count).astype(np.uint32)
 
 
-def _thing_of_vertex(world: World) -> Ids:
+def _thing_of_vertex(world: SceneGeometry) -> Ids:
     first = [placed.first_vertex for placed in world.placed]
     count = np.diff([*first, len(world.vertices)])
     return np.repeat(np.arange(len(first), dtype=np.int32), count)
@@ -390,7 +390,7 @@ class AreaPoints(Points):
     v: NDArray[np.float64]  # (M,) weight of corner 2
     area: NDArray[np.float64]  # (M,) of the surface each stands for, in radii^2
 
-    def hemispheres(self, lanes: NDArray[np.int64], offset: Lanes) -> Hemispheres:
+    def hemispheres(self, lanes: NDArray[np.int64], offset: Floats) -> Hemispheres:
         return Hemispheres(self.n, self.origins, self.ng).take(lanes)
 
     def above(self, clear: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -433,7 +433,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
         columns(facet.position, F),
         np.arange(len(triangle), dtype=np.uint32),
         world.objects[triangle],
-        lifted(facet.position, facet.ng, facet.edge),
+        offset_ray_origins(facet.position, facet.ng, facet.edge),
         facet.ng,
         triangle,
         a,

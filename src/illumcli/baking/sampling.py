@@ -22,7 +22,7 @@ from illumcli.rays.embree import Tracer
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.records import Record, Value
 from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
-from illumcli.visibility.open_hemisphere import Horizon, facet_planes
+from illumcli.visibility.open_hemisphere import ClusterTree, facet_planes
 
 RAYS = 1 << 18
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
@@ -42,7 +42,7 @@ class Occluders(Record):
     """What the points of an object may be hidden by."""
 
     tracer: Tracer
-    horizon: Horizon
+    horizon: ClusterTree
     facets: NDArray[np.float32] | None = None  # (T, 3) unit normals, where back faces are told apart
 
 
@@ -50,11 +50,11 @@ class Cast(Record):
     """What was found at M points; those that are known to be open have w = 1 and no unevenness."""
 
     w: NDArray[np.float32]
-    unevenness: NDArray[np.float32]
+    neighbor_variation: NDArray[np.float32]
     bent: NDArray[np.float32] | None = None
 
 
-class Piece(Value):
+class WorkUnit(Value):
     """A unit of work: a function of the points it names and its own fields alone."""
 
     lanes: NDArray[np.int64]
@@ -63,7 +63,7 @@ class Piece(Value):
 
 
 @dataclass(slots=True, eq=False)
-class Caster:
+class BakeSampler:
     """The points of a bake and the means to cast from them."""
 
     points: Points
@@ -89,13 +89,13 @@ class Caster:
         along = along[dot(area, area)[along] > 0]
         clear = np.zeros(len(area), bool)
         pieces = [
-            Piece(own[first : first + LANES], RAYS // LANES, number)
+            WorkUnit(own[first : first + LANES], RAYS // LANES, number)
             for number in range(len(world.placed))
             if (own := along[world.objects[along] == number]).size
             for first in range(0, len(own), LANES)
         ]
 
-        def ask(piece: Piece, stop: threading.Event) -> NDArray[np.bool_]:
+        def ask(piece: WorkUnit, stop: threading.Event) -> NDArray[np.bool_]:
             triangle = piece.lanes.astype(np.int32)
             planes = facet_planes(world, triangle, np.zeros(len(triangle), bool))
             return self.occluders[piece.thing].horizon.clears(*planes)
@@ -127,7 +127,7 @@ class Caster:
         keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase", "share")]
         pieces = list(self._pieces(lanes, samples))
 
-        def ask(piece: Piece, stop: threading.Event) -> tuple[Estimates, int]:
+        def ask(piece: WorkUnit, stop: threading.Event) -> tuple[Estimates, int]:
             number = self.points.number[piece.lanes]
             draws = np.stack([unit_interval(hashed(key, number)) for key in keys])
             over = self.points.hemispheres(piece.lanes, draws[2])
@@ -146,13 +146,15 @@ class Caster:
                 self.resumed += rays
         for number, (found, rays) in self._run(purpose, waiting, ask):
             piece = waiting[number]
-            out.w[piece.lanes], out.unevenness[piece.lanes] = found.w, found.unevenness
+            out.w[piece.lanes], out.neighbor_variation[piece.lanes] = found.w, found.neighbor_variation
             if out.bent is not None and found.bent is not None:
                 out.bent[piece.lanes] = found.bent
             self.rays[purpose] += rays
             if journal is not None:
                 _keep(journal, piece, out, rays)
-        return Cast(out.w[lanes], out.unevenness[lanes], None if out.bent is None else out.bent[lanes])
+        return Cast(
+            out.w[lanes], out.neighbor_variation[lanes], None if out.bent is None else out.bent[lanes]
+        )
 
     def errors(self, lanes: NDArray[np.int64], samples: NDArray[np.int64], replicate: int) -> Errors:
         """The error law of `lanes`, from pairs of scrambles numbered from `replicate` on, at a few of them.
@@ -171,7 +173,9 @@ class Caster:
                 number = replicate + 2 * again + half
                 halves[half].append(self.cast("errors", lanes[few], samples[few], number))
         a, b = (
-            Estimates(np.concatenate([c.w for c in half]), np.concatenate([c.unevenness for c in half]))
+            Estimates(
+                np.concatenate([c.w for c in half]), np.concatenate([c.neighbor_variation for c in half])
+            )
             for half in halves
         )
         return Errors.of_pairs(a, b, np.tile(samples[few], rounds))
@@ -192,7 +196,7 @@ class Caster:
         if not len(lanes):
             return np.zeros(0, np.int64)
         pilot = self.cast("pilot", lanes, np.full(len(lanes), PILOT), 1)
-        near = _averaged_along(self.order, lanes, pilot.unevenness, len(self.points.number))
+        near = _averaged_along(self.order, lanes, pilot.neighbor_variation, len(self.points.number))
         weight = (1 + near) ** 0.4
         aim = AIM * target / np.sqrt(share)
         scale = float((np.mean(weight) * 0.1 * PILOT**-0.5 / aim**2) ** (2 / 3))
@@ -211,7 +215,7 @@ class Caster:
             scale *= float(np.clip((reached / (0.97 * aim)) ** (4 / 3), 0.05, 20.0))
         return samples
 
-    def _pieces(self, lanes: NDArray[np.int64], samples: NDArray[np.int64]) -> Iterator[Piece]:
+    def _pieces(self, lanes: NDArray[np.int64], samples: NDArray[np.int64]) -> Iterator[WorkUnit]:
         """Lanes of one object and one number of rays, near each other."""
         rays = np.zeros(len(self.order), np.int64)
         rays[lanes] = samples
@@ -222,9 +226,11 @@ class Caster:
                 group = self.order[(along == count) & (thing == own)]
                 size = max(1, RAYS // int(count))
                 for first in range(0, len(group), size):
-                    yield Piece(group[first : first + size], int(count), int(own))
+                    yield WorkUnit(group[first : first + size], int(count), int(own))
 
-    def _run(self, what: str, pieces: Sequence[Piece], ask: Callable[..., Any]) -> Iterator[tuple[int, Any]]:
+    def _run(
+        self, what: str, pieces: Sequence[WorkUnit], ask: Callable[..., Any]
+    ) -> Iterator[tuple[int, Any]]:
         """Results of `ask(piece, stop)` as they come; when the consumer stops, pieces in flight end soon."""
         stop = threading.Event()
         total = sum(len(piece.lanes) * piece.samples for piece in pieces)
@@ -274,28 +280,28 @@ def _steps(samples: NDArray[np.float64]) -> NDArray[np.int64]:
     )
 
 
-def _key(piece: Piece) -> bytes:
+def _key(piece: WorkUnit) -> bytes:
     """16 bytes that tell a piece from every other of its bake."""
     digest = hashlib.blake2b(struct.pack("<qq", piece.samples, piece.thing), digest_size=16)
     digest.update(np.ascontiguousarray(piece.lanes).data)
     return digest.digest()
 
 
-def _kept(journal: Journal, piece: Piece, out: Cast) -> int | None:
+def _kept(journal: Journal, piece: WorkUnit, out: Cast) -> int | None:
     """Copy what the journal has of a piece to `out`; the rays it took, None where it has nothing."""
     width = 2 if out.bent is None else 5
     found = journal.find(_key(piece))
     if found is None or len(found) != 8 + 4 * width * len(piece.lanes):
         return None
     rows = np.frombuffer(found, F, offset=8).reshape(-1, width)
-    out.w[piece.lanes], out.unevenness[piece.lanes] = rows[:, 0], rows[:, 1]
+    out.w[piece.lanes], out.neighbor_variation[piece.lanes] = rows[:, 0], rows[:, 1]
     if out.bent is not None:
         out.bent[piece.lanes] = rows[:, 2:]
     return int.from_bytes(found[:8], "little")
 
 
-def _keep(journal: Journal, piece: Piece, out: Cast, rays: int) -> None:
+def _keep(journal: Journal, piece: WorkUnit, out: Cast, rays: int) -> None:
     """Add a finished piece to the journal."""
-    parts = [out.w[piece.lanes, None], out.unevenness[piece.lanes, None]]
+    parts = [out.w[piece.lanes, None], out.neighbor_variation[piece.lanes, None]]
     rows = np.concatenate(parts if out.bent is None else [*parts, out.bent[piece.lanes]], axis=1)
     journal.append(_key(piece), rays.to_bytes(8, "little") + np.ascontiguousarray(rows).tobytes())

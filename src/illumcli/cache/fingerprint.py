@@ -16,7 +16,7 @@ def _alone(path: Path) -> Iterable[Path]:
     return ()
 
 
-class Content(Value):
+class FileFingerprint(Value):
     """The content of a file and of those beside it that it names; equal contents have equal `repr`.
 
     It is read when it is asked for.
@@ -44,7 +44,7 @@ class Content(Value):
     @property
     def has_changed(self) -> bool:
         """Is the content other than when it was asked for first? Not where it never was."""
-        return "digest" in vars(self) and Content(self.locate, self.beside).digest != self.digest
+        return "digest" in vars(self) and FileFingerprint(self.locate, self.beside).digest != self.digest
 
     def __repr__(self) -> str:
         return f"Content({self.digest})"

@@ -11,7 +11,7 @@ from illumcli.geometry.shapes._base import TRIANGLE_BYTES, Shape
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
-from illumcli.scene.load import Loaded, resolve
+from illumcli.scene.load import SceneFile, resolve
 from illumcli.scene.spec import MeshFile, Scene
 
 BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
@@ -26,7 +26,7 @@ DENSEST = 20
 """No picture worth rendering packs better than this."""
 
 
-def expected_memory(loaded: Loaded, scene: Scene) -> dict[str, int]:
+def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
     """What a scene's shapes, mesh files and textures take [bytes], from counts, sizes and headers alone.
 
     Nothing is read but the headers of images. Files that are not there, or no images, count for nothing here,
@@ -58,7 +58,7 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
     yield from dict.fromkeys((value.texture, value.space) for value in values if isinstance(value, Texture))
 
 
-def _texels(loaded: Loaded, texture: tuple[str, str | None]) -> int:
+def _texels(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
     """Numbers in an image, by its header; 0 where it cannot be read, which its reader will say."""
     from illumcli.images.oiio import texel_count
 

@@ -14,7 +14,7 @@ from illumcli.commands.limits import expected_memory, refuse_memory
 from illumcli.commands.render import opened_store
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, why_all, without
-from illumcli.render_graph.execute import Tally
+from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.framing import framed
 from illumcli.render_graph.schedule import Plan, plan, reusing
 from illumcli.scene.load import load
@@ -31,8 +31,8 @@ def run(
     loaded = load(path, overrides)
     made = plan(loaded.scene, loaded, only)
     store = opened_store() if cache else None
-    made = framed(made, Artifacts(store), Tally(), at_hand=True)
-    numbers = unseen_objects(made, Artifacts(store), Tally(), at_hand=True)
+    made = framed(made, Artifacts(store), RenderStats(), at_hand=True)
+    numbers = unseen_objects(made, Artifacts(store), RenderStats(), at_hand=True)
     made = replace(without(made, loaded, numbers), objects=objects(made, numbers))
     parts = [reusing(made, view, Artifacts(store, look=True)) for view in made.views]
     expected = expected_memory(loaded, loaded.scene)

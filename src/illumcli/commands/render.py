@@ -26,19 +26,19 @@ from illumcli.files.seal import sealed_json
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import Standing
+from illumcli.geometry.scene_geometry import ObjectBounds
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import View
 from illumcli.render_graph.cached import Artifacts, Memory
 from illumcli.render_graph.culling import unseen_objects, without
-from illumcli.render_graph.execute import Planes, Tally, bands, run_once
+from illumcli.render_graph.execute import Planes, RenderStats, bands, run_once
 from illumcli.render_graph.framing import framed
 from illumcli.render_graph.keys import digest
 from illumcli.render_graph.proportions import disproportion
 from illumcli.render_graph.schedule import Plan, content_key, plan, read_by_others, reusing
 from illumcli.render_graph.stages import MOST, Tile
-from illumcli.scene.load import Loaded, lacking_lines, load, refuse_outside, told, unused_lines
+from illumcli.scene.load import SceneFile, lacking_lines, load, refuse_outside, told, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)
@@ -116,7 +116,7 @@ class ErrorSums:
 class Work(Value):
     """A scene to render: its plan and the files it is to fill."""
 
-    loaded: Loaded
+    loaded: SceneFile
     scene: Scene
     plan: Plan
     targets: tuple[Target, ...]
@@ -207,7 +207,7 @@ def opened_store() -> Store | None:
 
 
 def prepared(
-    loaded: Loaded,
+    loaded: SceneFile,
     pattern: str | None = None,
     only: Sequence[str] = (),
     seed: int | None = None,
@@ -250,7 +250,7 @@ def rendered(
     )
     due = work.due(force)
     report.kept = [str(target.path) for target in work.targets if target not in due]
-    tally = Tally()
+    tally = RenderStats()
     first = Artifacts(store, memory)
     steps = framed(work.plan, first, tally, threads) if due else work.plan
     numbers = unseen_objects(steps, first, tally, threads) if due and not strict else ()
@@ -290,7 +290,7 @@ def rendered(
     return report
 
 
-def proportions(work: Work, steps: Plan, standing: Standing | None) -> list[str]:
+def proportions(work: Work, steps: Plan, standing: ObjectBounds | None) -> list[str]:
     """A line where rays that leave surfaces start visibly far off those around some object."""
     if standing is None or all(step.makes != "ray_origins" for step in steps.tile):
         return []
@@ -318,7 +318,7 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
 
 
 def image_set(
-    loaded: Loaded, scene: Scene, steps: Plan, patterns: Sequence[str], more: Mapping[str, Any]
+    loaded: SceneFile, scene: Scene, steps: Plan, patterns: Sequence[str], more: Mapping[str, Any]
 ) -> list[Target]:
     """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer.
 
@@ -359,7 +359,7 @@ def _render_view(
     view: View,
     targets: Sequence[Target],
     threads: int,
-    tally: Tally,
+    tally: RenderStats,
     progress: Progress,
     artifacts: Artifacts,
     sums: ErrorSums,

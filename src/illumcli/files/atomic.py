@@ -45,7 +45,7 @@ _tidied: set[Path] = set()
 """Folders in which this process has looked for parts that others left behind."""
 
 
-class Part:
+class AtomicFile:
     """A file in the making: write to `path`, then `commit`; `discard` leaves no trace.
 
     As a context manager it commits at the end of the block and discards on any exception, interrupts
@@ -150,7 +150,7 @@ def discard_open() -> None:
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write `data` to `path`, whole or not at all."""
-    with Part(path) as part:
+    with AtomicFile(path) as part:
         part.path.write_bytes(data)
 
 

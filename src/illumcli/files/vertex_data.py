@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, LimitError
-from illumcli.files.atomic import Part
+from illumcli.files.atomic import AtomicFile
 from illumcli.files.seal import BLANK, seal
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.records import Record
@@ -105,7 +105,7 @@ def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts:
 def write_npz(path: Path, baked: Baked) -> None:
     """The arrays of `Baked.columns` and `Baked.corner_columns`, and `about`, JSON as text."""
     arrays: dict[str, Any] = {**baked.columns(), **baked.corner_columns()}
-    with Part(path) as part:
+    with AtomicFile(path) as part:
         with part.path.open("wb") as file:
             np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
             file.seek(-2, os.SEEK_END)  # the length of the archive's comment, which is its end
@@ -206,7 +206,7 @@ def write_ply(
             table[name] = each
         vertex = _with_columns(PlyElement.describe(table, "vertex"), {}, baked, channel)
         made = PlyData([vertex, _faces(shapes, first)], False, "<", [line])
-    with Part(path) as part:
+    with AtomicFile(path) as part:
         made.write(str(part.path))
         seal(part.path)
 
@@ -364,7 +364,7 @@ class _Buffer:
         self.document["buffers"] = [{"byteLength": len(data)}, *self.document.get("buffers", [])[1:]]
         text = json.dumps(self.document, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
-        with Part(path) as part:
+        with AtomicFile(path) as part:
             with part.path.open("wb") as file:
                 file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)))
                 file.write(struct.pack("<II", len(text), _JSON) + text)

@@ -22,7 +22,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import Lanes, Vectors, cross, dot, length, rows, unit
+from illumcli.arrays import Floats, Vectors, cross, dot, length, rows, unit
 from illumcli.geometry.components import components
 from illumcli.geometry.mesh import Mesh
 from illumcli.records import Record
@@ -332,7 +332,7 @@ def _computed(
 
 
 def _with_polygons_own(
-    sums: Vectors, total: Lanes, index: NDArray[np.int32], polygons: Vectors, owner: NDArray[np.int32]
+    sums: Vectors, total: Floats, index: NDArray[np.int32], polygons: Vectors, owner: NDArray[np.int32]
 ) -> CornerNormals:
     """The sums made unit; corners whose sum cancels have their polygon's own normal."""
     cancelled = length(sums) <= 16 * EPS * total
@@ -349,7 +349,7 @@ def _with_polygons_own(
     return CornerNormals(np.concatenate([unit(sums), own]), index.astype(np.int32), repairs)
 
 
-def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Lanes | None:
+def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Floats | None:
     """(C,) what each corner's polygon counts at the corner's vertex; None for all the same."""
     size = np.diff(mesh.starts)
     if weights == "equal":
@@ -379,8 +379,8 @@ def _pools(mesh: Mesh, owner: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[
 
 
 def _sums(
-    pool: NDArray[Any], weight: Lanes | None, polygons: Vectors, owner: NDArray[np.int32]
-) -> tuple[Vectors, Lanes]:
+    pool: NDArray[Any], weight: Floats | None, polygons: Vectors, owner: NDArray[np.int32]
+) -> tuple[Vectors, Floats]:
     """(K, 3) weighted sums of the polygon normals at the corners of each pool, and (K,) of the weights."""
     total = np.bincount(pool, weight).astype(np.float64)
     sums = np.empty((len(total), 3), order="F")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
-from illumcli.geometry.scene_geometry import CornerVectors, World, moved
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, moved
 from illumcli.records import Record
 
 FLATNESS = 2.0**-10
@@ -60,7 +60,7 @@ class PlanarPolygons(Record):
         return len(self.first_corner)
 
 
-def planar_polygons(world: World, normals: CornerVectors | None = None) -> PlanarPolygons | None:
+def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of a World; None where all is triangles.
 
     Corners are taken in double precision as the meshes have them, before they are rounded for the ray core.
@@ -122,7 +122,7 @@ def planar_polygons(world: World, normals: CornerVectors | None = None) -> Plana
     return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
 
 
-def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
+def _candidates(world: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
     """First corner and size of polygons that may be planar; place, in radii, and vertex of their corners."""
     firsts, sizes, places, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for placed in world.placed:
@@ -136,7 +136,7 @@ def _candidates(world: World) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDAr
         vertex = mesh.corners[corner]
         firsts.append(first + placed.first_corner)
         sizes.append(size)
-        places.append(world.frame.inward(rows(moved(mesh, placed.matrix), vertex)))
+        places.append(world.frame.from_world(rows(moved(mesh, placed.matrix), vertex)))
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), places[0], vertices[0]
@@ -174,7 +174,7 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return product
 
 
-def _rows_of_triangles(world: World, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
+def _rows_of_triangles(world: SceneGeometry, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
     """(T,) which of the polygons with these ascending first corners each triangle belongs to, -1 none."""
     corner = world.corners[:, 0]
     row = np.searchsorted(first, corner, side="right") - 1
@@ -192,7 +192,7 @@ def _smallest_corner(
 
 
 def _places(
-    world: World,
+    world: SceneGeometry,
     row: NDArray[np.int32],
     first: NDArray[np.int32],
     starts: NDArray[np.int32],

@@ -14,10 +14,10 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import reversed_polygons
 from illumcli.geometry.triangulate import triangulate
 from illumcli.records import Record
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 
 
-class Placed(Record):
+class PlacedMesh(Record):
     """One object of the scene: a mesh, where it stands, and its numbers in the World."""
 
     mesh: Mesh
@@ -30,21 +30,21 @@ class Placed(Record):
     first_triangle: int
 
 
-class Standing(Record):
+class ObjectBounds(Record):
     """Where every object stands: known before any of them is cut in triangles."""
 
     matrices: tuple[NDArray[np.float64], ...]  # (4, 4) each, object to scene
     low: NDArray[np.float64]  # (O, 3) corner of what its polygons use [scene units]; inf without polygons
     high: NDArray[np.float64]  # (O, 3); -inf without polygons
     polygons: NDArray[np.int64]  # (O,) how many
-    frame: Frame
+    frame: RenderSpace
 
 
-class World(Record):
+class SceneGeometry(Record):
     """All triangles of the scene, in radii from its centre. Arrays are read-only."""
 
-    frame: Frame
-    placed: tuple[Placed, ...]
+    frame: RenderSpace
+    placed: tuple[PlacedMesh, ...]
     vertices: NDArray[np.float32]  # (V, 3), exactly what the ray core sees
     triangles: NDArray[np.int32]  # (T, 3) vertex numbers
     corners: NDArray[np.int32]  # (T, 3) corner numbers, for normals and uv
@@ -105,7 +105,7 @@ def used(mesh: Mesh) -> NDArray[np.bool_]:
     return mask
 
 
-def stand(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> Standing:
+def stand(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> ObjectBounds:
     """Mesh i under matrix i; the frame's box holds them all, with its centre at 0 and half its diagonal 1."""
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
@@ -116,9 +116,9 @@ def stand(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> St
         lowest, highest = np.zeros(3), np.zeros(3)
     centre = (lowest + highest) / 2
     radius = float(np.linalg.norm((highest - lowest) / 2)) or 1.0
-    frame = Frame((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+    frame = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
     polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
-    return Standing(tuple(matrices), low, high, polygons, frame)
+    return ObjectBounds(tuple(matrices), low, high, polygons, frame)
 
 
 def moved(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,9 +167,9 @@ def without_polygons(mesh: Mesh) -> Mesh:
 def place(
     meshes: Sequence[Mesh],
     matrices: Sequence[NDArray[np.float64]],
-    frame: Frame | None = None,
+    frame: RenderSpace | None = None,
     by_file: Sequence[bool] | None = None,
-) -> World:
+) -> SceneGeometry:
     """Mesh i under matrix i, all in one World of unit radius: in `frame`, or in that of all these meshes.
 
     Triangles run counter-clockwise seen from outside: those of mirrored objects and of polygons that run
@@ -187,7 +187,7 @@ def place(
         against = reversed_polygons(mesh) if by_file is None or by_file[number] else None
         if against is not None:
             own = np.where(against[cut.polygon][:, None], own[:, ::-1], own)
-        placed.append(Placed(mesh, matrix, mirrored, against, *first.values()))
+        placed.append(PlacedMesh(mesh, matrix, mirrored, against, *first.values()))
         vertices.append(moved(mesh, matrix))
         triangles.append(mesh.corners[own] + np.int32(first["vertex"]))
         corners.append(own + np.int32(first["corner"]))
@@ -197,10 +197,10 @@ def place(
         first["corner"] += len(mesh.corners)
         first["polygon"] += mesh.polygon_count
         first["triangle"] += len(own)
-    return World(
+    return SceneGeometry(
         frame=frame,
         placed=tuple(placed),
-        vertices=columns(_joined([frame.inward(v) for v in vertices], np.zeros((0, 3))), F),
+        vertices=columns(_joined([frame.from_world(v) for v in vertices], np.zeros((0, 3))), F),
         triangles=columns(_joined(triangles, np.zeros((0, 3), np.int32))),
         corners=columns(_joined(corners, np.zeros((0, 3), np.int32))),
         polygons=_joined(polygons, np.zeros(0, np.int32)),
@@ -219,7 +219,7 @@ class CornerVectors(Record):
     index: NDArray[np.int32]  # (C,) row of `values`, -1 where the corner has none
 
 
-def world_normals(world: World, normals: Sequence[Any]) -> CornerVectors:
+def world_normals(world: SceneGeometry, normals: Sequence[Any]) -> CornerVectors:
     """Unit shading normals of every corner in scene directions, from each object's own
     (`geometry.normals.CornerNormals`), by the inverse transpose of its matrix."""
     values, index, first = [], [], 0
@@ -242,7 +242,7 @@ def cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
 
 
-def world_uvs(world: World) -> CornerVectors:
+def world_uvs(world: SceneGeometry) -> CornerVectors:
     """Texture coordinates of every corner; -1 where a mesh has none."""
     values, index, first = [], [], 0
     for placed in world.placed:
@@ -268,7 +268,7 @@ class PolygonCentres(Record):
             array.setflags(write=False)
 
 
-def polygon_centres(world: World) -> PolygonCentres:
+def polygon_centres(world: SceneGeometry) -> PolygonCentres:
     """Centres and corners of all polygons."""
     centres, vertices, starts = [], [np.zeros(0, np.int32)], [np.zeros(1, np.int32)]
     for placed in world.placed:

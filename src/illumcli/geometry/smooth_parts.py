@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
 from illumcli.geometry.components import components
-from illumcli.geometry.scene_geometry import CornerVectors, World
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 
 NORMAL_STEPS = 512
 """Normals that round to the same multiples of 1 / NORMAL_STEPS are one: exporters write the normal of a
@@ -23,7 +23,7 @@ vertex that they split several times, with different last digits."""
 class SmoothParts:
     """Which triangles belong to one smooth part; the parts are looked for when a question needs them."""
 
-    def __init__(self, world: World, normals: CornerVectors) -> None:
+    def __init__(self, world: SceneGeometry, normals: CornerVectors) -> None:
         self._world = world
         self._normals = normals
 

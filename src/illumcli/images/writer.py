@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from illumcli.color import refuse_nonfinite
 from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import Part, refusals
+from illumcli.files.atomic import AtomicFile, refusals
 from illumcli.images.png import PngFile
 from illumcli.records import Value
 
@@ -110,7 +110,7 @@ class ImageWriter:
         if no_utf8(os.path.realpath(path)):
             raise InputError(f"{shown(os.path.realpath(path))}: {NO_UTF8}")
         open_file = _format(suffix, srgb)
-        self._part = Part(path)
+        self._part = AtomicFile(path)
         with self._or_nothing():
             self._file = open_file(self._part.path, width, height, self._channels, metadata or {})
 

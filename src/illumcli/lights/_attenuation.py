@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.schema.description import Description
 from illumcli.schema.fields import By, NonNegative, Positive
 
@@ -16,7 +16,7 @@ class NoLaw(Description):
 
     law: Literal["none"] = "none"
 
-    def factor(self, distance: Lanes) -> Lanes:
+    def factor(self, distance: Floats) -> Floats:
         """(N,) 1."""
         return np.ones_like(distance)
 
@@ -37,7 +37,7 @@ class Polynomial(Description):
         if not (self.c1 or self.c2 or self.c3):
             raise ValueError("c1, c2 and c3 must not all be 0")
 
-    def factor(self, distance: Lanes) -> Lanes:
+    def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / (c1 + c2 d + c3 d^2)."""
         return 1 / (self.c1 + distance * (self.c2 + distance * self.c3))
 
@@ -47,7 +47,7 @@ class InverseSquare(Description):
 
     law: Literal["inverse_square"]
 
-    def factor(self, distance: Lanes) -> Lanes:
+    def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / d^2."""
         return 1 / np.square(distance)
 
@@ -57,7 +57,7 @@ class InverseSquareFlux(Description):
 
     law: Literal["inverse_square_flux"]
 
-    def factor(self, distance: Lanes) -> Lanes:
+    def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / (4 pi d^2)."""
         return 1 / (4 * np.pi * np.square(distance))
 
@@ -72,7 +72,7 @@ class Windowed(Description):
     range: Positive
     """Distance from which nothing arrives [scene units]."""
 
-    def factor(self, distance: Lanes) -> Lanes:
+    def factor(self, distance: Floats) -> Floats:
         """(N,) the inverse square times the window; 0 from `range` on."""
         share = np.minimum(distance / self.range, 1)
         return np.square(1 - np.square(np.square(share))) / np.square(distance)

@@ -6,9 +6,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, columns, length
+from illumcli.arrays import Floats, Vectors, columns, length
 from illumcli.records import Record
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.schema.description import Description
 from illumcli.schema.fields import Name
 
@@ -16,12 +16,12 @@ NEAREST = 1e-6
 """Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""
 
 
-class Arriving(Record):
+class LightSample(Record):
     """Light arriving at N points if nothing stood between."""
 
     l: Vectors  # (N, 3) unit, from the point to the light
-    distance: Lanes  # (N,) to the light in radii of the scene, inf for a light at infinity
-    strength: Lanes  # (N,) irradiance facing the light, per unit of the light's colour
+    distance: Floats  # (N,) to the light in radii of the scene, inf for a light at infinity
+    strength: Floats  # (N,) irradiance facing the light, per unit of the light's colour
 
 
 class Light(Description):
@@ -43,12 +43,12 @@ class Light(Description):
         """This light with neither colour nor name: all that `arriving` depends on."""
         return self.replaced(**{self.power: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
-    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
         """Light at `position` [(N, 3), radii from the scene's centre]."""
         raise NotImplementedError
 
 
-def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Lanes]:
+def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Floats]:
     """Unit vectors from (N, 3) positions to a light at (3,), and its distances, both in radii.
 
     A light further than 10^4 radii is reached in float64, where neither the difference nor its square

@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from illumcli.arrays import Vectors
-from illumcli.lights._base import Arriving, Light
-from illumcli.render_space import Frame
+from illumcli.lights._base import Light, LightSample
+from illumcli.render_space import RenderSpace
 from illumcli.schema.fields import Color, Direction
 
 
@@ -21,12 +21,12 @@ class Directional(Light):
 
     power: ClassVar[str] = "irradiance"
 
-    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
         """Light at `position`: the same everywhere, strength 1, distance inf."""
         lanes = len(position)
         way = -np.asarray(self.direction) / np.abs(self.direction).max()
         l = (way / np.linalg.norm(way)).astype(position.dtype)
-        return Arriving(
+        return LightSample(
             np.broadcast_to(l, (lanes, 3)),
             np.broadcast_to(position.dtype.type(np.inf), lanes),
             np.broadcast_to(position.dtype.type(1), lanes),

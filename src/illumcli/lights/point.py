@@ -8,8 +8,8 @@ import numpy as np
 
 from illumcli.arrays import Vectors
 from illumcli.lights._attenuation import Law
-from illumcli.lights._base import Arriving, Light, towards
-from illumcli.render_space import Frame
+from illumcli.lights._base import Light, LightSample, towards
+from illumcli.render_space import RenderSpace
 from illumcli.schema.description import written
 from illumcli.schema.fields import Color, Vector
 
@@ -25,8 +25,8 @@ class Point(Light):
 
     power: ClassVar[str] = "intensity"
 
-    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
         """Light at `position`; strength f(d)."""
-        l, distance = towards(frame.inward(self.position), position)
+        l, distance = towards(frame.from_world(self.position), position)
         scene_units = distance.astype(np.float64) * frame.radius
-        return Arriving(l, distance, self.attenuation.factor(scene_units).astype(position.dtype))
+        return LightSample(l, distance, self.attenuation.factor(scene_units).astype(position.dtype))

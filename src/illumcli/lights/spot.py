@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, dot, unit
 from illumcli.lights._attenuation import Law
-from illumcli.lights._base import Arriving, Light, towards
-from illumcli.render_space import Frame
+from illumcli.lights._base import Light, LightSample, towards
+from illumcli.render_space import RenderSpace
 from illumcli.schema.description import written
 from illumcli.schema.fields import Color, Share, Vector, Within
 
@@ -37,9 +37,9 @@ class Spot(Light):
         if self.position == self.target:
             raise ValueError("position and target must differ")
 
-    def arriving(self, position: Vectors, frame: Frame) -> Arriving:
+    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
         """Light at `position`; strength f(d) times the cone's smooth step in the cosine to the axis."""
-        light = frame.inward(self.position)
+        light = frame.from_world(self.position)
         l, distance = towards(light, position)
         # the cone in double precision and by 1 - cos: a narrow one has no digits in a rounded cosine
         gap = gap_to_axis(position - light, np.subtract(self.target, self.position))
@@ -51,7 +51,7 @@ class Spot(Light):
         else:
             cone = gap <= rim_gap
         strength = self.attenuation.factor(distance.astype(np.float64) * frame.radius) * cone
-        return Arriving(l, distance, strength.astype(position.dtype))
+        return LightSample(l, distance, strength.astype(position.dtype))
 
 
 def gap_to_axis(way: NDArray[np.float64], axis: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._lobes import channels
 from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
 from illumcli.schema.description import Description
@@ -119,7 +119,7 @@ class Dielectric(Description):
     ior: Index = 1.5
     """eta, index of refraction behind the surface over the one before it; below 1 it may reflect all."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(N,) at the cosine c."""
         (eta,) = like(c, self.ior)
         return dielectric(c, eta)
@@ -134,7 +134,7 @@ class Conductor(Description):
     k: ExtinctionColor = (3.9, 2.45, 2.14)
     """k, imaginary part of the index per channel."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c."""
         return conductor(c, channels(c, self.n), channels(c, self.k))
 
@@ -146,7 +146,7 @@ class Schlick(Description):
     f0: Albedo = (0.04, 0.04, 0.04)
     """F0, reflectance at normal incidence per channel."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c."""
         return schlick(c, channels(c, self.f0))
 
@@ -162,7 +162,7 @@ class Material(Description):
     """How the table's F0 goes on to grazing. `dielectric`: by the index it implies with k = 0, which for
     metals is fictitious. `schlick`: by Schlick's curve."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c."""
         f0 = channels(c, MATERIALS[self.name])
         return schlick(c, f0) if self.curve == "schlick" else dielectric(c, eta_from_f0(f0))
@@ -180,7 +180,7 @@ class Shifted(Description):
     """Colour at grazing. `white`: the light keeps its colour. `light`: the text's wording taken literally,
     which applies the colour of the light twice."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c; `light` is the light's colour, largest component 1."""
         (eta,) = like(c, self.ior)
         grazing = channels(c, (1.0, 1.0, 1.0) if light is None else light)
@@ -194,7 +194,7 @@ class Constant(Description):
     value: Albedo = (1.0, 1.0, 1.0)
     """F per channel; 1 is a perfect mirror in every facet."""
 
-    def reflectance(self, c: Lanes, light: Vectors | None = None) -> Array:
+    def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, 1) whatever c."""
         return channels(c, self.value)
 

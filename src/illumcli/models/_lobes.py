@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors
+from illumcli.arrays import Floats, Vectors
 from illumcli.schema.description import Description
 
 
-def lobe(gap: Lanes, exponent: Any) -> Lanes:
+def lobe(gap: Floats, exponent: Any) -> Floats:
     """(N,) max(0, cos(angle))^exponent from gap = 1 - cos(angle); an exponent of 0 gives 1 at any angle.
 
     A power of a rounded cosine loses exponent * 2^-53 of its value; with the gap formed as half the squared
@@ -22,13 +22,13 @@ def lobe(gap: Lanes, exponent: Any) -> Lanes:
     return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * ((gap < 1) | (exponent == 0))
 
 
-def log_cos(cosine: Lanes, sin2: Lanes) -> Lanes:
+def log_cos(cosine: Floats, sin2: Floats) -> Floats:
     """(N,) logarithm of a cosine above 0: from sin^2 near 0 degrees, where the cosine has lost its digits."""
     near = sin2 < 0.5
     return np.log1p(-np.minimum(sin2, 0.5)) / 2 * near + np.log(cosine) * ~near
 
 
-def channels(lanes: Lanes, color: Any) -> NDArray[Any]:
+def channels(lanes: Floats, color: Any) -> NDArray[Any]:
     """A colour in the precision of `lanes`, channel by channel: (3, 1), or (3, N) where it varies.
 
     Its product with (N,) lanes is (3, N), whose transpose is (N, 3) column by column in memory.
@@ -37,7 +37,7 @@ def channels(lanes: Lanes, color: Any) -> NDArray[Any]:
     return values[:, None] if values.ndim == 1 else values.T
 
 
-def tint(color: Any, lanes: Lanes) -> Vectors:
+def tint(color: Any, lanes: Floats) -> Vectors:
     """(N, 3) the lanes weighted by a colour, or by one colour per lane."""
     return (channels(lanes, color) * lanes).T
 

@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
-from illumcli.arrays import Lanes, like
+from illumcli.arrays import Floats, like
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
 from illumcli.schema.description import Description
@@ -118,7 +118,7 @@ class Gaussian(Description):
     c: Positive | None = None
     """c, height at the normal [1/sr]; left out, the c that normalises D."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) c exp(-(theta / m)^2)."""
         m, c = like(n_h, self.m, gaussian_constant(self.m) if self.c is None else self.c)
         return c * gaussian(n_h, sin2_h, m)
@@ -131,7 +131,7 @@ class Beckmann(Description):
     m: Roughness = 0.3
     """m, RMS slope: 0.05 polished, 1 very rough."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with 1 / (m^2 cos^4), pi times that."""
         (m,) = like(n_h, self.m)
         density = beckmann(n_h, sin2_h, m)
@@ -145,7 +145,7 @@ class Blinn(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
         (exponent,) = like(n_h, power_of_half_height(self.beta))
         height = 1 if printed else (exponent + 2) / (2 * np.pi)
@@ -159,7 +159,7 @@ class PowerCosine(Description):
     exponent: NonNegative = 20.0
     """n, the exponent; 0 to 10^6 and beyond."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) (n + 2) / (2 pi) cos^n, normalised."""
         (exponent,) = like(n_h, self.exponent)
         return power_cosine(n_h, sin2_h, exponent) * ((exponent + 2) / (2 * np.pi))
@@ -172,7 +172,7 @@ class TorranceSparrow(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
         width = m_of_half_height(self.beta)
         m, c = like(n_h, width, 1 if printed else gaussian_constant(width))
@@ -186,7 +186,7 @@ class TrowbridgeReitz(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
         (alpha,) = like(n_h, alpha_of_half_height(self.beta))
         density = ggx(n_h, sin2_h, alpha)
@@ -200,7 +200,7 @@ class GGX(Description):
     alpha: Roughness = 0.3
     """alpha, slope scale: 0.05 polished, 1 very rough; longer tails than Beckmann."""
 
-    def density(self, n_h: Lanes, sin2_h: Lanes, printed: bool = False) -> Lanes:
+    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised."""
         (alpha,) = like(n_h, self.alpha)
         return ggx(n_h, sin2_h, alpha)

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._fresnel import schlick
 from illumcli.models._lobes import channels, log_cos
@@ -47,14 +47,14 @@ class AshikhminShirley(IlluminationModel):
         """Unless the exponents are equal along and across it."""
         return self.exponent_u != self.exponent_v
 
-    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats, n_v: Floats) -> Vectors:
         """(N, 3) n_l * diffuse."""
         Rd, Rs = channels(n_l, self.diffuse), channels(n_l, self.specular)
         seen = n_l * _rise(n_l) * _rise(n_v) * (28 / (23 * np.pi))
         return (Rd * (1 - Rs) * seen).T
 
     def specular_lobe(
-        self, n_l: Lanes, n_v: Lanes, s_s: Lanes, v_h: Lanes, n_h: Lanes, t_s: Lanes, b_s: Lanes
+        self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, t_s: Floats, b_s: Floats
     ) -> Vectors:
         """(N, 3) n_l * specular."""
         nu, nv = like(n_l, self.exponent_u, self.exponent_v)
@@ -67,7 +67,7 @@ class AshikhminShirley(IlluminationModel):
         return (schlick(v_h, channels(n_l, self.specular)) * shape).T
 
 
-def _rise(cosine: Lanes) -> Lanes:
+def _rise(cosine: Floats) -> Floats:
     """1 - (1 - cosine / 2)^5, 0 at the horizon with all its digits."""
     x = cosine / 2
     return x * (5 - x * (10 - x * (10 - x * (5 - x))))

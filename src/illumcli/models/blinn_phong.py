@@ -23,7 +23,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -40,11 +40,11 @@ class BlinnPhong(IlluminationModel):
     normalised: bool = False
     """Divide each lobe by its integral at normal incidence and weigh it by the cosine."""
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) kd * n_l; over pi where normalised."""
         return tint(self.diffuse, n_l / np.pi if self.normalised else n_l)
 
-    def specular_lobe(self, n_l: Lanes, gap_nh: Lanes) -> Vectors:
+    def specular_lobe(self, n_l: Floats, gap_nh: Floats) -> Vectors:
         """(N, 3) ks * n_h**e, from gap_nh = 1 - n.h."""
         (e,) = like(gap_nh, self.exponent)
         shape = lobe(gap_nh, e)

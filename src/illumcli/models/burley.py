@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Share
@@ -34,7 +34,7 @@ class Burley(IlluminationModel):
     reciprocal: ClassVar[bool] = True
     physical: ClassVar[bool] = True
 
-    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes, s_s: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats, n_v: Floats, s_s: Floats) -> Vectors:
         """(N, 3) n_l * rho / pi and both factors, of which (l.h)^2 = |l + v|^2 / 4."""
         (r,) = like(n_l, self.roughness)
         edge = 0.5 + r * s_s / 2
@@ -42,6 +42,6 @@ class Burley(IlluminationModel):
         return tint(self.diffuse, fall * n_l / np.pi)
 
 
-def _fifth(x: Lanes) -> Lanes:
+def _fifth(x: Floats) -> Floats:
     square = x * x
     return square * square * x

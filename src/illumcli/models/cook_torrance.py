@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
@@ -70,25 +70,25 @@ class CookTorrance(IlluminationModel):
         """kd * rho."""
         return weighed(self.diffuse, self._diffuse_weight())
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) kd * rho / pi * n_l."""
         (kd,) = like(n_l, self._diffuse_weight())
         return tint(self.diffuse, n_l * (kd / np.pi))
 
     def specular_lobe(
-        self, n_l: Lanes, n_v: Lanes, s_s: Lanes, v_h: Lanes, n_h: Lanes, sin2_h: Lanes
+        self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, sin2_h: Floats
     ) -> Vectors:
         """(N, 3) ks * D G F / (4 n_v)."""
         return self.colored_lobe(n_l, n_v, s_s, v_h, n_h, sin2_h, None)
 
     def colored_lobe(
         self,
-        n_l: Lanes,
-        n_v: Lanes,
-        s_s: Lanes,
-        v_h: Lanes,
-        n_h: Lanes,
-        sin2_h: Lanes,
+        n_l: Floats,
+        n_v: Floats,
+        s_s: Floats,
+        v_h: Floats,
+        n_h: Floats,
+        sin2_h: Floats,
         light: Vectors | None,
     ) -> Vectors:
         """(N, 3) the specular lobe of a facet whose colour goes over to the light's at grazing."""

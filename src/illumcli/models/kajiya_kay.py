@@ -20,7 +20,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -37,11 +37,11 @@ class KajiyaKay(IlluminationModel):
 
     isotropic: ClassVar[bool] = False
 
-    def diffuse_lobe(self, sin_tl: Lanes) -> Vectors:
+    def diffuse_lobe(self, sin_tl: Floats) -> Vectors:
         """(N, 3) kd * |t x l|."""
         return tint(self.diffuse, sin_tl)
 
-    def specular_lobe(self, sin_tl: Lanes, sin_tv: Lanes, t_l: Lanes, t_v: Lanes) -> Vectors:
+    def specular_lobe(self, sin_tl: Floats, sin_tv: Floats, t_l: Floats, t_v: Floats) -> Vectors:
         """(N, 3) ks * cos(angle to the cone)^e, the gap as half a squared distance in the strand's plane."""
         (e,) = like(t_l, self.exponent)
         gap = (np.square(sin_tl - sin_tv) + np.square(t_l + t_v)) / 2

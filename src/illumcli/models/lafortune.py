@@ -19,7 +19,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
@@ -51,12 +51,12 @@ class Lafortune(IlluminationModel):
         """Unless Cx and Cy are equal."""
         return self.cx != self.cy
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) n_l * rho_d / pi."""
         return tint(self.diffuse, n_l / np.pi)
 
     def specular_lobe(
-        self, n_l: Lanes, n_v: Lanes, t_l: Lanes, t_v: Lanes, b_l: Lanes, b_v: Lanes
+        self, n_l: Floats, n_v: Floats, t_l: Floats, t_v: Floats, b_l: Floats, b_v: Floats
     ) -> Vectors:
         """(N, 3) the lobe, its gap as half of |C l - v|^2 plus what C shortens l by."""
         cx, cy, cz, e = like(n_l, self.cx, self.cy, self.cz, self.exponent)

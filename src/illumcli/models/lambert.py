@@ -13,7 +13,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors
+from illumcli.arrays import Floats, Vectors
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo
@@ -28,6 +28,6 @@ class Lambert(IlluminationModel):
     conserving: ClassVar[bool] = True
     physical: ClassVar[bool] = True
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) rho / pi * n_l."""
         return tint(self.diffuse, n_l / np.pi)

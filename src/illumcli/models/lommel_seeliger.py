@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors
+from illumcli.arrays import Floats, Vectors
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint, weighed
 from illumcli.models._parameters import Albedo
@@ -37,6 +37,6 @@ class LommelSeeliger(IlluminationModel):
         """The albedo under light from everywhere."""
         return weighed(self.diffuse, 2 / 3 * (1 - np.log(2)))
 
-    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats, n_v: Floats) -> Vectors:
         """(N, 3) w n_l / (4 pi (n_l + n_v))."""
         return tint(self.diffuse, n_l / (n_l + n_v) / (4 * np.pi))

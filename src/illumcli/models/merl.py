@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors, dot
+from illumcli.arrays import Floats, Vectors, dot
 from illumcli.errors import InputError
 from illumcli.models._base import IlluminationModel, Lobe
 
@@ -35,8 +35,8 @@ SCALE = (1 / 1500, 1.15 / 1500, 1.66 / 1500)
 
 
 def rusinkiewicz(
-    nxs: Vectors, n_s: Lanes, n: Vectors, l: Vectors, v: Vectors, s_s: Lanes
-) -> tuple[Lanes, Lanes, Lanes]:
+    nxs: Vectors, n_s: Floats, n: Vectors, l: Vectors, v: Vectors, s_s: Floats
+) -> tuple[Floats, Floats, Floats]:
     """theta_h, theta_d and phi_d in radians, phi_d within -pi..pi and 0 where it is undefined.
 
     With d = l - v and the frame whose X and Y point from the half vector away from the normal and across,
@@ -80,9 +80,9 @@ class Merl(IlluminationModel):
 
     def specular_lobe(
         self,
-        n_l: Lanes,
-        n_s: Lanes,
-        s_s: Lanes,
+        n_l: Floats,
+        n_s: Floats,
+        s_s: Floats,
         nxs: Vectors,
         n: Vectors,
         l: Vectors,
@@ -139,13 +139,13 @@ def _cells(table: NDArray[np.uint32], flat: NDArray[np.int64]) -> NDArray[np.flo
     return halves.view("<f8")[..., 0].astype(np.float64, copy=False)
 
 
-def _nearest(table: NDArray[np.uint32], *angles: Lanes) -> NDArray[Any]:
+def _nearest(table: NDArray[np.uint32], *angles: Floats) -> NDArray[Any]:
     """(3, N) the cells that the angles fall in; 0 without measurement."""
     flat = merl_index(*angles)[3]
     return _scaled(np.maximum(_cells(table, flat), 0), angles[0].dtype)
 
 
-def _linear(table: NDArray[np.uint32], *angles: Lanes) -> NDArray[Any]:
+def _linear(table: NDArray[np.uint32], *angles: Floats) -> NDArray[Any]:
     """(3, N) between the centres of cells, phi_d going round; 0 without any measurement nearby."""
     low, part = [], []
     for x in merl_coordinates(*angles):

@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -38,11 +38,11 @@ class Phong(IlluminationModel):
     normalised: bool = False
     """Divide each lobe by its integral and weigh it by the cosine (Lewis 1994)."""
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) kd * n_l; over pi where normalised."""
         return tint(self.diffuse, n_l / np.pi if self.normalised else n_l)
 
-    def specular_lobe(self, n_l: Lanes, gap_rv: Lanes) -> Vectors:
+    def specular_lobe(self, n_l: Floats, gap_rv: Floats) -> Vectors:
         """(N, 3) ks * r_v**e, from gap_rv = 1 - r.v."""
         (e,) = like(gap_rv, self.exponent)
         shape = lobe(gap_rv, e)

@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
 from illumcli.models._parameters import Albedo, NonNegative, Varying
@@ -50,7 +50,7 @@ class PoulinFournier(IlluminationModel):
     isotropic: ClassVar[bool] = False
     physical: ClassVar[bool] = True
 
-    def diffuse_lobe(self, n_l: Lanes, n_v: Lanes, b_l: Lanes, b_v: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats, n_v: Floats, b_l: Floats, b_v: Floats) -> Vectors:
         """(N, 3) the diffuse part, integrated in closed form."""
         (steepest,) = like(n_l, self.slope)
         low, high = lit_and_seen(n_l, n_v, b_l, b_v, steepest)
@@ -59,14 +59,14 @@ class PoulinFournier(IlluminationModel):
 
     def specular_lobe(
         self,
-        n_l: Lanes,
-        n_v: Lanes,
-        b_l: Lanes,
-        b_v: Lanes,
-        s_s: Lanes,
-        n_s: Lanes,
-        t_s: Lanes,
-        b_s: Lanes,
+        n_l: Floats,
+        n_v: Floats,
+        b_l: Floats,
+        b_v: Floats,
+        s_s: Floats,
+        n_s: Floats,
+        t_s: Floats,
+        b_s: Floats,
     ) -> Vectors:
         """(N, 3) the specular part, by quadrature: to 1e-5 in single precision, 1e-12 in double."""
         e, steepest = like(n_l, self.exponent, self.slope)

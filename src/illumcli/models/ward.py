@@ -23,7 +23,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, like
+from illumcli.arrays import Floats, Vectors, like
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Roughness
@@ -57,12 +57,12 @@ class Ward(IlluminationModel):
         """Unless the slopes are equal along and across it."""
         return self.alpha_x != self.alpha_y
 
-    def diffuse_lobe(self, n_l: Lanes) -> Vectors:
+    def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) n_l * rho_d / pi."""
         return tint(self.diffuse, n_l / np.pi)
 
     def specular_lobe(
-        self, n_l: Lanes, n_v: Lanes, s_s: Lanes, n_s: Lanes, t_s: Lanes, b_s: Lanes
+        self, n_l: Floats, n_v: Floats, s_s: Floats, n_s: Floats, t_s: Floats, b_s: Floats
     ) -> Vectors:
         """(N, 3) the highlight."""
         ax, ay = like(n_l, self.alpha_x, self.alpha_y)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Lanes, Vectors, columns
-from illumcli.render_space import Frame
+from illumcli.arrays import F, Floats, Vectors, columns
+from illumcli.render_space import RenderSpace
 
 PARALLEL = 1e-9
 """Sine of the angle below which `up` is taken to point along the line of sight."""
@@ -72,12 +72,12 @@ CLOSEST = 1e-3
 """A framed object that hides behind one of its own points is seen from this far off it, in its radii."""
 
 
-def _between_edges(x: Lanes, z: Lanes, slope: float) -> float:
+def _between_edges(x: Floats, z: Floats, slope: float) -> float:
     """How far along the line of sight an eye can be that has all points between two edges of its view."""
     return -float((x - slope * z).max() + (-x - slope * z).max()) / (2 * slope)
 
 
-def _amid(x: Lanes, depth: Lanes) -> float:
+def _amid(x: Floats, depth: Floats) -> float:
     """The place across from which points of these depths reach as far to either side in the picture."""
     eye = float(x.min() + x.max()) / 2
     for _ in range(16):  # two points decide; where they stay the same the place is exact
@@ -95,8 +95,8 @@ def _tuple(vector: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def camera_rays(
-    camera: Any, frame: Frame, width: int, height: int, points: NDArray[np.float64]
-) -> tuple[Vectors, Vectors, Lanes]:
+    camera: Any, frame: RenderSpace, width: int, height: int, points: NDArray[np.float64]
+) -> tuple[Vectors, Vectors, Floats]:
     """Rays through film positions, in radii from the scene's centre.
 
     Parameters
@@ -115,7 +115,7 @@ def camera_rays(
     right, up, forward = axes(camera)
     x = (2 * points[:, 0] - width) / height
     y = 1 - 2 * points[:, 1] / height
-    eye = frame.inward(camera.position)
+    eye = frame.from_world(camera.position)
     if camera.projection == "perspective":
         slope = np.tan(np.radians(camera.fov) / 2)
         x, y = slope * x, slope * y
@@ -144,7 +144,7 @@ CLEAR = 1.25
 """Rays start this far before they pass the scene's centre, clear of its sphere of radius 1."""
 
 
-def _combined(*terms: tuple[Lanes, NDArray[np.float64]]) -> Vectors:
+def _combined(*terms: tuple[Floats, NDArray[np.float64]]) -> Vectors:
     """(N, 3) float64 sum of a weight per lane times a vector."""
     out = np.empty((len(terms[0][0]), 3), order="F")
     for k in range(3):
@@ -177,7 +177,7 @@ def film_points(
     return out
 
 
-def offsets(u: Lanes, v: Lanes, film_filter: Any | None) -> tuple[Lanes, Lanes]:
+def offsets(u: Floats, v: Floats, film_filter: Any | None) -> tuple[Floats, Floats]:
     """Distances from the pixel's centre [pixels] of points drawn from the filter by inversion."""
     if film_filter is None:
         return np.zeros_like(u), np.zeros_like(v)

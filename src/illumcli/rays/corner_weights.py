@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, rows
+from illumcli.arrays import F, Floats, Ids, rows
 from illumcli.geometry.planar import PlanarPolygons
-from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, World
+from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.records import Record
 
 BLOCK = 1 << 15
@@ -45,19 +45,19 @@ class Corners(Record):
         """Corners per hit."""
         raise NotImplementedError
 
-    def weight(self, k: int) -> Lanes:
+    def weight(self, k: int) -> Floats:
         """(m,) weight of corner k."""
         raise NotImplementedError
 
-    def end_weight(self, k: int) -> Lanes:
+    def end_weight(self, k: int) -> Floats:
         """(m,) weight of corner k as an end of an edge."""
         return self.weight(k)
 
-    def corner(self, world: World, k: int) -> Ids:
+    def corner(self, world: SceneGeometry, k: int) -> Ids:
         """(m,) number of corner k among the World's corners."""
         raise NotImplementedError
 
-    def vertex(self, world: World, k: int) -> Ids:
+    def vertex(self, world: SceneGeometry, k: int) -> Ids:
         """(m,) number of its vertex."""
         raise NotImplementedError
 
@@ -66,7 +66,7 @@ class Corners(Record):
         """(m,) which triangle or polygon of the class each hit lies on."""
         raise NotImplementedError
 
-    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
         """(m,) a triangle in which corner k lies, and its barycentric weights there."""
         raise NotImplementedError
 
@@ -86,27 +86,27 @@ class TriangleCorners(Corners):
     """Barycentric weights."""
 
     triangle: Ids  # (m,)
-    u: Lanes  # (m,) float32 weight of corner 1
-    v: Lanes  # (m,) float32 weight of corner 2
+    u: Floats  # (m,) float32 weight of corner 1
+    v: Floats  # (m,) float32 weight of corner 2
 
     @property
     def count(self) -> int:
         return 3
 
-    def weight(self, k: int) -> Lanes:
+    def weight(self, k: int) -> Floats:
         return (self.u, self.v)[k - 1] if k else 1 - self.u - self.v
 
-    def corner(self, world: World, k: int) -> Ids:
+    def corner(self, world: SceneGeometry, k: int) -> Ids:
         return world.corners[:, k].take(self.triangle)
 
-    def vertex(self, world: World, k: int) -> Ids:
+    def vertex(self, world: SceneGeometry, k: int) -> Ids:
         return world.triangles[:, k].take(self.triangle)
 
     @property
     def shape(self) -> Ids:
         return self.triangle
 
-    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
         return self.triangle, np.full_like(self.u, k == 1), np.full_like(self.v, k == 2)
 
     def of(self, hits: NDArray[Any], place: Ids) -> TriangleCorners:
@@ -129,11 +129,11 @@ class PolygonCorners(Corners):
     def count(self) -> int:
         return len(self.weights)
 
-    def weight(self, k: int) -> Lanes:
-        weight: Lanes = self.weights[k]
+    def weight(self, k: int) -> Floats:
+        weight: Floats = self.weights[k]
         return weight
 
-    def end_weight(self, k: int) -> Lanes:
+    def end_weight(self, k: int) -> Floats:
         """The same; beyond the last corner that of the first, where the last edge ends."""
         return np.where(self.last < k, self.weights[0], self.weights[k])
 
@@ -141,17 +141,17 @@ class PolygonCorners(Corners):
         """(m,) number of corner k, where those of polygon q have the numbers from ``first[q]`` on."""
         return first.take(self.polygon) + np.where(self.last < k, np.int32(0), np.int32(k))
 
-    def corner(self, world: World, k: int) -> Ids:
+    def corner(self, world: SceneGeometry, k: int) -> Ids:
         return self.number(self.planar.first_corner, k)
 
-    def vertex(self, world: World, k: int) -> Ids:
+    def vertex(self, world: SceneGeometry, k: int) -> Ids:
         return self.planar.vertex.take(self.number(self.planar.starts, k))
 
     @property
     def shape(self) -> Ids:
         return self.polygon
 
-    def place(self, k: int) -> tuple[Ids, Lanes, Lanes]:
+    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
         number = self.number(self.planar.starts, k)
         return self.planar.triangle.take(number), self.planar.u.take(number), self.planar.v.take(number)
 
@@ -193,14 +193,14 @@ class MeanCorners(Corners):
     def _last(self) -> Ids:
         return np.diff(self.centres.starts).take(self.polygon) - np.int32(1)
 
-    def weight(self, k: int) -> Lanes:
+    def weight(self, k: int) -> Floats:
         last = self._last()
         return np.where(k <= last, 1 / (last + 1), 0).astype(F)
 
-    def corner(self, world: World, k: int) -> Ids:
+    def corner(self, world: SceneGeometry, k: int) -> Ids:
         return np.asarray(self.centres.starts.take(self.polygon) + np.minimum(self._last(), np.int32(k)))
 
-    def vertex(self, world: World, k: int) -> Ids:
+    def vertex(self, world: SceneGeometry, k: int) -> Ids:
         return self.centres.vertex.take(self.corner(world, k))
 
     def of(self, hits: NDArray[Any], place: Ids) -> MeanCorners:
@@ -225,11 +225,11 @@ class CornerWeights(Record):
     def __len__(self) -> int:
         return len(self.hits.triangle)
 
-    def interpolate(self, world: World, table: CornerVectors) -> NDArray[Any]:
+    def interpolate(self, world: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
         """(M, j) the vectors that `table` has at corners, interpolated; not made unit."""
         return self.joined(lambda group, k: rows(table.values, table.index.take(group.corner(world, k))))
 
-    def interpolate_vertices(self, world: World, values: NDArray[Any]) -> NDArray[Any]:
+    def interpolate_vertices(self, world: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
         """(M, j) of (V, j) values at the World's vertices."""
         return self.joined(lambda group, k: rows(values, group.vertex(world, k)))
 
@@ -268,7 +268,7 @@ def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
 
 
 def corner_weights(
-    world: World, planar: PlanarPolygons | None, triangle: Ids, u: Lanes, v: Lanes
+    world: SceneGeometry, planar: PlanarPolygons | None, triangle: Ids, u: Floats, v: Floats
 ) -> CornerWeights:
     """The weights at M hits.
 
@@ -305,7 +305,7 @@ def corner_weights(
 
 
 def _in_plane(
-    world: World, planar: PlanarPolygons, triangle: Ids, u: Lanes, v: Lanes
+    world: SceneGeometry, planar: PlanarPolygons, triangle: Ids, u: Floats, v: Floats
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m,) coordinates of hits in the planes of their polygons, in double precision."""
     polygon = planar.row.take(triangle)

@@ -14,7 +14,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, repeated
+from illumcli.arrays import F, Floats, Ids, Vectors, repeated
 from illumcli.errors import IllumError
 from illumcli.rays.embree_upload import upload
 from illumcli.records import Record
@@ -32,9 +32,9 @@ class Closest(Record):
     """First hits of N rays; a miss has triangle -1 and distance inf."""
 
     triangle: Ids  # (N,)
-    u: Lanes  # (N,) weight of corner 1
-    v: Lanes  # (N,) weight of corner 2
-    distance: Lanes  # (N,) in lengths of the direction
+    u: Floats  # (N,) weight of corner 1
+    v: Floats  # (N,) weight of corner 2
+    distance: Floats  # (N,) in lengths of the direction
 
 
 class Interrupted(Exception):
@@ -102,7 +102,7 @@ class Tracer:
         hits.distance[hits.triangle < 0] = np.inf
         return hits
 
-    def distance(self, origins: Vectors, directions: Vectors) -> Lanes:
+    def distance(self, origins: Vectors, directions: Vectors) -> Floats:
         """(N,) distance to what each ray hits first, inf where it hits nothing."""
         origins, count = self._asked(origins, directions), len(directions)
         far = np.empty(count, F)
@@ -112,7 +112,7 @@ class Tracer:
         return far
 
     def occluded(
-        self, origins: Vectors, directions: Vectors, limits: Lanes | float = np.inf
+        self, origins: Vectors, directions: Vectors, limits: Floats | float = np.inf
     ) -> NDArray[np.bool_]:
         """(N,) True where anything stands between an origin and `limits` along its direction.
 

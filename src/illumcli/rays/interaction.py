@@ -8,9 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
 from illumcli.geometry.planar import PlanarPolygons
-from illumcli.geometry.scene_geometry import CornerVectors, World, cofactors
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, cofactors
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
 from illumcli.rays.embree import Closest
 from illumcli.rays.offsets import effective_edge
@@ -22,8 +22,8 @@ class Hits(Record):
 
     lane: Ids  # (M,) which sample of the tile
     triangle: Ids  # (M,)
-    u: Lanes  # (M,) float32 weight of corner 1
-    v: Lanes  # (M,) float32 weight of corner 2
+    u: Floats  # (M,) float32 weight of corner 1
+    v: Floats  # (M,) float32 weight of corner 2
 
 
 def seen(closest: Closest) -> Hits:
@@ -35,16 +35,18 @@ def seen(closest: Closest) -> Hits:
     )
 
 
-class Facets(Record):
+class SurfaceInteraction(Record):
     """Where hits lie on their triangles, and the triangles' own planes."""
 
     position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees
     ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
-    edge: Lanes  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
+    edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
     behind: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
 
 
-def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors) -> Facets:
+def facets(
+    world: SceneGeometry, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
+) -> SurfaceInteraction:
     """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
     v0, e1, e2 = (
         columns(rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64) for k in range(3)
@@ -61,7 +63,7 @@ def facets(world: World, triangle: Ids, u: Lanes, v: Lanes, towards_eye: Vectors
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
-    return Facets(position, columns(normal, F), effective_edge(edge, area), behind)
+    return SurfaceInteraction(position, columns(normal, F), effective_edge(edge, area), behind)
 
 
 def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
@@ -69,13 +71,13 @@ def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
     return n * (1 - 2 * behind.astype(n.dtype))[:, None]
 
 
-def corner_rows(world: World, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:
+def corner_rows(world: SceneGeometry, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:
     """Rows of `table` at the three corners of each hit triangle."""
     a, b, c = (table.index.take(world.corners[:, k].take(triangle)) for k in range(3))
     return a, b, c
 
 
-def polygon_facing(triangle: Ids, facet: Facets, planar: PlanarPolygons | None) -> Vectors:
+def polygon_facing(triangle: Ids, facet: SurfaceInteraction, planar: PlanarPolygons | None) -> Vectors:
     """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
 
     Of a planar polygon Newell's, of others the triangle's. Rays keep to the triangle's, which they leave.
@@ -90,7 +92,9 @@ def polygon_facing(triangle: Ids, facet: Facets, planar: PlanarPolygons | None) 
     return out
 
 
-def interpolated(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
+def interpolated(
+    world: SceneGeometry, normals: CornerVectors, weights: CornerWeights, facet: SurfaceInteraction
+) -> Vectors:
     """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
 
     The facet's own where the interpolated one vanishes. On the side the eye sees.
@@ -108,7 +112,9 @@ def with_facet(n: Vectors, ng: Vectors) -> Vectors:
     return n
 
 
-def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, facet: Facets) -> Vectors:
+def quadratic(
+    world: SceneGeometry, normals: CornerVectors, weights: CornerWeights, facet: SurfaceInteraction
+) -> Vectors:
     """(M, 3) unit normal, quadratic along every edge.
 
     Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
@@ -139,11 +145,11 @@ def quadratic(world: World, normals: CornerVectors, weights: CornerWeights, face
     return with_facet(facing(unit(n), facet.behind), facet.ng)
 
 
-Corner: TypeAlias = tuple[Vectors, Vectors, Lanes]
+Corner: TypeAlias = tuple[Vectors, Vectors, Floats]
 """(M, 3) place of a corner, its unit normal, (M,) its weight."""
 
 
-def between(first: Lanes, last: Lanes) -> Lanes:
+def between(first: Floats, last: Floats) -> Floats:
     """(M,) w_i w_j / (w_i + w_j) for the weights of an edge's ends; 0 where one is not positive."""
     product = np.maximum(first, 0) * np.maximum(last, 0)
     return np.divide(product, first + last, out=np.zeros_like(product), where=product > 0)
@@ -153,7 +159,7 @@ def bend(
     n: Vectors,
     count: int,
     corner: Callable[[int], Corner],
-    share: Callable[[Lanes, Lanes], Lanes] = np.multiply,
+    share: Callable[[Floats, Floats], Floats] = np.multiply,
 ) -> None:
     """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit.
 
@@ -171,7 +177,7 @@ def bend(
         last = following
 
 
-def uv(world: World, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
+def uv(world: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
     """(M, 2) texture coordinates; 0 where a mesh has none.
 
     Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
@@ -184,7 +190,7 @@ def uv(world: World, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.f
     return out
 
 
-def _with_all(world: World, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
+def _with_all(world: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
     """(m, 2) means by weight; 0 where a corner has none."""
     index = [uvs.index.take(corners.corner(world, k)) for k in range(corners.count)]
     has = np.minimum.reduce(index) >= 0
@@ -194,7 +200,7 @@ def _with_all(world: World, uvs: CornerVectors, corners: Corners) -> NDArray[np.
     return np.asarray(np.where(has[:, None], found, F(0)))
 
 
-def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
+def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     """Where u grows, at every corner.
 
     The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that

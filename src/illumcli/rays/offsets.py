@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Lanes, Vectors, columns, dot, length
+from illumcli.arrays import F, Floats, Vectors, columns, dot, length
 
 SHARE = 4 * 2.0**-24
 """Four times the distance at which false self-hits begin; contact gaps of 1e-6 radii still shade."""
@@ -15,7 +15,7 @@ LONGEST = 100.0
 """No sliver counts as longer than this [radii]: its rays start 2.4e-5 radii off at most."""
 
 
-def effective_edge(edge: Lanes, area: NDArray[np.floating]) -> Lanes:
+def effective_edge(edge: Floats, area: NDArray[np.floating]) -> Floats:
     """(N,) float32 the length that the rounding of a hit goes with: the longest edge, for slivers more.
 
     The ray core forms a triangle's normal in single precision from edges that in a sliver are nearly
@@ -34,7 +34,7 @@ def effective_edge(edge: Lanes, area: NDArray[np.floating]) -> Lanes:
     return np.minimum(edge * np.maximum(aspect, 1), np.maximum(edge, LONGEST)).astype(F)
 
 
-def lifted(position: NDArray[np.float64], ng: Vectors, edge: Lanes) -> Vectors:
+def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats) -> Vectors:
     """(N, 3) float32 origins above the facet: position + 4 2^-24 (|ng|.|position| + edge) ng, and one ulp.
 
     Parameters
@@ -69,7 +69,7 @@ def to_tangent_plane(position: Vectors, corner: Vectors, normal: Vectors) -> Vec
     return -below[:, None] * normal
 
 
-def bounded(way: Vectors, most: Lanes) -> Vectors:
+def bounded(way: Vectors, most: Floats) -> Vectors:
     """(N, 3) `way`, no longer than `most`."""
     size = length(way)
     return way * np.divide(most, size, out=np.ones_like(size), where=size > most)[:, None]

@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from illumcli.cache.fingerprint import Content
+from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
-from illumcli.graph import Recipe
+from illumcli.graph import Node
 from illumcli.layers import FIXED, Layer, of_light, shadow_of
 from illumcli.lights._base import Light
 from illumcli.mesh_files import companions
@@ -167,7 +167,7 @@ def active_lights(scene: Scene) -> dict[str, Light]:
     return {name: light for name, light in scene.named_lights().items() if sends(light)}
 
 
-def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str, Recipe]:
+def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str, Node]:
     """Every buffer this scene could make, by name; `view` and `tile` are given.
 
     The objects of the numbers `unseen` are left out of it, as far as nothing can tell.
@@ -187,43 +187,43 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     by_uv = {name: name for name in ("uv_tangents", "point_weights")} if None in grains else {}
     book = [
         *_geometry(scene, loaded, rate, unseen),
-        Recipe.of(stages.uvs),
-        Recipe.of(stages.polygon_centres),
-        Recipe.of(stages.planar_polygons),
-        Recipe.of(stages.planar_polygons, "curved_polygons", normals="corner_normals"),
-        Recipe.of(partial(stages.samples, scene.seed), "samples"),
-        Recipe.of(partial(stages.rays, scene.film.filter), "rays"),
-        Recipe.of(stages.hits),
-        Recipe.of(stages.facets),
-        Recipe.of(stages.corner_weights, **whole),
-        Recipe.of(stages.corner_weights, "normal_weights", planar_polygons="curved_polygons"),
-        Recipe.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
-        Recipe.of(stages.point_weights),
-        Recipe.of(stages.material),
-        Recipe.of(stages.view_vectors, "v"),
-        Recipe.of(stages.uv_tangents),
-        Recipe.of(partial(stages.tangents, grains), "t", **by_uv),
-        Recipe.of(stages.ray_origins),
+        Node.of(stages.uvs),
+        Node.of(stages.polygon_centres),
+        Node.of(stages.planar_polygons),
+        Node.of(stages.planar_polygons, "curved_polygons", normals="corner_normals"),
+        Node.of(partial(stages.samples, scene.seed), "samples"),
+        Node.of(partial(stages.rays, scene.film.filter), "rays"),
+        Node.of(stages.hits),
+        Node.of(stages.facets),
+        Node.of(stages.corner_weights, **whole),
+        Node.of(stages.corner_weights, "normal_weights", planar_polygons="curved_polygons"),
+        Node.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
+        Node.of(stages.point_weights),
+        Node.of(stages.material),
+        Node.of(stages.view_vectors, "v"),
+        Node.of(stages.uv_tangents),
+        Node.of(partial(stages.tangents, grains), "t", **by_uv),
+        Node.of(stages.ray_origins),
         *_terminator(rate, smooth, of_normals),
-        Recipe.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
-        Recipe.of(
+        Node.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
+        Node.of(
             partial(stages.obscurance_normals, rate),
             "obscurance_normals",
             normals="corner_normals",
             **of_normals,
         ),
         *_obscurance(scene, loaded, unseen),
-        Recipe.of(stages.ambient_color, **_varying(scene, "ambient")),
-        Recipe.of(stages.emission, **_varying(scene, "emission")),
-        Recipe.of(stages.alpha),
-        Recipe.of(stages.depth),
-        Recipe.of(stages.world_position),
-        Recipe.of(stages.normal),
-        Recipe.of(stages.geometric_normal, planar_polygons="planar_polygons"),
-        Recipe.of(stages.uv),
-        Recipe.of(stages.object_id),
-        Recipe.of(stages.material_id),
-        Recipe.of(stages.triangle_id),
+        Node.of(stages.ambient_color, **_varying(scene, "ambient")),
+        Node.of(stages.emission, **_varying(scene, "emission")),
+        Node.of(stages.alpha),
+        Node.of(stages.depth),
+        Node.of(stages.world_position),
+        Node.of(stages.normal),
+        Node.of(stages.geometric_normal, planar_polygons="planar_polygons"),
+        Node.of(stages.uv),
+        Node.of(stages.object_id),
+        Node.of(stages.material_id),
+        Node.of(stages.triangle_id),
     ]
     book += _materials(scene, loaded)
     eye = {word: word for word in ("v", "t") if word in wanted} | _varying(scene, "lobes")
@@ -236,14 +236,14 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
 
 
-def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Recipe]]:
+def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Node]]:
     """The views that an object is to fill, and what makes their cameras."""
     numbers = {name: number for number, name in enumerate(scene.object_names())}
     every = "every_mesh" if unseen else "meshes"
     return [
         (
             view,
-            Recipe.of(
+            Node.of(
                 partial(stages.framed, view.camera, view.width / view.height, numbers[view.camera.fit]),
                 f"camera:{view.name}",
                 meshes=every,
@@ -254,7 +254,7 @@ def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Recipe]
     ]
 
 
-def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Recipe]:
+def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Node]:
     """w, by rays or from the files that its objects' meshes name."""
     files = tuple(
         (name, None if number in unseen else file)
@@ -269,23 +269,23 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Reci
     if settings.about == "shading" and set(rates(scene)) & set(SMOOTH):
         more["obscurance_normals"] = "obscurance_normals"
     if all_baked(scene) or (scene.obscurance is None and "baked" in more):
-        w = Recipe.of(stages.baked_or_open, "obscurance")
+        w = Node.of(stages.baked_or_open, "obscurance")
     else:
-        w = Recipe.of(partial(stages.obscurance, settings), "obscurance", **more)
+        w = Node.of(partial(stages.obscurance, settings), "obscurance", **more)
     return [
-        Recipe.of(stages.open_facets),
-        Recipe.of(stages.facet_normals),
-        Recipe.of(partial(stages.baked, files), "baked"),
+        Node.of(stages.open_facets),
+        Node.of(stages.facet_normals),
+        Node.of(partial(stages.baked, files), "baked"),
         w,
     ]
 
 
-def baked_files(scene: Scene, loaded: Any) -> tuple[tuple[str, Content | None], ...]:
+def baked_files(scene: Scene, loaded: Any) -> tuple[tuple[str, FileFingerprint | None], ...]:
     """Name of each object and the file of its baked obscurance."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
     files = [source.obscurance if isinstance(source, MeshFile) else None for source in sources]
     return tuple(
-        (name, None if file is None else Content(partial(resolve, loaded, file)))
+        (name, None if file is None else FileFingerprint(partial(resolve, loaded, file)))
         for name, file in zip(scene.object_names(), files, strict=True)
     )
 
@@ -300,7 +300,7 @@ def all_baked(scene: Scene) -> bool:
     return bool(scene.objects) and all(is_baked(scene))
 
 
-def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int, ...]) -> list[Recipe]:
+def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int, ...]) -> list[Node]:
     """Meshes, each source once, what is made of them all, and their normals."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
     found = {
@@ -329,25 +329,25 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         for thing in scene.objects
     )
     wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
-    left = [Recipe.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
+    left = [Node.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
-        *(Recipe.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
-        Recipe(every, partial(stages.meshes, which), parts),
+        *(Node.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
+        Node(every, partial(stages.meshes, which), parts),
         *left,
-        Recipe.of(
+        Node.of(
             partial(stages.standing, tuple(thing.transform for thing in scene.objects)),
             "standing",
             meshes=every,
         ),
-        Recipe.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
-        Recipe.of(partial(stages.world, by_file), "world"),
-        Recipe.of(stages.frame),
-        Recipe.of(partial(stages.repairs, called, computes), "repairs"),
-        *([Recipe.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
-        *([Recipe.of(partial(stages.unnamed, called, selects), "unnamed")] if any(selects) else []),
-        Recipe.of(stages.tracer_over, "tracer"),
-        Recipe.of(partial(stages.corner_normals, how), "corner_normals"),
-        Recipe.of(partial(stages.polygon_normals, methods), "polygon_normals"),
+        Node.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
+        Node.of(partial(stages.world, by_file), "world"),
+        Node.of(stages.frame),
+        Node.of(partial(stages.repairs, called, computes), "repairs"),
+        *([Node.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
+        *([Node.of(partial(stages.unnamed, called, selects), "unnamed")] if any(selects) else []),
+        Node.of(stages.tracer_over, "tracer"),
+        Node.of(partial(stages.corner_normals, how), "corner_normals"),
+        Node.of(partial(stages.polygon_normals, methods), "polygon_normals"),
     ]
 
 
@@ -384,10 +384,10 @@ def _read(loaded: Any, source: Any) -> Any:
     """What a mesh is made from: the content of its file, or the shape."""
     if not isinstance(source, MeshFile):
         return source
-    return Content(partial(resolve, loaded, source.file), companions)
+    return FileFingerprint(partial(resolve, loaded, source.file), companions)
 
 
-def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
+def _materials(scene: Scene, loaded: Any) -> list[Node]:
     """Numbers of materials, their models, and what these vary by."""
     choices: list[Choice] = []
     models: dict[Token, Any] = {DEFAULT: default_material()}
@@ -407,21 +407,21 @@ def _materials(scene: Scene, loaded: Any) -> list[Recipe]:
     if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
         models |= {("material", name): model for name, model in scene.materials.items()}
     files = {model.file for model in models.values() if hasattr(model, "file")}
-    measured = {file: Content(partial(resolve, loaded, file)) for file in sorted(files)}
+    measured = {file: FileFingerprint(partial(resolve, loaded, file)) for file in sorted(files)}
     numbering = partial(stages.numbering, tuple(choices), tuple(sorted(scene.materials)))
     own = {"meshes": "meshes"} if any(imported) else {}
     book = [
-        Recipe.of(numbering, "numbering"),
-        Recipe.of(partial(stages.materials_of, models, measured, imported), "materials", **own),
+        Node.of(numbering, "numbering"),
+        Node.of(partial(stages.materials_of, models, measured, imported), "materials", **own),
     ]
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
-    images = stages.Images({path: Content(partial(resolve, loaded, path)) for path in named}, loaded)
+    images = stages.Images({path: FileFingerprint(partial(resolve, loaded, path)) for path in named}, loaded)
     for purpose in PURPOSES:
         if may_vary(scene, purpose):
             read, made = f"{purpose}_textures", f"{purpose}_parameters"
             book += [
-                Recipe.of(partial(stages.textures, scene.object_names(), images, purpose), read),
-                Recipe.of(stages.parameters, made, textures=read),
+                Node.of(partial(stages.textures, scene.object_names(), images, purpose), read),
+                Node.of(stages.parameters, made, textures=read),
             ]
     return book
 
@@ -436,20 +436,20 @@ def _varying(scene: Scene, purpose: str) -> dict[str, str]:
     return {"parameters": f"{purpose}_parameters"} if may_vary(scene, purpose) else {}
 
 
-def _terminator(rate: Sequence[str], smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Recipe]:
+def _terminator(rate: Sequence[str], smooth: Mapping[str, str], weights: Mapping[str, str]) -> list[Node]:
     """The surface that normals imply, from which shadow rays start; none where every object is flat."""
     if not smooth:
         return []
     surface = partial(stages.smooth_surface, tuple(own == "constant" for own in rate))
     return [
-        Recipe.of(stages.smooth_parts, **smooth),
-        Recipe.of(surface, "smooth_surface", **smooth, **weights),
+        Node.of(stages.smooth_parts, **smooth),
+        Node.of(surface, "smooth_surface", **smooth, **weights),
     ]
 
 
 def _light(
     name: str, light: Light, eye: Mapping[str, str], at_samples: bool, implied: Mapping[str, str]
-) -> list[Recipe]:
+) -> list[Node]:
     """What one light takes: where it arrives, its shadow, the response to it.
 
     `implied` names the smooth surface that shadow rays may start from, if there is one.
@@ -457,7 +457,7 @@ def _light(
     lit, reach, shadow = f"lit:{name}", f"reach:{name}", f"shadow:{name}"
     if not sends(light):
         dark = partial(stages.black)
-        return [Recipe.of(dark, f"light:{name}"), Recipe.of(partial(stages.no_shadow), shadow)]
+        return [Node.of(dark, f"light:{name}"), Node.of(partial(stages.no_shadow), shadow)]
     place = light.placed()
     color = light.color()
     way = {"shadow": shadow} if light.shadows else {}
@@ -465,46 +465,46 @@ def _light(
     opened = []
     if at_samples and light.shadows:  # what lies in shadow is not evaluated at all
         arriving, way = f"free:{name}", {}
-        opened = [Recipe.of(partial(stages.free, place), arriving, shadow=shadow)]
+        opened = [Node.of(partial(stages.free, place), arriving, shadow=shadow)]
     return [
         *opened,
-        Recipe.of(partial(stages.lit, place), lit),
+        Node.of(partial(stages.lit, place), lit),
         # where every model is evaluated at the samples, its lit points are those that want shadow rays
-        Recipe.of(partial(stages.reach, place), reach)
+        Node.of(partial(stages.reach, place), reach)
         if not at_samples
-        else Recipe.of(stages.same, reach, lit=lit),
-        Recipe.of(stages.shadow, shadow, reach=reach, **implied)
+        else Node.of(stages.same, reach, lit=lit),
+        Node.of(stages.shadow, shadow, reach=reach, **implied)
         if light.shadows
-        else Recipe.of(stages.no_shadow, shadow),
-        Recipe.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),
-        Recipe.of(stages.lobe_sum, f"light:{name}", direct=f"direct:{name}", **way),
-        Recipe.of(partial(stages.one_lobe, "diffuse"), f"diffuse:{name}", direct=f"direct:{name}", **way),
-        Recipe.of(partial(stages.one_lobe, "specular"), f"specular:{name}", direct=f"direct:{name}", **way),
-        Recipe.of(partial(stages.arriving_light, color), f"unlit:{name}", lit=arriving, **way),
+        else Node.of(stages.no_shadow, shadow),
+        Node.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),
+        Node.of(stages.lobe_sum, f"light:{name}", direct=f"direct:{name}", **way),
+        Node.of(partial(stages.one_lobe, "diffuse"), f"diffuse:{name}", direct=f"direct:{name}", **way),
+        Node.of(partial(stages.one_lobe, "specular"), f"specular:{name}", direct=f"direct:{name}", **way),
+        Node.of(partial(stages.arriving_light, color), f"unlit:{name}", lit=arriving, **way),
     ]
 
 
-def _sums(scene: Scene) -> list[Recipe]:
+def _sums(scene: Scene) -> list[Node]:
     """The pictures that are sums over lights, and the beauty."""
     lights = list(active_lights(scene))
     open_way = {"obscurance": "obscurance"} if weighs_ambient(scene) else {}
-    ambient = Recipe.of(partial(stages.ambient, scene.ambient.color), "ambient", **open_way)
+    ambient = Node.of(partial(stages.ambient, scene.ambient.color), "ambient", **open_way)
 
-    def total(makes: str, *parts: str) -> Recipe:
-        return Recipe(makes, stages.total, {"hits": "hits", **{part: part for part in parts}})
+    def total(makes: str, *parts: str) -> Node:
+        return Node(makes, stages.total, {"hits": "hits", **{part: part for part in parts}})
 
     glow = ["emission"] if is_emissive(scene) else []
     if scene.ambient.form == "coupled":
         both = ["coupled"]
         needs = {"ambient_color": "ambient_color", "direct": "direct", "unlit": "unlit", **open_way}
-        coupled = [Recipe("coupled", partial(stages.coupled, scene.ambient.color), needs)]
+        coupled = [Node("coupled", partial(stages.coupled, scene.ambient.color), needs)]
     else:
         both, coupled = (
             [*(["ambient"] if is_ambient(scene) else []), *(f"light:{name}" for name in lights)],
             [],
         )
     if scene.depth_cue is not None:
-        cued = [Recipe.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
+        cued = [Node.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
     else:
         cued = []
     return [

@@ -21,13 +21,13 @@ from illumcli.cache.store import Store, Stored
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import Repair
-from illumcli.geometry.scene_geometry import CornerVectors, Placed, Standing, World
-from illumcli.graph import Recipe
+from illumcli.geometry.scene_geometry import CornerVectors, ObjectBounds, PlacedMesh, SceneGeometry
+from illumcli.graph import Node
 from illumcli.rays.interaction import Hits
 from illumcli.records import Record, Value
 from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.stages import MeshRepairs, Tile
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.shading.materials import Numbering
 from illumcli.shading.rates import Points, as_they_are
 
@@ -40,12 +40,12 @@ MEMORY = 1 << 30
 
 ONCE: Mapping[str, type | tuple[type, ...]] = {
     "mesh": Mesh,
-    "standing": Standing,
+    "standing": ObjectBounds,
     "planar_polygons": (PlanarPolygons, type(None)),
     "curved_polygons": (PlanarPolygons, type(None)),
     "camera": tuple,
     "implied_widths": np.ndarray,
-    "world": World,
+    "world": SceneGeometry,
     "repairs": MeshRepairs,
     "undirected": MeshRepairs,
     "unnamed": MeshRepairs,
@@ -62,11 +62,11 @@ CLASSES = {
     cls.__name__: cls
     for cls in (
         Mesh,
-        Standing,
+        ObjectBounds,
         PlanarPolygons,
-        World,
-        Placed,
-        Frame,
+        SceneGeometry,
+        PlacedMesh,
+        RenderSpace,
         CornerVectors,
         MeshRepairs,
         Repair,
@@ -258,33 +258,33 @@ class Artifacts:
     made: dict[str, Any] = field(default_factory=dict)
     """By key, what this run made of the whole scene before it knew its plan."""
 
-    def recipe(self, name: str, key: str, view: Any) -> Recipe | None:
+    def recipe(self, name: str, key: str, view: Any) -> Node | None:
         """A recipe that loads the buffer; None where it must be made."""
         if key in self.made:
-            return Recipe(name, partial(_known, self.made[key]), {})
+            return Node(name, partial(_known, self.made[key]), {})
         found = self._in_memory(name, key) or self._in_store(name, key, view)
         return found
 
-    def _in_memory(self, name: str, key: str) -> Recipe | None:
+    def _in_memory(self, name: str, key: str) -> Node | None:
         if self.memory is None:
             return None
         if key in self.memory.once:
             self.reused[name] = "memory"
-            return Recipe(name, partial(_known, self.memory.once[key]), {})
+            return Node(name, partial(_known, self.memory.once[key]), {})
         tiles = self.memory.tiles(key)
         if tiles is None:
             return None
         self.reused[name] = "memory"
-        return Recipe(name, partial(_of_tile, tiles), {"tile": "tile"})
+        return Node(name, partial(_of_tile, tiles), {"tile": "tile"})
 
-    def _in_store(self, name: str, key: str, view: Any) -> Recipe | None:
+    def _in_store(self, name: str, key: str, view: Any) -> Node | None:
         if self.store is None or not is_kept(name):
             return None
         if self.look:
             if not self.store.has(key):
                 return None
             self.reused[name] = "store"
-            return Recipe(name, _known, _needs(name))
+            return Node(name, _known, _needs(name))
         stored = self.store.read(key)
         if stored is None:
             return None
@@ -298,9 +298,9 @@ class Artifacts:
         if kind is None:
             if self.memory is not None:
                 self.memory.once[key] = value
-            return Recipe(name, partial(_known, value), {})
+            return Node(name, partial(_known, value), {})
         load = load_hits if name == "hits" else load_tile
-        return Recipe(name, partial(load, value), _needs(name))
+        return Node(name, partial(load, value), _needs(name))
 
     def keeps(self, name: str) -> bool:
         """May a buffer of this name be kept?"""
@@ -369,14 +369,14 @@ def _of_tile(tiles: Mapping[Tile, Any], tile: Tile) -> Any:
     return tiles[tile]
 
 
-class Book(Mapping[str, Recipe]):
+class Book(Mapping[str, Node]):
     """A book in which every recipe that is asked for is first looked up among the artifacts."""
 
-    def __init__(self, book: Mapping[str, Recipe], view: Any, artifacts: Artifacts) -> None:
+    def __init__(self, book: Mapping[str, Node], view: Any, artifacts: Artifacts) -> None:
         self._book, self._view, self._artifacts = book, view, artifacts
         self.keys_of = Keys(book, view, code())
 
-    def __getitem__(self, name: str) -> Recipe:
+    def __getitem__(self, name: str) -> Node:
         recipe = self._book[name]
         if not self._artifacts.memory and not is_kept(name):
             return recipe

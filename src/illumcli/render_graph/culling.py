@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from illumcli.geometry.scene_geometry import Standing
+from illumcli.geometry.scene_geometry import ObjectBounds
 from illumcli.graph import order
 from illumcli.render_graph.build import SMOOTH, active_lights, rates
 from illumcli.render_graph.cached import Artifacts, Book
-from illumcli.render_graph.execute import Tally, run_once
+from illumcli.render_graph.execute import RenderStats, run_once
 from illumcli.render_graph.schedule import GIVEN, Plan, plan
 from illumcli.scene.spec import Obscurance
 from illumcli.visibility.culling import frustum, unseen
@@ -43,7 +43,7 @@ def _reach(made: Plan, radius: float) -> float:
 
 
 def unseen_objects(
-    made: Plan, artifacts: Artifacts, tally: Tally, threads: int = 1, at_hand: bool = False
+    made: Plan, artifacts: Artifacts, tally: RenderStats, threads: int = 1, at_hand: bool = False
 ) -> tuple[int, ...]:
     """The numbers of the objects that can be left out of all views of a plan.
 
@@ -53,7 +53,7 @@ def unseen_objects(
     scene = made.scene
     if scene is None or why_all(made) is not None or any(view.camera.fit for view in made.views):
         return ()
-    standing: Standing | None = asked(made, "standing", artifacts, tally, threads, at_hand)
+    standing: ObjectBounds | None = asked(made, "standing", artifacts, tally, threads, at_hand)
     if standing is None:
         return ()
     frame, film = standing.frame, scene.film
@@ -89,7 +89,9 @@ def without(made: Plan, loaded: Any, numbers: tuple[int, ...]) -> Plan:
     return replace(fewer, views=made.views, skipped=skipped)
 
 
-def asked(made: Plan, name: str, artifacts: Artifacts, tally: Tally, threads: int, at_hand: bool) -> Any:
+def asked(
+    made: Plan, name: str, artifacts: Artifacts, tally: RenderStats, threads: int, at_hand: bool
+) -> Any:
     """A buffer of the whole scene, before the plan runs; None where it would have to be made and must not."""
     book = Book(made.book, made.views[0], artifacts)
     steps = order(book, [name], GIVEN)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import columns
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
-from illumcli.graph import Recipe
+from illumcli.graph import Node
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record
@@ -25,7 +25,7 @@ from illumcli.render_graph.cached import Artifacts, Keeper
 from illumcli.render_graph.schedule import Plan
 from illumcli.render_graph.stages import MOST, Scattered, Tile
 from illumcli.render_graph.stages import tiles as cut
-from illumcli.visibility.incident import Lit
+from illumcli.visibility.incident import LitPoints
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32 or, ids, uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
@@ -34,7 +34,7 @@ Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
 
 
 @dataclass(slots=True)
-class Tally:
+class RenderStats:
     """What was done: seconds, rays and lanes by step. Threads add under a lock."""
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -72,7 +72,7 @@ class _Common(Record):
     plan: Plan
     shared: Mapping[str, Any]
     view: View
-    tally: Tally
+    tally: RenderStats
     stop: threading.Event
     keeper: Keeper
     develop: Develop
@@ -84,7 +84,7 @@ def _as_they_are(tile: Tile, layers: Planes) -> Planes:
 
 
 def run_once(
-    plan: Plan, tally: Tally, artifacts: Artifacts | None = None, threads: int = 1
+    plan: Plan, tally: RenderStats, artifacts: Artifacts | None = None, threads: int = 1
 ) -> dict[str, Any]:
     """The buffers that no tile changes; those that do not need each other are made beside each other.
 
@@ -92,7 +92,7 @@ def run_once(
     """
     pending: dict[str, Future[Any]] = {}
 
-    def make(step: Recipe) -> Any:
+    def make(step: Node) -> Any:
         needs = {name: pending[name].result() for name in step.needs.values()}  # handed out before it
         start = time.perf_counter()
         made = step.make(needs)
@@ -113,7 +113,7 @@ def run_once(
     return buffers
 
 
-def _cost(plan: Plan, name: str, tally: Tally) -> float:
+def _cost(plan: Plan, name: str, tally: RenderStats) -> float:
     """Seconds of one processor that a buffer took, with all that had to be made for it."""
     return sum(tally.seconds.get(need, 0.0) for need in plan.needed_for(name))
 
@@ -123,7 +123,7 @@ def bands(
     shared: Mapping[str, Any],
     view: View,
     threads: int,
-    tally: Tally,
+    tally: RenderStats,
     done: Callable[[int], None] = lambda pixels: None,
     side: int | None = None,
     artifacts: Artifacts | None = None,
@@ -190,7 +190,7 @@ def at_pixels(
     x: NDArray[np.int64],
     y: NDArray[np.int64],
     threads: int,
-    tally: Tally,
+    tally: RenderStats,
 ) -> Planes:
     """Layer -> (K, channels) at K pixels of a view: what `bands` makes there, and nothing else is made."""
     some = max(1, MOST // view.samples)
@@ -231,7 +231,7 @@ def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept
         seconds[step.makes] = time.perf_counter() - start
         if tracer and tracer.rays > before:
             rays[step.makes] = tracer.rays - before
-        if isinstance(made, Lit):
+        if isinstance(made, LitPoints):
             lanes[step.makes] = made.count - len(made.lane)
         if step.makes in common.keeper.names:
             kept[step.makes] = common.keeper.take(step.makes, buffers, tile)

@@ -7,12 +7,14 @@ from dataclasses import replace
 from illumcli.render_graph.build import View
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import asked
-from illumcli.render_graph.execute import Tally
+from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.schedule import Plan
 from illumcli.render_graph.stages import Placement
 
 
-def framed(made: Plan, artifacts: Artifacts, tally: Tally, threads: int = 1, at_hand: bool = False) -> Plan:
+def framed(
+    made: Plan, artifacts: Artifacts, tally: RenderStats, threads: int = 1, at_hand: bool = False
+) -> Plan:
     """The plan with its cameras in place.
 
     With `at_hand` no mesh is read: a camera that the store does not know stays where the scene says.

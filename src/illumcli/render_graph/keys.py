@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy
 
-from illumcli.graph import Recipe
+from illumcli.graph import Node
 
 MAKERS = (
     "geometry",
@@ -37,7 +37,7 @@ MAKERS = (
 class Keys:
     """The key of every buffer in a book, 32 hexadecimal digits, found when asked for."""
 
-    def __init__(self, book: Mapping[str, Recipe], view: Any, salt: str) -> None:
+    def __init__(self, book: Mapping[str, Node], view: Any, salt: str) -> None:
         self._book = book
         self._salt = salt
         self._known = {"tile": "tile", "view": repr(view)}

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.geometry.scene_geometry import Standing
+from illumcli.geometry.scene_geometry import ObjectBounds
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Value
 from illumcli.render_graph.build import View
@@ -37,7 +37,7 @@ class Disproportion(Value):
     """Of the small object's radius."""
 
 
-def disproportion(standing: Standing, views: Sequence[View]) -> Disproportion | None:
+def disproportion(standing: ObjectBounds, views: Sequence[View]) -> Disproportion | None:
     """The object for which it is worst; None where all is well."""
     size = (standing.high - standing.low) / 2
     centre = standing.low + size
@@ -62,7 +62,7 @@ def _edges(radius: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[
     return 2 * radius * np.minimum(1, 4 / np.sqrt(np.maximum(polygons, 1)))
 
 
-def _looked_at(standing: Standing, views: Sequence[View]) -> NDArray[np.bool_]:
+def _looked_at(standing: ObjectBounds, views: Sequence[View]) -> NDArray[np.bool_]:
     """(O,) Is the object in some view, and not small there?"""
     frame = standing.frame
     with np.errstate(invalid="ignore"):
@@ -72,7 +72,7 @@ def _looked_at(standing: Standing, views: Sequence[View]) -> NDArray[np.bool_]:
         for view in views:
             planes = frustum(view.camera, frame, view.width, view.height, None)
             if view.camera.projection == "perspective":
-                distance = np.linalg.norm(centre - frame.inward(view.camera.position), axis=1)
+                distance = np.linalg.norm(centre - frame.from_world(view.camera.position), axis=1)
                 half = distance * np.tan(np.radians(view.camera.fov) / 2)
             else:
                 half = np.full(len(low), view.camera.extent / 2 / frame.radius)

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors
+from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.film.reconstruct import pixel_means
-from illumcli.graph import Recipe, order
+from illumcli.graph import Node, order
 from illumcli.rays import sampling
 from illumcli.rays.interaction import Hits
 from illumcli.render_graph.stages import Samples, Tile
@@ -33,12 +33,12 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 def error_recipes(
-    book: Mapping[str, Recipe],
+    book: Mapping[str, Node],
     seed: int,
     background: tuple[float, float, float] | None,
     samples: Sequence[int],
     given: Sequence[str],
-) -> dict[str, Recipe]:
+) -> dict[str, Node]:
     """What the layer `error` takes beyond a book: copies of all recipes between samples and beauty.
 
     Parameters
@@ -54,19 +54,19 @@ def error_recipes(
     steps = order(book, ["beauty"], given)
     traced = "obscurance_draws" in {step.makes for step in steps}
     if max(samples) == 1 and not traced:
-        return {"error": Recipe.of(no_error, "error")}
+        return {"error": Node.of(no_error, "error")}
     copied = {"samples"}
-    made = [Recipe.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
+    made = [Node.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
     for step in steps:
         if copied.isdisjoint(step.needs.values()):
             continue
         copied.add(step.makes)
         needs = {p: f"{AGAIN}{need}" if need in copied else need for p, need in step.needs.items()}
         function = partial(doubled_draws, seed) if step.makes == "obscurance_draws" else step.function
-        made.append(Recipe(f"{AGAIN}{step.makes}", function, needs))
+        made.append(Node(f"{AGAIN}{step.makes}", function, needs))
     two = {f"{which}_{what}": f"{prefix}{what}" for which, prefix in (("first", ""), ("second", AGAIN))
            for what in ("samples", "hits", "beauty")}  # fmt: skip
-    made.append(Recipe.of(partial(standard_error, background or (0.0, 0.0, 0.0)), "error", **two))
+    made.append(Node.of(partial(standard_error, background or (0.0, 0.0, 0.0)), "error", **two))
     return {recipe.makes: recipe for recipe in made}
 
 
@@ -115,7 +115,7 @@ def doubled_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64
     return (within + np.stack(start).take(pixel, axis=1)) % 1.0
 
 
-def no_error(tile: Tile) -> Lanes:
+def no_error(tile: Tile) -> Floats:
     """(P,) 0 at every pixel: nothing in the picture is random."""
     return np.zeros(tile.width * tile.height, F)
 
@@ -130,7 +130,7 @@ def standard_error(
     second_samples: Samples,
     second_hits: Hits,
     second_beauty: Vectors,
-) -> Lanes:
+) -> Floats:
     """(P,) float32 standard error of the luminance of every pixel, the same all over a block.
 
     The tile begins at a block's corner and ends at one or at the film's edge. Cells that the edge cuts have

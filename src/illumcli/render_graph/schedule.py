@@ -11,7 +11,7 @@ import numpy as np
 
 from illumcli import __version__
 from illumcli.errors import InputError, LimitError
-from illumcli.graph import Recipe, order
+from illumcli.graph import Node, order
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import (
@@ -41,8 +41,8 @@ class Plan(Value):
 
     views: tuple[View, ...]
     layers: tuple[Layer, ...]
-    once: tuple[Recipe, ...]
-    tile: tuple[Recipe, ...]
+    once: tuple[Node, ...]
+    tile: tuple[Node, ...]
     skipped: Mapping[str, str]
     """Buffer -> why it is not computed."""
     expected_rays: Mapping[str, int]
@@ -54,7 +54,7 @@ class Plan(Value):
     objects: str = ""
     """Which objects take part."""
     scene: Scene | None = field(default=None, repr=False)
-    book: Mapping[str, Recipe] = field(default_factory=dict, repr=False)
+    book: Mapping[str, Node] = field(default_factory=dict, repr=False)
 
     def last_use(self) -> dict[str, int]:
         """The last tile step that reads each buffer made in the tile; those of layers are kept."""
@@ -197,8 +197,8 @@ def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
 
 
 def _steps(
-    book: Mapping[str, Recipe], wanted: Sequence[Layer], all_views: Sequence[View]
-) -> tuple[tuple[Recipe, ...], tuple[Recipe, ...]]:
+    book: Mapping[str, Node], wanted: Sequence[Layer], all_views: Sequence[View]
+) -> tuple[tuple[Node, ...], tuple[Node, ...]]:
     """What runs once and what runs per tile, each after all it needs."""
     coverage = ["alpha"] if any(layer.buffer == "beauty" for layer in wanted) else []
     nearest = ["samples"] if any(layer.data for layer in wanted) else []
@@ -252,7 +252,7 @@ def _refuse(all_views: Sequence[View], rays: Mapping[str, int]) -> None:
         )
 
 
-def _why_not(scene: Scene, book: Mapping[str, Recipe], made: set[str]) -> dict[str, str]:
+def _why_not(scene: Scene, book: Mapping[str, Node], made: set[str]) -> dict[str, str]:
     """A reason for every buffer that is not computed."""
     reasons = {}
     active = active_lights(scene)

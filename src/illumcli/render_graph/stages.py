@@ -11,8 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, cross, dot, length, rows, unit
-from illumcli.cache.fingerprint import Content
+from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
 from illumcli.geometry import planar
 from illumcli.geometry import scene_geometry as assemble
@@ -30,7 +30,7 @@ from illumcli.geometry.repairs import (
     located,
     note,
 )
-from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, Standing, World
+from illumcli.geometry.scene_geometry import CornerVectors, ObjectBounds, PolygonCentres, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._base import Light
 from illumcli.rays import interaction as surface
@@ -40,9 +40,9 @@ from illumcli.rays.camera import camera_rays, film_points, framing
 from illumcli.rays.corner_weights import CornerWeights
 from illumcli.rays.corner_weights import corner_weights as corner_weights_at
 from illumcli.rays.embree import Tracer
-from illumcli.rays.interaction import Facets, Hits
+from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.records import Record, Value
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import DepthCue, Obscurance
 from illumcli.shading import direct as shading
 from illumcli.shading import rates as shading_rates
@@ -54,10 +54,10 @@ from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
 from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
-from illumcli.visibility.incident import Lit, reaching
+from illumcli.visibility.incident import LitPoints, reaching
 from illumcli.visibility.incident import lit as lit_lanes
 from illumcli.visibility.obscurance import Hemispheres, Method, estimates
-from illumcli.visibility.open_hemisphere import OpenFacets
+from illumcli.visibility.open_hemisphere import OpenTriangles
 
 LARGEST_HORIZON = 1 << 17
 """Vertices up to which it is worth to look for facets with nothing above them."""
@@ -68,14 +68,14 @@ WORTH_RAYS = 1 << 11
 
 
 def mesh(source: Any) -> Mesh:
-    """The mesh in a file, given by its `Content`, or of a shape.
+    """The mesh in a file, given by its `FileFingerprint`, or of a shape.
 
     Raises
     ------
     InputError
         The file changed while it was read.
     """
-    if not isinstance(source, Content):
+    if not isinstance(source, FileFingerprint):
         shape: Mesh = source.mesh()
         return replace(shape, repairs=faults(shape))
     from illumcli.mesh_files import read_mesh
@@ -98,7 +98,7 @@ def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
     return tuple(own[k] for k in which)
 
 
-def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> Standing:
+def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> ObjectBounds:
     """Where every object stands, and the scene's centre and radius."""
     matrices = [
         assemble.transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)
@@ -111,7 +111,7 @@ Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, flo
 
 
 def framed(
-    camera: Any, aspect: float, number: int, meshes: tuple[Mesh, ...], standing: Standing
+    camera: Any, aspect: float, number: int, meshes: tuple[Mesh, ...], standing: ObjectBounds
 ) -> Placement:
     """Where a camera stands whose picture the object of this number fills."""
     mesh = meshes[number]
@@ -121,7 +121,7 @@ def framed(
 
 
 def implied_widths(
-    flat: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing
+    flat: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: ObjectBounds
 ) -> NDArray[np.float64]:
     """(O,) the widest polygon of each object whose normals imply another surface [scene units], else 0."""
     sizes = [
@@ -138,13 +138,13 @@ def left(unseen: tuple[int, ...], meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
     )
 
 
-def world(by_file: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: Standing) -> World:
+def world(by_file: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: ObjectBounds) -> SceneGeometry:
     """All triangles, placed, recentred and scaled to unit radius; `by_file` says of which objects the
     file's normals are used."""
     return assemble.place(meshes, standing.matrices, standing.frame, by_file)
 
 
-def frame(standing: Standing) -> Frame:
+def frame(standing: ObjectBounds) -> RenderSpace:
     """The scene's centre and radius."""
     return standing.frame
 
@@ -201,17 +201,17 @@ def unnamed(
     return MeshRepairs(found)
 
 
-def tracer_over(world: World) -> Tracer:
+def tracer_over(world: SceneGeometry) -> Tracer:
     """The ray core over the world's triangles."""
     return Tracer(world.vertices, world.triangles)
 
 
-def open_facets(world: World) -> OpenFacets | None:
+def open_facets(world: SceneGeometry) -> OpenTriangles | None:
     """What tells triangles with nothing above them; None for meshes so large that it does not pay."""
-    return OpenFacets(world) if len(world.vertices) <= LARGEST_HORIZON else None
+    return OpenTriangles(world) if len(world.vertices) <= LARGEST_HORIZON else None
 
 
-def facet_normals(world: World) -> Vectors:
+def facet_normals(world: SceneGeometry) -> Vectors:
     """(T, 3) float32 unit normals of all triangles."""
     v0, v1, v2 = (columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
     return columns(unit(cross(v1 - v0, v2 - v0)), F)
@@ -224,7 +224,7 @@ class BakedValues(Record):
     repairs: Repairs
 
 
-def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedValues:
+def baked(files: tuple[tuple[str, FileFingerprint | None], ...], world: SceneGeometry) -> BakedValues:
     """The values in each object's file: of its corners where it has them, else of its vertices.
 
     Raises
@@ -252,7 +252,7 @@ def baked(files: tuple[tuple[str, Content | None], ...], world: World) -> BakedV
     return BakedValues(CornerVectors(values, np.arange(len(values), dtype=np.int32)), repairs)
 
 
-def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> CornerVectors:
+def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: SceneGeometry) -> CornerVectors:
     """Shading normals of every corner.
 
     `how` says of each object whether they are its polygons' own (`flat`), what its file's description says
@@ -275,28 +275,30 @@ def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World)
     return assemble.world_normals(world, own)
 
 
-def uvs(world: World) -> CornerVectors:
+def uvs(world: SceneGeometry) -> CornerVectors:
     """Texture coordinates of every corner."""
     return assemble.world_uvs(world)
 
 
-def uv_tangents(world: World, uvs: CornerVectors) -> CornerVectors:
+def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     """Where u grows, at every corner of every triangle."""
     return surface.uv_tangents(world, uvs)
 
 
-def planar_polygons(world: World, normals: CornerVectors | None = None) -> PlanarPolygons | None:
+def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of more than three corners, where `normals` are given those that are not flat by
     them; None where there are none."""
     return planar.planar_polygons(world, normals)
 
 
-def polygon_centres(world: World) -> PolygonCentres:
+def polygon_centres(world: SceneGeometry) -> PolygonCentres:
     """The centre of every polygon."""
     return assemble.polygon_centres(world)
 
 
-def polygon_normals(methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: World) -> NDArray[np.float32]:
+def polygon_normals(
+    methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: SceneGeometry
+) -> NDArray[np.float32]:
     """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
     from illumcli.geometry.normals import polygon_normals as of_mesh
 
@@ -311,14 +313,14 @@ def polygon_normals(methods: tuple[Any, ...], meshes: tuple[Mesh, ...], world: W
     return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 
 
-def numbering(choices: tuple[Choice, ...], named: tuple[str, ...], world: World) -> Numbering:
+def numbering(choices: tuple[Choice, ...], named: tuple[str, ...], world: SceneGeometry) -> Numbering:
     """The material number of every triangle, whatever the materials' parameters are."""
     return number_materials(world, choices, frozenset(named))
 
 
 def materials_of(
     models: Mapping[Token, Any],
-    measured: Mapping[str, Content],
+    measured: Mapping[str, FileFingerprint],
     imported: tuple[str | None, ...],
     numbering: Numbering,
     meshes: tuple[Mesh, ...] = (),
@@ -335,7 +337,7 @@ def materials_of(
 class Images(Value):
     """Reads the textures of a scene, each once."""
 
-    contents: Mapping[str, Content]
+    contents: Mapping[str, FileFingerprint]
     """By path, those that the scene itself names."""
     loaded: Any = field(repr=False)
     known: dict[Any, NDArray[np.float32]] = field(default_factory=dict, repr=False)
@@ -361,7 +363,7 @@ class Images(Value):
 
 
 def textures(
-    object_names: tuple[str, ...], images: Images, purpose: str, world: World, materials: Materials
+    object_names: tuple[str, ...], images: Images, purpose: str, world: SceneGeometry, materials: Materials
 ) -> Varying:
     """What the parameters of materials that serve `purpose` vary by."""
     return varying(world, materials, object_names, purpose, images)
@@ -464,10 +466,10 @@ class Rays(Record):
 
     origins: Vectors
     directions: Vectors
-    skipped: Lanes  # (N,) float64 from the eye to the origin, in radii
+    skipped: Floats  # (N,) float64 from the eye to the origin, in radii
 
 
-def rays(film_filter: Any, frame: Frame, view: Any, samples: Samples) -> Rays:
+def rays(film_filter: Any, frame: RenderSpace, view: Any, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
     several = samples.per_pixel > 1 or samples.first is not None
     points = film_points(samples.x, samples.y, samples.points, film_filter if several else None)
@@ -479,22 +481,24 @@ def hits(tracer: Tracer, rays: Rays) -> Hits:
     return surface.seen(tracer.closest(rays.origins, rays.directions))
 
 
-def facets(world: World, rays: Rays, hits: Hits) -> Facets:
+def facets(world: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
     """Where they see it."""
     towards_eye = -rows(rays.directions, hits.lane)
     return surface.facets(world, hits.triangle, hits.u, hits.v, towards_eye)
 
 
-def corner_weights(world: World, hits: Hits, planar_polygons: PlanarPolygons | None = None) -> CornerWeights:
+def corner_weights(
+    world: SceneGeometry, hits: Hits, planar_polygons: PlanarPolygons | None = None
+) -> CornerWeights:
     """What the corners around each sample weigh there."""
     return corner_weights_at(world, planar_polygons, hits.triangle, hits.u, hits.v)
 
 
 def points(
     rate: list[str],
-    world: World,
+    world: SceneGeometry,
     corner_weights: CornerWeights,
-    facets: Facets,
+    facets: SurfaceInteraction,
     normals: CornerVectors | None = None,
     centres: PolygonCentres | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
@@ -508,31 +512,31 @@ def point_weights(points: Points, corner_weights: CornerWeights) -> CornerWeight
     return corner_weights if points.weights is None else points.weights
 
 
-def material(world: World, numbering: Numbering, points: Points) -> Ids:
+def material(world: SceneGeometry, numbering: Numbering, points: Points) -> Ids:
     """(E,) material number at every point."""
     return numbering.number(world, points.triangle)
 
 
 def parameters(
-    world: World, textures: Varying, material: Ids, point_weights: CornerWeights, uvs: CornerVectors
+    world: SceneGeometry, textures: Varying, material: Ids, point_weights: CornerWeights, uvs: CornerVectors
 ) -> Parameters:
     """The parameters that vary over the surface, at every point."""
     return parameters_at(world, textures, material, point_weights, uvs)
 
 
-def view_vectors(view: Any, frame: Frame, points: Points) -> Vectors:
+def view_vectors(view: Any, frame: RenderSpace, points: Points) -> Vectors:
     """(E, 3) float32 unit vectors to the eye."""
     if view.camera.projection == "orthographic":
         backward = (-camera_axes(view.camera)[2]).astype(F)
         return np.asfortranarray(np.broadcast_to(backward, points.position.shape))
     from illumcli.lights._base import towards
 
-    return towards(frame.inward(view.camera.position), points.position)[0]
+    return towards(frame.from_world(view.camera.position), points.position)[0]
 
 
 def tangents(
     grains: tuple[Any, ...],
-    world: World,
+    world: SceneGeometry,
     points: Points,
     point_weights: CornerWeights | None = None,
     uv_tangents: CornerVectors | None = None,
@@ -551,7 +555,7 @@ def tangents(
             way = linear @ (np.asarray(own) / np.abs(own).max())
             grain[lanes] = way / (np.linalg.norm(way) or 1.0)
         else:
-            centre = world.frame.inward(placed.matrix[:3, :3] @ own.centre + placed.matrix[:3, 3])
+            centre = world.frame.from_world(placed.matrix[:3, :3] @ own.centre + placed.matrix[:3, 3])
             grain[lanes] = surface.rings(linear, own.axis, centre, rows(points.position, lanes))
     return surface.tangent(points.n, surface.unit(grain))
 
@@ -559,22 +563,22 @@ def tangents(
 # --- per tile: light ----------------------------------------------------------------------------------
 
 
-def lit(light: Light, frame: Frame, points: Points) -> Lit:
+def lit(light: Light, frame: RenderSpace, points: Points) -> LitPoints:
     """The points a light reaches if nothing stands between."""
     return lit_lanes(light, frame, points.position, points.n)
 
 
-def reach(light: Light, frame: Frame, facets: Facets) -> Lit:
+def reach(light: Light, frame: RenderSpace, facets: SurfaceInteraction) -> LitPoints:
     """The samples whose vertices or polygons a light may reach."""
     return lit_lanes(light, frame, columns(facets.position, F))
 
 
-def same(lit: Lit) -> Lit:
+def same(lit: LitPoints) -> LitPoints:
     """The points are the samples."""
     return lit
 
 
-def free(light: Light, frame: Frame, points: Points, shadow: Lanes) -> Lit:
+def free(light: Light, frame: RenderSpace, points: Points, shadow: Floats) -> LitPoints:
     """The points that a light reaches and that are not in shadow, where points are samples.
 
     The shadow alone says which: it is 0 where the light does not reach.
@@ -582,21 +586,21 @@ def free(light: Light, frame: Frame, points: Points, shadow: Lanes) -> Lit:
     return reaching(light, frame, points.position, np.flatnonzero(shadow != 0))
 
 
-def ray_origins(facets: Facets) -> Vectors:
+def ray_origins(facets: SurfaceInteraction) -> Vectors:
     """(M, 3) where shadow and obscurance rays start."""
     return shadows.ray_origins(facets)
 
 
-def smooth_parts(world: World, normals: CornerVectors) -> SmoothParts:
+def smooth_parts(world: SceneGeometry, normals: CornerVectors) -> SmoothParts:
     """Which triangles form one smooth surface."""
     return SmoothParts(world, normals)
 
 
 def smooth_surface(
     flat: tuple[bool, ...],
-    world: World,
+    world: SceneGeometry,
     corner_weights: CornerWeights,
-    facets: Facets,
+    facets: SurfaceInteraction,
     smooth_parts: SmoothParts,
     normals: CornerVectors,
 ) -> shadows.SmoothSurface:
@@ -607,13 +611,13 @@ def smooth_surface(
 
 
 def shadow(
-    tracer: Tracer, ray_origins: Vectors, reach: Lit, smooth: shadows.SmoothSurface | None = None
-) -> Lanes:
+    tracer: Tracer, ray_origins: Vectors, reach: LitPoints, smooth: shadows.SmoothSurface | None = None
+) -> Floats:
     """(M,) delta of one light."""
     return shadows.shadow(tracer, ray_origins, reach, smooth)
 
 
-def no_shadow(hits: Hits) -> Lanes:
+def no_shadow(hits: Hits) -> Floats:
     """(M,) delta of a light that casts no shadow."""
     return np.ones(len(hits.lane), F)
 
@@ -628,7 +632,7 @@ def direct(
     materials: Materials,
     material: Ids,
     points: Points,
-    lit: Lit,
+    lit: LitPoints,
     v: Vectors | None = None,
     t: Vectors | None = None,
     parameters: Parameters | None = None,
@@ -639,18 +643,18 @@ def direct(
     return {name: points.spread(value) for name, value in at_points.items()}
 
 
-def lobe_sum(hits: Hits, direct: dict[str, Vectors], shadow: Lanes | None = None) -> Vectors:
+def lobe_sum(hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
     """(M, 3) one light with its shadow."""
     return _shadowed(total(hits, **direct), shadow)
 
 
-def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Lanes | None = None) -> Vectors:
+def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
     """(M, 3) one lobe of one light with its shadow."""
     return _shadowed(direct[name] if name in direct else black(hits), shadow)
 
 
 def arriving_light(
-    color: tuple[float, float, float], points: Points, lit: Lit, shadow: Lanes | None = None
+    color: tuple[float, float, float], points: Points, lit: LitPoints, shadow: Floats | None = None
 ) -> Vectors:
     """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
     out = np.zeros((lit.count, 3), F, order="F")
@@ -659,7 +663,7 @@ def arriving_light(
     return _shadowed(points.spread(out), shadow)
 
 
-def _shadowed(value: Vectors, shadow: Lanes | None) -> Vectors:
+def _shadowed(value: Vectors, shadow: Floats | None) -> Vectors:
     return value if shadow is None else value * shadow[:, None]
 
 
@@ -676,7 +680,9 @@ def total(hits: Hits, **parts: Vectors) -> Vectors:
     return out
 
 
-def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: Vectors) -> Vectors:
+def depth_cued(
+    cue: DepthCue, view: Any, frame: RenderSpace, facets: SurfaceInteraction, uncued: Vectors
+) -> Vectors:
     """(M, 3) light that fades into a colour with the distance from the eye."""
     share = (distance(view, frame, facets) - cue.near) / (cue.far - cue.near)
     fade = (cue.strength * np.clip(share, 0, 1)).astype(F)[:, None]
@@ -684,7 +690,11 @@ def depth_cued(cue: DepthCue, view: Any, frame: Frame, facets: Facets, uncued: V
 
 
 def obscurance_normals(
-    rate: list[str], world: World, corner_weights: CornerWeights, facets: Facets, normals: CornerVectors
+    rate: list[str],
+    world: SceneGeometry,
+    corner_weights: CornerWeights,
+    facets: SurfaceInteraction,
+    normals: CornerVectors,
 ) -> Vectors:
     """(M, 3) what the hemisphere of obscurance stands about: the interpolated shading normal."""
     return shading_rates.sample_normals(world, corner_weights, facets, rate, normals)
@@ -701,17 +711,17 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
 def obscurance(
     settings: Obscurance,
     tracer: Tracer,
-    world: World,
+    world: SceneGeometry,
     hits: Hits,
-    facets: Facets,
+    facets: SurfaceInteraction,
     ray_origins: Vectors,
     obscurance_draws: NDArray[np.float64],
     obscurance_normals: Vectors | None = None,
-    open_facets: OpenFacets | None = None,
+    open_facets: OpenTriangles | None = None,
     baked: BakedValues | None = None,
     facet_normals: Vectors | None = None,
     corner_weights: CornerWeights | None = None,
-) -> Lanes:
+) -> Floats:
     """(M,) w of every sample seen; on meshes with baked values these, and rays for the others.
 
     About the geometric normals where no others are given.
@@ -740,13 +750,13 @@ def obscurance(
     return w
 
 
-def baked_obscurance(world: World, baked: BakedValues, corner_weights: CornerWeights) -> Lanes:
+def baked_obscurance(world: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:
     """(M,) baked values interpolated over polygons; NaN on meshes that have none."""
-    w: Lanes = corner_weights.interpolate(world, baked.values)[:, 0]
+    w: Floats = corner_weights.interpolate(world, baked.values)[:, 0]
     return w
 
 
-def baked_or_open(world: World, baked: BakedValues, corner_weights: CornerWeights) -> Lanes:
+def baked_or_open(world: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:
     """(M,) the same; 1 on meshes that have none."""
     w = baked_obscurance(world, baked, corner_weights)
     return np.where(np.isnan(w), F(1), w)
@@ -761,13 +771,13 @@ def ambient_color(
     )
 
 
-def ambient(color: Any, ambient_color: Vectors, obscurance: Lanes | None = None) -> Vectors:
+def ambient(color: Any, ambient_color: Vectors, obscurance: Floats | None = None) -> Vectors:
     """(M, 3) k_a I_a w."""
     return ambient_light(ambient_color, color, obscurance)
 
 
 def coupled(
-    color: Any, ambient_color: Vectors, direct: Vectors, unlit: Vectors, obscurance: Lanes | None = None
+    color: Any, ambient_color: Vectors, direct: Vectors, unlit: Vectors, obscurance: Floats | None = None
 ) -> Vectors:
     """(M, 3) (k_a I_a + direct) w + I_d."""
     w = np.ones(len(ambient_color), F) if obscurance is None else obscurance
@@ -784,30 +794,30 @@ def emission(
 # --- per tile: data layers ----------------------------------------------------------------------------
 
 
-def alpha(hits: Hits) -> Lanes:
+def alpha(hits: Hits) -> Floats:
     """(M,) 1 where a surface is seen."""
     return np.ones(len(hits.lane), F)
 
 
-def depth(view: Any, frame: Frame, facets: Facets) -> Lanes:
+def depth(view: Any, frame: RenderSpace, facets: SurfaceInteraction) -> Floats:
     """(M,) distance from the eye's plane along the line of sight, at least 0 [scene units]."""
     forward = camera_axes(view.camera)[2]
-    eye = frame.inward(view.camera.position)
+    eye = frame.from_world(view.camera.position)
     along = np.maximum(dot(facets.position - eye, forward[None, :]), 0)
     return (along * frame.radius).astype(F)
 
 
-def distance(view: Any, frame: Frame, facets: Facets) -> Lanes:
+def distance(view: Any, frame: RenderSpace, facets: SurfaceInteraction) -> Floats:
     """(M,) float64 distance along the line of sight from the eye, or from its plane [scene units]."""
-    away = facets.position - frame.inward(view.camera.position)
+    away = facets.position - frame.from_world(view.camera.position)
     if view.camera.projection == "orthographic":
         return dot(away, camera_axes(view.camera)[2][None, :]) * frame.radius
     return length(away) * frame.radius
 
 
-def world_position(frame: Frame, facets: Facets) -> Vectors:
+def world_position(frame: RenderSpace, facets: SurfaceInteraction) -> Vectors:
     """(M, 3) [scene units]."""
-    return columns(frame.outward(facets.position), F)
+    return columns(frame.to_world(facets.position), F)
 
 
 def normal(points: Points) -> Vectors:
@@ -815,23 +825,25 @@ def normal(points: Points) -> Vectors:
     return surface.unit(points.spread(points.n))
 
 
-def geometric_normal(hits: Hits, facets: Facets, planar_polygons: PlanarPolygons | None = None) -> Vectors:
+def geometric_normal(
+    hits: Hits, facets: SurfaceInteraction, planar_polygons: PlanarPolygons | None = None
+) -> Vectors:
     """(M, 3) unit normal of the polygon on the side the eye sees: Newell's of a planar one, else the
     triangle's."""
     return surface.polygon_facing(hits.triangle, facets, planar_polygons)
 
 
-def uv(world: World, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
+def uv(world: SceneGeometry, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
     """(M, 2) texture coordinates."""
     return surface.uv(world, uvs, corner_weights_at(world, None, hits.triangle, hits.u, hits.v))
 
 
-def object_id(world: World, hits: Hits) -> NDArray[np.uint32]:
+def object_id(world: SceneGeometry, hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the object, from 1."""
     return (world.objects.take(hits.triangle) + 1).astype(np.uint32)
 
 
-def material_id(world: World, numbering: Numbering, hits: Hits) -> NDArray[np.uint32]:
+def material_id(world: SceneGeometry, numbering: Numbering, hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the material, from 1."""
     return (numbering.number(world, hits.triangle) + 1).astype(np.uint32)
 

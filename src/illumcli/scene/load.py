@@ -36,7 +36,7 @@ PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides 
 D = TypeVar("D", bound=Description)
 
 
-class Loaded(Value):
+class SceneFile(Value):
     """A valid scene and what was written to get it."""
 
     scene: Scene
@@ -53,7 +53,7 @@ class Loaded(Value):
     """The folders that the scene may read from."""
 
 
-def load(path: Path, overrides: Sequence[str] = ()) -> Loaded:
+def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
     """The scene in the file `path`, or the studio scene around `path` where that is a mesh.
 
     Parameters
@@ -89,7 +89,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> Loaded:
     if scene is None or tree is None or reading.problems:
         raise InputError(_lines(reading.problems, overrides))
     values = {change.text: change.value.plain() for change in changes if change.text}
-    return Loaded(scene, path, path.parent, path.stem, values, tree, reading.roots)
+    return SceneFile(scene, path, path.parent, path.stem, values, tree, reading.roots)
 
 
 def _studio(path: Path, settings: Sequence[Override], reading: _Reading) -> Node | None:
@@ -104,7 +104,7 @@ def _studio(path: Path, settings: Sequence[Override], reading: _Reading) -> Node
     return assign(arranged(tree, made.studio), mesh, reading.problems)
 
 
-def resolve(loaded: Loaded, path: str) -> Path:
+def resolve(loaded: SceneFile, path: str) -> Path:
     """The file that a scene means by `path`: regular, and inside the folders it may read from.
 
     Raises
@@ -120,7 +120,7 @@ def resolve(loaded: Loaded, path: str) -> Path:
     raise InputError(str(_problem(node.at, at, found)))
 
 
-def refuse_outside(loaded: Loaded, number: int, path: Path) -> None:
+def refuse_outside(loaded: SceneFile, number: int, path: Path) -> None:
     """Raise InputError where the pattern of this number in `outputs.files` leads to `path`, outside the
     folders that the scene may read from, or holds control characters. Links are followed; a pattern that `-D`
     gives may lead anywhere."""
@@ -140,7 +140,7 @@ def refuse_outside(loaded: Loaded, number: int, path: Path) -> None:
         raise InputError(told(loaded, at, f"{fact}; allow it with --allow {folder}, or name it with -o"))
 
 
-def file_problems(loaded: Loaded) -> list[str]:
+def file_problems(loaded: SceneFile) -> list[str]:
     """What `resolve` has against each path in the scene."""
     found = [
         (at, node, _inside(str(node.value), loaded.folder, loaded.roots)) for at, node in _paths(loaded.tree)
@@ -148,19 +148,21 @@ def file_problems(loaded: Loaded) -> list[str]:
     return _lines([_problem(node.at, at, fact) for at, node, fact in found if isinstance(fact, str)])
 
 
-def unused_lines(loaded: Loaded, scene: Scene, layers: Collection[str], files: Collection[str]) -> list[str]:
+def unused_lines(
+    loaded: SceneFile, scene: Scene, layers: Collection[str], files: Collection[str]
+) -> list[str]:
     """What the scene as written says and what has no effect, a line each; arguments as those of `unused`."""
     found = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
     said = ((node.at, path, fact) for path, fact, node in found if node is not None)
     return _lines([_problem(at, path, fact) for at, path, fact in said if at.source != str(STUDIO)])
 
 
-def lacking_lines(loaded: Loaded, scene: Scene, layers: Collection[str]) -> list[str]:
+def lacking_lines(loaded: SceneFile, scene: Scene, layers: Collection[str]) -> list[str]:
     """What pictures of the scene lack, a line each; arguments as those of `lacking`."""
     return [told(loaded, path, fact) for path, fact in lacking(scene, layers)]
 
 
-def told(loaded: Loaded, path: source.Path, fact: str) -> str:
+def told(loaded: SceneFile, path: source.Path, fact: str) -> str:
     """A line about a part of the scene, with its place."""
     return str(_problem((loaded.tree.find(path) or loaded.tree).at, path, fact))
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.arrays import F, Lanes, Vectors
+from illumcli.arrays import F, Floats, Vectors
 
 
 def ambient_light(
-    ambient_color: Vectors, light: tuple[float, float, float], obscurance: Lanes | None
+    ambient_color: Vectors, light: tuple[float, float, float], obscurance: Floats | None
 ) -> Vectors:
     """(M, 3) k_a I_a w; w is 1 where no obscurance is asked for."""
     out = ambient_color * np.asarray(light, F)
@@ -16,7 +16,7 @@ def ambient_light(
 
 
 def coupled(
-    ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, unlit: Vectors, w: Lanes
+    ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, unlit: Vectors, w: Floats
 ) -> Vectors:
     """(M, 3) (k_a I_a + direct) w + I_d, as one text prints it (Theoharis et al. 2008, eq. 12.75).
 

@@ -12,7 +12,7 @@ from illumcli.arrays import F, Ids, Vectors, rows, some
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.shading.textures import Parameters
-from illumcli.visibility.incident import Lit
+from illumcli.visibility.incident import LitPoints
 
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
@@ -34,7 +34,7 @@ def response(
     models: Sequence[IlluminationModel],
     lobes: Sequence[Mapping[str, Any]],
     material: Ids,
-    lit: Lit,
+    lit: LitPoints,
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
     parameters: Parameters | None = None,

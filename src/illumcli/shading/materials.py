@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, rows
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.repairs import Repairs, joined, located, path_of
-from illumcli.geometry.scene_geometry import World
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import VertexValues
 from illumcli.records import Record, Value
@@ -33,7 +33,7 @@ class Numbering(Record):
     of_object: NDArray[np.int32]  # (O,) material number
     of_triangle: NDArray[np.int32] | None = None  # (T,) where it differs within objects
 
-    def number(self, world: World, triangle: Ids) -> Ids:
+    def number(self, world: SceneGeometry, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
         if self.of_triangle is not None:
             return self.of_triangle.take(triangle)
@@ -67,7 +67,7 @@ class Choice(Value):
         return "colors", *token
 
 
-def numbering(world: World, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
+def numbering(world: SceneGeometry, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
     """Numbers the materials of all objects.
 
     Parameters
@@ -119,7 +119,7 @@ class Materials(Record):
         own = self.substitutes[number] if self.substitutes else None
         return None if own is None else own.get(path, Substitute((1.0, 1.0, 1.0)))
 
-    def number(self, world: World, triangle: Ids) -> Ids:
+    def number(self, world: SceneGeometry, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
         return self.numbering.number(world, triangle)
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, rows
-from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, World
+from illumcli.arrays import F, Floats, Ids, Vectors, columns, rows
+from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.rays.corner_weights import (
     Corners,
     CornerWeights,
@@ -23,7 +23,7 @@ from illumcli.rays.corner_weights import (
     TriangleCorners,
     concatenated,
 )
-from illumcli.rays.interaction import Facets, facing, interpolated, quadratic
+from illumcli.rays.interaction import SurfaceInteraction, facing, interpolated, quadratic
 from illumcli.records import Record
 
 RATES = ("constant", "gouraud", "phong", "quadratic")
@@ -35,8 +35,8 @@ class Points(Record):
     """Where models are evaluated, E points on triangles, and how values return to the M samples seen."""
 
     triangle: Ids  # (E,)
-    u: Lanes  # (E,)
-    v: Lanes  # (E,)
+    u: Floats  # (E,)
+    v: Floats  # (E,)
     position: Vectors  # (E, 3) float32, in radii
     n: Vectors  # (E, 3) float32 unit shading normal on the side the eye sees
     spread: Callable[[NDArray[Any]], NDArray[Any]]
@@ -49,7 +49,11 @@ class Points(Record):
 
 
 def sample_normals(
-    world: World, weights: CornerWeights, facet: Facets, rates: Sequence[str], normals: CornerVectors
+    world: SceneGeometry,
+    weights: CornerWeights,
+    facet: SurfaceInteraction,
+    rates: Sequence[str],
+    normals: CornerVectors,
 ) -> Vectors:
     """(M, 3) the interpolated shading normal of every sample, where object i is shaded at ``rates[i]``: of
     `gouraud` the linear one, of `constant` the facet's own."""
@@ -60,9 +64,9 @@ def sample_normals(
 
 
 def points(
-    world: World,
+    world: SceneGeometry,
     weights: CornerWeights,
-    facet: Facets,
+    facet: SurfaceInteraction,
     rates: Sequence[str],
     normals: CornerVectors | None = None,
     centres: PolygonCentres | None = None,
@@ -87,7 +91,7 @@ def points(
         if not group.size:
             continue
         some = weights.take(group)
-        own = Facets(*(rows(values, group) for values in vars(facet).values()))
+        own = SurfaceInteraction(*(rows(values, group) for values in vars(facet).values()))
         groups.append(group)
         if name is None:
             n = _sample_normals(world, some, own, of_sample.take(group), normals)
@@ -117,7 +121,7 @@ def points(
     return Points(**joined, spread=spread, weights=concatenated(own_weights))
 
 
-def _samples(weights: CornerWeights, facet: Facets, n: Vectors) -> Points:
+def _samples(weights: CornerWeights, facet: SurfaceInteraction, n: Vectors) -> Points:
     hits = weights.hits
     return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, as_they_are)
 
@@ -128,9 +132,9 @@ def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sample_normals(
-    world: World,
+    world: SceneGeometry,
     weights: CornerWeights,
-    facet: Facets,
+    facet: SurfaceInteraction,
     of_sample: NDArray[np.int8],
     normals: CornerVectors | None,
 ) -> Vectors:
@@ -145,15 +149,15 @@ def _sample_normals(
         if group.size == len(of_sample):
             return normal(world, normals, weights, facet)
         if group.size:
-            own = Facets(*(rows(values, group) for values in vars(facet).values()))
+            own = SurfaceInteraction(*(rows(values, group) for values in vars(facet).values()))
             out[group] = normal(world, normals, weights.take(group), own)
     return out
 
 
 def _constant(
-    world: World,
+    world: SceneGeometry,
     weights: CornerWeights,
-    facet: Facets,
+    facet: SurfaceInteraction,
     normals: Any,
     centres: PolygonCentres,
     polygon_normals: Any,
@@ -173,7 +177,12 @@ def _constant(
 
 
 def _gouraud(
-    world: World, weights: CornerWeights, facet: Facets, normals: Any, centres: Any, polygon_normals: Any
+    world: SceneGeometry,
+    weights: CornerWeights,
+    facet: SurfaceInteraction,
+    normals: Any,
+    centres: Any,
+    polygon_normals: Any,
 ) -> Points:
     """One point per polygon corner and side seen: corners of a vertex may differ in normal and uv."""
     found: list[tuple[NDArray[Any], ...]] = []

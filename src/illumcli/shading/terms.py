@@ -17,24 +17,24 @@ from typing import Any
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, cross, dot, length, mirror, unit
-from illumcli.graph import Recipe, order, required
+from illumcli.arrays import Floats, Vectors, cross, dot, length, mirror, unit
+from illumcli.graph import Node, order, required
 
 GIVEN = ("n", "l", "v", "t", "light")
 
 
-def n_l(n: Vectors, l: Vectors) -> Lanes:
+def n_l(n: Vectors, l: Vectors) -> Floats:
     """Cosine of the angle of incidence, above 0 on every lane that a model sees."""
     return dot(n, l)
 
 
-def n_v(n: Vectors, v: Vectors) -> Lanes:
+def n_v(n: Vectors, v: Vectors) -> Floats:
     """Cosine at the eye, kept above 0: an interpolated normal may turn away where its facet does not."""
     cosine = np.abs(dot(n, v))
     return np.maximum(cosine, np.finfo(cosine.dtype).eps)
 
 
-def l_v(l: Vectors, v: Vectors) -> Lanes:
+def l_v(l: Vectors, v: Vectors) -> Floats:
     return dot(l, v)
 
 
@@ -43,7 +43,7 @@ def s(l: Vectors, v: Vectors) -> Vectors:
     return l + v
 
 
-def s_s(s: Vectors) -> Lanes:
+def s_s(s: Vectors) -> Floats:
     """|s|^2 = 2 (1 + l.v)."""
     return dot(s, s)
 
@@ -53,34 +53,34 @@ def h(s: Vectors) -> Vectors:
     return unit(s)
 
 
-def v_h(s_s: Lanes) -> Lanes:
+def v_h(s_s: Floats) -> Floats:
     """v.h = l.h = |s| / 2, without the cancellation of sqrt((1 + l.v) / 2)."""
     return np.minimum(np.sqrt(s_s) / 2, 1)
 
 
-def n_s(n: Vectors, s: Vectors) -> Lanes:
+def n_s(n: Vectors, s: Vectors) -> Floats:
     """n.s, equal to n.l + n.v."""
     return dot(n, s)
 
 
-def n_h(n_s: Lanes, s_s: Lanes) -> Lanes:
+def n_h(n_s: Floats, s_s: Floats) -> Floats:
     """Cosine between normal and half vector, within (0, 1]."""
     limits = np.finfo(s_s.dtype)
     return np.clip(n_s / np.sqrt(np.maximum(s_s, limits.tiny)), limits.eps, 1)
 
 
-def gap_nh(n: Vectors, h: Vectors, s_s: Lanes) -> Lanes:
+def gap_nh(n: Vectors, h: Vectors, s_s: Floats) -> Floats:
     """1 - n.h = |n - h|^2 / 2; at least 1 (no highlight) where h is undefined."""
     d = n - h
     return dot(d, d) / 2 + (s_s == 0)
 
 
-def r(l: Vectors, n: Vectors, n_l: Lanes) -> Vectors:
+def r(l: Vectors, n: Vectors, n_l: Floats) -> Vectors:
     """`l` mirrored at `n`."""
     return mirror(l, n, n_l)
 
 
-def gap_rv(r: Vectors, v: Vectors) -> Lanes:
+def gap_rv(r: Vectors, v: Vectors) -> Floats:
     """1 - r.v = |r - v|^2 / 2."""
     d = r - v
     return dot(d, d) / 2
@@ -90,7 +90,7 @@ def nxs(n: Vectors, s: Vectors) -> Vectors:
     return cross(n, s)
 
 
-def sin2_h(nxs: Vectors, n_s: Lanes, s_s: Lanes) -> Lanes:
+def sin2_h(nxs: Vectors, n_s: Floats, s_s: Floats) -> Floats:
     """sin^2 of the angle between n and h = |n x s|^2 / |s|^2; keeps its digits where 1 - (n.h)^2 has none.
 
     1 (a right angle) where h is undefined or below the surface.
@@ -107,23 +107,23 @@ def nxv(n: Vectors, v: Vectors) -> Vectors:
     return cross(n, v)
 
 
-def sin_l(nxl: Vectors) -> Lanes:
+def sin_l(nxl: Vectors) -> Floats:
     """Sine of the angle of incidence, |n x l|."""
     return length(nxl)
 
 
-def sin_v(nxv: Vectors) -> Lanes:
+def sin_v(nxv: Vectors) -> Floats:
     """Sine of the angle at the eye, |n x v|."""
     return length(nxv)
 
 
-def cos_phi(nxl: Vectors, nxv: Vectors, sin_l: Lanes, sin_v: Lanes) -> Lanes:
+def cos_phi(nxl: Vectors, nxv: Vectors, sin_l: Floats, sin_v: Floats) -> Floats:
     """Cosine of the azimuth between l and v; 0 where either stands on the normal and has none."""
     sines = sin_l * sin_v
     return np.clip(dot(nxl, nxv) / np.maximum(sines, np.finfo(sines.dtype).tiny), -1, 1)
 
 
-def sin_theta_d(l: Vectors, v: Vectors) -> Lanes:
+def sin_theta_d(l: Vectors, v: Vectors) -> Floats:
     """Sine of the angle between l and h = |l - v| / 2."""
     return length(l - v) / 2
 
@@ -133,36 +133,36 @@ def b(n: Vectors, t: Vectors) -> Vectors:
     return cross(n, t)
 
 
-def t_l(t: Vectors, l: Vectors) -> Lanes:
+def t_l(t: Vectors, l: Vectors) -> Floats:
     return dot(t, l)
 
 
-def t_v(t: Vectors, v: Vectors) -> Lanes:
+def t_v(t: Vectors, v: Vectors) -> Floats:
     return dot(t, v)
 
 
-def b_l(b: Vectors, l: Vectors) -> Lanes:
+def b_l(b: Vectors, l: Vectors) -> Floats:
     return dot(b, l)
 
 
-def b_v(b: Vectors, v: Vectors) -> Lanes:
+def b_v(b: Vectors, v: Vectors) -> Floats:
     return dot(b, v)
 
 
-def t_s(t: Vectors, s: Vectors) -> Lanes:
+def t_s(t: Vectors, s: Vectors) -> Floats:
     return dot(t, s)
 
 
-def b_s(b: Vectors, s: Vectors) -> Lanes:
+def b_s(b: Vectors, s: Vectors) -> Floats:
     return dot(b, s)
 
 
-def sin_tl(t: Vectors, l: Vectors) -> Lanes:
+def sin_tl(t: Vectors, l: Vectors) -> Floats:
     """Sine of the angle between tangent and light, |t x l|."""
     return length(cross(t, l))
 
 
-def sin_tv(t: Vectors, v: Vectors) -> Lanes:
+def sin_tv(t: Vectors, v: Vectors) -> Floats:
     """Sine of the angle between tangent and eye, |t x v|."""
     return length(cross(t, v))
 
@@ -174,11 +174,11 @@ FUNCTIONS = (
     b, t_l, t_v, b_l, b_v, t_s, b_s, sin_tl, sin_tv,
 )
 # fmt: on
-TERMS: dict[str, Recipe] = {function.__name__: Recipe.of(function) for function in FUNCTIONS}
+TERMS: dict[str, Node] = {function.__name__: Node.of(function) for function in FUNCTIONS}
 
 
 @cache
-def steps(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Recipe, ...]:
+def steps(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Node, ...]:
     """The terms that `needs` reach, each after those it is formed from."""
     return tuple(order(TERMS, needs, given))
 

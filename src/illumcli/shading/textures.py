@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, columns, rows
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, Repairs, note
-from illumcli.geometry.scene_geometry import CornerVectors, World
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import interaction as surface
@@ -151,7 +151,7 @@ def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexV
 
 
 def varying(
-    world: World,
+    world: SceneGeometry,
     materials: Materials,
     object_names: Sequence[str],
     purpose: str,
@@ -222,7 +222,7 @@ def _uniform(value: Sequence[float], within: Range) -> Map:
     return Map(texel.reshape(1, 1, -1), "nearest", "repeat", within)
 
 
-def _objects_of(world: World, materials: Materials) -> list[list[int]]:
+def _objects_of(world: SceneGeometry, materials: Materials) -> list[list[int]]:
     """By material number, the objects that have it."""
     material = materials.number(world, np.arange(len(world.triangles), dtype=np.int32))
     pairs = np.unique(material.astype(np.int64) * len(world.placed) + world.objects)
@@ -233,7 +233,7 @@ def _objects_of(world: World, materials: Materials) -> list[list[int]]:
 
 
 def _lacks(
-    world: World, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
+    world: SceneGeometry, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
 ) -> str | None:
     """What object number `thing` lacks for a parameter to vary by `value`."""
     mesh = world.placed[thing].mesh
@@ -260,7 +260,7 @@ def _lacks(
     return None
 
 
-def _table(world: World, attribute: str, things: Sequence[int], width: int) -> Floats:
+def _table(world: SceneGeometry, attribute: str, things: Sequence[int], width: int) -> Floats:
     """(V, C) an attribute at the World's vertices, 0 where another object is."""
     out = np.zeros((len(world.vertices), width), F)
     for thing in things:
@@ -318,7 +318,7 @@ class Parameters(Record):
 
 
 def parameters(
-    world: World,
+    world: SceneGeometry,
     varying: Varying,
     material: Ids,
     weights: CornerWeights,

@@ -12,7 +12,7 @@ from typing import Any
 from illumcli.errors import ThresholdError
 from illumcli.records import Value
 from illumcli.stress import meshes, models, rays, scale, scenes
-from illumcli.stress.outcome import Room, Row
+from illumcli.stress.outcome import Row, Sandbox
 
 __all__ = ["Result", "as_data", "as_table", "check", "run"]
 
@@ -40,7 +40,7 @@ def run(quick: bool = False, progress: Progress = lambda what, done, of: None) -
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="illum-stress-") as folder, warnings.catch_warnings():
         warnings.simplefilter("error")  # an overflow that numpy notices is a finding
-        room = Room(Path(folder))
+        room = Sandbox(Path(folder))
         parts: dict[str, Callable[[], list[Row]]] = {
             "scenes": lambda: scenes.rows(room, quick),
             "scale": lambda: scale.rows(room, quick),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.stress.outcome import Room, Row
+from illumcli.stress.outcome import Row, Sandbox
 from illumcli.stress.rays import icosphere
 from illumcli.stress.scenes import BALL, FLOOR, scene
 
@@ -15,7 +15,7 @@ RAYS = 32
 radii, and now and then a ray passes an edge on the other side."""
 
 
-def rows(room: Room, quick: bool) -> list[Row]:
+def rows(room: Sandbox, quick: bool) -> list[Row]:
     """Meshes written differently, and threads."""
     film = {"width": 40, "height": 30, "samples": 1} if quick else {"width": 320, "height": 240, "samples": 1}
     return [*_written(room, film), _threads(room, film, quick)]
@@ -40,7 +40,7 @@ def variants(vertices: NDArray[np.float64], faces: Faces) -> dict[str, tuple[NDA
     }
 
 
-def _written(room: Room, film: dict[str, int]) -> list[Row]:
+def _written(room: Sandbox, film: dict[str, int]) -> list[Row]:
     ball = icosphere(3)
     vertices, faces = (
         ball.vertices * [1, 0.7, 0.4] + [0.1, 0.2, 0.3],
@@ -64,7 +64,9 @@ def _written(room: Room, film: dict[str, int]) -> list[Row]:
     return found
 
 
-def _w(room: Room, vertices: NDArray[np.float64], faces: Faces, film: dict[str, int]) -> NDArray[np.float32]:
+def _w(
+    room: Sandbox, vertices: NDArray[np.float64], faces: Faces, film: dict[str, int]
+) -> NDArray[np.float32]:
     text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
     text += "".join(f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist())
     thing = {"mesh": room.file(f"mesh{room.pictures}.obj", text.encode())}
@@ -72,7 +74,7 @@ def _w(room: Room, vertices: NDArray[np.float64], faces: Faces, film: dict[str, 
     return room.picture(said, ("obscurance",))[0]["obscurance.Y"]
 
 
-def _threads(room: Room, film: dict[str, int], quick: bool) -> Row:
+def _threads(room: Sandbox, film: dict[str, int], quick: bool) -> Row:
     said = {**scene(BALL, FLOOR), "film": film}
     reference = room.picture(said)[1]
     counts = (2, 3) if quick else (1, 2, 3, 4, 8, 8, 8)

@@ -33,7 +33,7 @@ class Row(Value):
     passed: bool
 
 
-class Room:
+class Sandbox:
     """A folder in which scenes are rendered, and a count of every value that came out of them."""
 
     def __init__(self, folder: Path) -> None:

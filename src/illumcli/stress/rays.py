@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, columns, cross, dot, rows, unit
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import World, place, rotation
+from illumcli.geometry.scene_geometry import SceneGeometry, place, rotation
 from illumcli.rays.embree import Tracer
-from illumcli.rays.interaction import Facets, facets
-from illumcli.rays.offsets import lifted
-from illumcli.stress.outcome import Room, Row
+from illumcli.rays.interaction import SurfaceInteraction, facets
+from illumcli.rays.offsets import offset_ray_origins
+from illumcli.stress.outcome import Row, Sandbox
 from illumcli.stress.scenes import scene
 
 GAPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -26,7 +26,7 @@ EDGES_PPM = 1000
 tolerance, which then takes the face beyond for hit. A longer offset would lose contact gaps of 1e-6 radii."""
 
 
-def check_rows(room: Room, quick: bool) -> list[Row]:
+def check_rows(room: Sandbox, quick: bool) -> list[Row]:
     """Every check of the ray core and of where rays start."""
     count = 20_000 if quick else 2_000_000
     return [
@@ -87,7 +87,7 @@ def _scaled(mesh: Mesh, factor: float) -> Mesh:
     return Mesh(mesh.vertices * factor, mesh.corners, mesh.starts)
 
 
-def world_of(mesh: Mesh, away: float = 0.0) -> World:
+def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
     """The mesh turned about all axes and moved; with `away` a speck at the origin keeps the radius at 1."""
     matrix = rotation(2, 23.0) @ rotation(1, 41.0) @ rotation(0, 17.0)
     matrix[:3, 3] = away
@@ -97,7 +97,9 @@ def world_of(mesh: Mesh, away: float = 0.0) -> World:
     return place([mesh, speck], [matrix, np.eye(4)])
 
 
-def surface_points(world: World, count: int, seed: int) -> tuple[NDArray[np.float64], Facets]:
+def surface_points(
+    world: SceneGeometry, count: int, seed: int
+) -> tuple[NDArray[np.float64], SurfaceInteraction]:
     """Points of object 0, one in four on an edge or vertex, and their facets seen from outside."""
     random = np.random.default_rng(seed)
     mine = np.flatnonzero(world.objects == 0).astype(np.int32)
@@ -134,7 +136,7 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
         way = grazing(facet.ng.astype(np.float64), seed)
         # rounding brings a ray of 1e-6 rad below the horizon now and then; such a one asks about the inside
         up = dot(way.astype(np.float64), facet.ng.astype(np.float64)) > 1e-7
-        origins = lifted(position, facet.ng, facet.edge)
+        origins = offset_ray_origins(position, facet.ng, facet.edge)
         hidden = tracer.occluded(columns(origins[up]), columns(way[up]), limit)
         rim = np.flatnonzero(up) < part // 4
         for k, where in enumerate((~rim, rim)):
@@ -178,7 +180,7 @@ def _gaps(count: int) -> Row:
         )
         up = unit(columns(np.cross(corner[3] - corner[0], corner[1] - corner[0])[None]))
         n = columns(np.repeat(up, count, axis=0), F)
-        origins = lifted(position, n, np.full(count, np.linalg.norm(corner[2] - corner[0]), F))
+        origins = offset_ray_origins(position, n, np.full(count, np.linalg.norm(corner[2] - corner[0]), F))
         hidden = tracer.occluded(origins, n)
         lit[gap] = float(np.mean(~hidden))
     worst = max(lit, key=lambda gap: lit[gap])
@@ -214,7 +216,7 @@ def _leaks(divisions: int, count: int) -> list[Row]:
     return found
 
 
-def _terminators(room: Room, quick: bool) -> list[Row]:
+def _terminators(room: Sandbox, quick: bool) -> list[Row]:
     """A lone smooth ball has no shadow on its lit side, however coarse it is."""
     found = []
     film = {"width": 48, "height": 48, "samples": 1} if quick else {"width": 256, "height": 256, "samples": 1}
@@ -246,7 +248,7 @@ def _terminators(room: Room, quick: bool) -> list[Row]:
     return found
 
 
-def _near_lights(room: Room, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2)) -> Row:
+def _near_lights(room: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2)) -> Row:
     """A light however near to a plane, on its lit side, casts no shadow there."""
     plane = {"mesh": {"shape": "plane", "size": [2, 2]}}
     lamps = [

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from illumcli.stress.outcome import Channels, Room, Row
+from illumcli.stress.outcome import Channels, Row, Sandbox
 from illumcli.stress.scenes import Scene, scaled, scene
 
 SCALES = (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
@@ -18,7 +18,7 @@ BEYOND = 1e-3
 """Share of pixels that may differ: their rays pass edges by less than a rounding of the vertices."""
 
 
-def rows(room: Room, quick: bool) -> list[Row]:
+def rows(room: Sandbox, quick: bool) -> list[Row]:
     """The matrix of sizes and distances, powers of two, and bodies that nothing can shade."""
     pairs = list(product(SCALES, DISTANCES))
     chosen = pairs[:: 5 if quick else 1]
@@ -31,7 +31,7 @@ def rows(room: Room, quick: bool) -> list[Row]:
     ]
 
 
-def _matrix(room: Room, pairs: list[tuple[float, float]], film: Scene) -> Row:
+def _matrix(room: Sandbox, pairs: list[tuple[float, float]], film: Scene) -> Row:
     reference = _view(room, 1.0, 0.0, film)
     most, where = 0.0, (1.0, 0.0)
     for size, distance in pairs:
@@ -47,12 +47,12 @@ def _matrix(room: Room, pairs: list[tuple[float, float]], film: Scene) -> Row:
     return Row("size and distance", check, worst, most <= BEYOND)
 
 
-def _view(room: Room, size: float, distance: float, film: Scene) -> Channels:
+def _view(room: Sandbox, size: float, distance: float, film: Scene) -> Channels:
     said = {**_there(size, distance), "film": film, "obscurance": {"samples": RAYS}}
     return room.picture(said, LAYERS)[0]
 
 
-def _baked(room: Room, pairs: list[tuple[float, float]]) -> Row:
+def _baked(room: Sandbox, pairs: list[tuple[float, float]]) -> Row:
     reference = room.bake(_there(1.0, 0.0), RAYS)
     most, where = 0.0, (1.0, 0.0)
     for size, distance in pairs:
@@ -79,7 +79,7 @@ def _beyond(a: Channels, b: Channels) -> float:
     return float(wrong.mean())
 
 
-def _powers_of_two(room: Room, exponents: range | tuple[int, ...], film: Scene) -> Row:
+def _powers_of_two(room: Sandbox, exponents: range | tuple[int, ...], film: Scene) -> Row:
     reference = _view(room, 1.0, 0.0, film)
     different = 0
     for exponent in exponents:
@@ -100,7 +100,7 @@ BODIES: dict[str, Scene] = {
 }
 
 
-def _convex(room: Room, pairs: list[tuple[float, float]], film: Scene) -> list[Row]:
+def _convex(room: Sandbox, pairs: list[tuple[float, float]], film: Scene) -> list[Row]:
     """Bodies without hollows: w is 1 exactly, at any size and distance."""
     found = []
     for name, body in BODIES.items():

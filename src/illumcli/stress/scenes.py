@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import IllumError
-from illumcli.stress.outcome import Room, Row, faults, is_refusal, refusal
+from illumcli.stress.outcome import Row, Sandbox, faults, is_refusal, refusal
 
 Scene = dict[str, Any]
 RATES = ("phong", "gouraud", "constant", "quadratic")
@@ -85,12 +85,12 @@ def scaled(size: float, *away: float) -> Scene:
     )  # fmt: skip
 
 
-def obj(room: Room, text: str, **more: Any) -> Scene:
+def obj(room: Sandbox, text: str, **more: Any) -> Scene:
     """A scene around a mesh file of this text."""
     return scene({"mesh": room.file(f"mesh{room.pictures}.obj", text.encode())}, FLOOR, **more)
 
 
-MUST_RENDER: dict[str, Callable[[Room], Scene]] = {
+MUST_RENDER: dict[str, Callable[[Sandbox], Scene]] = {
     "empty scene": lambda room: {},
     "empty scene with lights and obscurance": lambda room: scene(),
     "all vertices one point": lambda room: scene(polygons([[1, 2, 3]] * 3, [(0, 1, 2)])),
@@ -265,7 +265,7 @@ MUST_RENDER: dict[str, Callable[[Room], Scene]] = {
 }
 """Name -> scene, of what must render."""
 
-MUST_REFUSE: dict[str, Callable[[Room], Scene]] = {
+MUST_REFUSE: dict[str, Callable[[Sandbox], Scene]] = {
     "a mesh without faces": lambda room: obj(room, TRIANGLE),
     "a mesh file of 0 bytes": lambda room: obj(room, ""),
     "a NaN vertex": lambda room: obj(room, "v nan 0 0\n" + TRIANGLE + "f 1 2 3\n"),
@@ -285,7 +285,7 @@ MUST_REFUSE: dict[str, Callable[[Room], Scene]] = {
 """Name -> scene, of what must be refused."""
 
 
-def rows(room: Room, quick: bool) -> list[Row]:
+def rows(room: Sandbox, quick: bool) -> list[Row]:
     """One row per scene: rendered at every shading rate, or refused."""
     rates = RATES[:2] if quick else RATES
     size = {"width": 24, "height": 18, "samples": 1} if quick else {"width": 120, "height": 90, "samples": 2}
@@ -294,7 +294,7 @@ def rows(room: Room, quick: bool) -> list[Row]:
 
 
 def _rendered(
-    name: str, make: Callable[[Room], Scene], room: Room, rates: Sequence[str], size: Mapping[str, int]
+    name: str, make: Callable[[Sandbox], Scene], room: Sandbox, rates: Sequence[str], size: Mapping[str, int]
 ) -> Row:
     check, wrong = "finite, nothing below 0, shares within 1", []
     for rate in rates:
@@ -311,7 +311,7 @@ def _rendered(
     return Row(name, check, wrong[0] if wrong else "-", not wrong)
 
 
-def _refused(name: str, make: Callable[[Room], Scene], room: Room) -> Row:
+def _refused(name: str, make: Callable[[Sandbox], Scene], room: Sandbox) -> Row:
     try:
         room.picture(make(room))
         worst, passed = "rendered", False

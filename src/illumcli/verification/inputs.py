@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from illumcli.arrays import Lanes, Vectors, columns
+from illumcli.arrays import Floats, Vectors, columns
 from illumcli.errors import InputError
 from illumcli.records import Value
 from illumcli.schema.families import suggestion
@@ -44,7 +44,7 @@ class Inputs(Value):
         """A scalar, or None where the file has null."""
         return None if self.value(key) is None else self.number(key)
 
-    def lanes(self, key: str) -> Lanes:
+    def lanes(self, key: str) -> Floats:
         """(1,) a scalar as a lane."""
         return self._array(key, ()).reshape(1)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors, dot, rows
+from illumcli.arrays import Floats, Vectors, dot, rows
 from illumcli.models._base import IlluminationModel
 from illumcli.models.ashikhmin_shirley import AshikhminShirley
 from illumcli.models.kajiya_kay import KajiyaKay
@@ -37,7 +37,7 @@ def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) 
     return out
 
 
-def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Lanes:
+def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Floats:
     """(1,) f_r = response / n.l of a grey model; 0 where light or eye are below the horizon."""
     n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
     n_l = dot(n, l)
@@ -60,16 +60,16 @@ def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
     return [buffers[name] for name in names]
 
 
-def oren_nayar_full(inputs: Inputs) -> Lanes:
+def oren_nayar_full(inputs: Inputs) -> Floats:
     return brdf(OrenNayar(diffuse=inputs.color("albedo"), sigma=inputs.number("sigma")), inputs)
 
 
-def oren_nayar_ab(inputs: Inputs) -> Lanes:
+def oren_nayar_ab(inputs: Inputs) -> Floats:
     model = OrenNayar(diffuse=inputs.color("albedo"), sigma=inputs.number("sigma"), form="qualitative")
     return brdf(model, inputs)
 
 
-def oren_nayar_bounces(inputs: Inputs) -> Lanes:
+def oren_nayar_bounces(inputs: Inputs) -> Floats:
     """[f1, f2] as parts of f_r, not clamped."""
     if not facing(inputs):
         return np.zeros(2, inputs.dtype)
@@ -105,15 +105,15 @@ def strauss_parameters(inputs: Inputs) -> dict[str, Any]:
     return {k: inputs.number(k) for k in ("smoothness", "metalness", "transparency", "kj", "kf", "kg")}
 
 
-def fresnel_of_strauss(inputs: Inputs) -> Lanes:
+def fresnel_of_strauss(inputs: Inputs) -> Floats:
     return strauss_fresnel(inputs.lanes("x"), inputs.lanes("kf"))
 
 
-def geometry_of_strauss(inputs: Inputs) -> Lanes:
+def geometry_of_strauss(inputs: Inputs) -> Floats:
     return strauss_geometry(1 - inputs.lanes("x"), inputs.lanes("kg"))
 
 
-def ward(inputs: Inputs) -> Lanes:
+def ward(inputs: Inputs) -> Floats:
     model = Ward(
         diffuse=inputs.color("rho_d"),
         specular=inputs.color("rho_s"),
@@ -123,7 +123,7 @@ def ward(inputs: Inputs) -> Lanes:
     return brdf(model, inputs, t=inputs.tangent())
 
 
-def ashikhmin_shirley(inputs: Inputs) -> Lanes:
+def ashikhmin_shirley(inputs: Inputs) -> Floats:
     model = AshikhminShirley(
         diffuse=inputs.color("Rd"),
         specular=inputs.color("Rs"),
@@ -133,7 +133,7 @@ def ashikhmin_shirley(inputs: Inputs) -> Lanes:
     return brdf(model, inputs, t=inputs.tangent())
 
 
-def kajiya_kay(inputs: Inputs) -> Lanes:
+def kajiya_kay(inputs: Inputs) -> Floats:
     """A strand on its own: no surface hides the light, so the lobes are asked directly."""
     model = KajiyaKay(
         diffuse=inputs.color("kd"), specular=inputs.color("ks"), exponent=inputs.number("exponent")
@@ -142,7 +142,7 @@ def kajiya_kay(inputs: Inputs) -> Lanes:
     return np.asarray(sum(values.values(), np.zeros((1, 3), inputs.dtype)))[:, 0]
 
 
-def aniso_cylinder(inputs: Inputs) -> Lanes:
+def aniso_cylinder(inputs: Inputs) -> Floats:
     model = PoulinFournier(
         diffuse=inputs.color("kd"),
         specular=inputs.color("ks"),

@@ -7,25 +7,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.models import merl
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import formed
 
 
-def rusinkiewicz(inputs: Inputs) -> Lanes:
+def rusinkiewicz(inputs: Inputs) -> Floats:
     """[theta_h, phi_h, theta_d, phi_d] about the tangent."""
     theta_h, theta_d, phi_d = angles(inputs)
     t_s, b_s = formed(inputs, "t_s", "b_s", t=inputs.tangent())
     return np.concatenate([theta_h, np.arctan2(b_s, t_s), theta_d, phi_d])
 
 
-def rusinkiewicz_theta(inputs: Inputs) -> Lanes:
+def rusinkiewicz_theta(inputs: Inputs) -> Floats:
     """[theta_h, theta_d], which are defined where the azimuths are not."""
     return np.concatenate(angles(inputs)[:2])
 
 
-def angles(inputs: Inputs) -> tuple[Lanes, Lanes, Lanes]:
+def angles(inputs: Inputs) -> tuple[Floats, Floats, Floats]:
     """theta_h, theta_d and phi_d, as the model looks them up."""
     nxs, n_s, n, l, v, s_s = formed(inputs, "nxs", "n_s", "n", "l", "v", "s_s")
     return merl.rusinkiewicz(nxs, n_s, n, l, v, s_s)

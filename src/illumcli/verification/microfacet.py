@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, dot
+from illumcli.arrays import Floats, dot
 from illumcli.models import _fresnel, _microfacet
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.shading import terms
@@ -41,7 +41,7 @@ UNDER_DGF = {"microfacet_4": 4.0, "printed_pi": PI}
 """What n.l n.v is multiplied by under D G F."""
 
 
-def ndf(inputs: Inputs) -> Lanes:
+def ndf(inputs: Inputs) -> Floats:
     n, h, d = inputs.unit("n"), inputs.unit("h"), inputs.part("D")
     if not dot(n, h)[0] > 0:
         return np.zeros(1, inputs.dtype)
@@ -53,14 +53,14 @@ def ndf(inputs: Inputs) -> Lanes:
     return share * distribution.density(cosine, sin2, printed)
 
 
-def geometry_vgroove(inputs: Inputs) -> Lanes:
+def geometry_vgroove(inputs: Inputs) -> Floats:
     n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
     if not (dot(n, l)[0] > 0 and dot(n, v)[0] > 0):
         return np.zeros(1, inputs.dtype)
     return _microfacet.vgroove(terms.n_l(n, l), terms.n_v(n, v), terms.s_s(terms.s(l, v)))
 
 
-def cook_torrance(inputs: Inputs) -> Lanes:
+def cook_torrance(inputs: Inputs) -> Floats:
     """f_r of the model; where a case joins a D and a constant that no scene can, by their ratio."""
     d, f = inputs.part("D"), inputs.part("F")
     distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
@@ -78,28 +78,28 @@ def cook_torrance(inputs: Inputs) -> Lanes:
     return brdf(diffuse, inputs) + share * brdf(specular, inputs)
 
 
-def fresnel_dielectric(inputs: Inputs) -> Lanes:
+def fresnel_dielectric(inputs: Inputs) -> Floats:
     return _fresnel.dielectric(inputs.lanes("cos"), inputs.lanes("eta"))
 
 
-def fresnel_conductor(inputs: Inputs) -> Lanes:
+def fresnel_conductor(inputs: Inputs) -> Floats:
     return _fresnel.conductor(inputs.lanes("cos"), inputs.lanes("eta"), inputs.lanes("k"))
 
 
-def fresnel_schlick(inputs: Inputs) -> Lanes:
+def fresnel_schlick(inputs: Inputs) -> Floats:
     return _fresnel.schlick(inputs.lanes("cos"), inputs.lanes("f0"))
 
 
-def fresnel_sin_tan(inputs: Inputs) -> Lanes:
+def fresnel_sin_tan(inputs: Inputs) -> Floats:
     """The form by angles: the dielectric at c = cos(phi)."""
     return _fresnel.dielectric(np.cos(inputs.lanes("phi")), inputs.lanes("mu"))
 
 
-def eta_from_f0(inputs: Inputs) -> Lanes:
+def eta_from_f0(inputs: Inputs) -> Floats:
     return _fresnel.eta_from_f0(inputs.lanes("f0"))
 
 
-def f0_from_eta(inputs: Inputs) -> Lanes:
+def f0_from_eta(inputs: Inputs) -> Floats:
     return _fresnel.f0_from_eta(inputs.lanes("eta"), inputs.lanes("k"))
 
 

@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from illumcli.arrays import F, Lanes, columns
+from illumcli.arrays import F, Floats, columns
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place
 from illumcli.rays.embree import tracer
-from illumcli.rays.offsets import lifted
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.outcome import Estimate
@@ -37,7 +37,7 @@ def exponential(inputs: Inputs) -> Exponential:
     )
 
 
-def mu(inputs: Inputs) -> Lanes:
+def mu(inputs: Inputs) -> Floats:
     falloff = exponential(inputs)
     return falloff.weight(inputs.lanes("x"), falloff.reach(1.0), 1.0)
 
@@ -61,10 +61,10 @@ def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
     world = place([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     ng = columns(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
-    here = np.tile(world.frame.inward(np.zeros(3)), (PATTERNS, 1))
+    here = np.tile(world.frame.from_world(np.zeros(3)), (PATTERNS, 1))
     corners = around.vertices[around.triangles[0]]
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius
-    origins = lifted(here, ng, np.full(PATTERNS, edge))
+    origins = offset_ray_origins(here, ng, np.full(PATTERNS, edge))
     number = np.arange(PATTERNS, dtype=np.uint32)
     draws = np.stack(
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
@@ -80,4 +80,4 @@ CAST: dict[str, Callable[[Inputs], Estimate]] = {
     "ao_dmax": ao_dmax,
     "obscurance": obscured,
 }
-CASES: dict[str, Callable[[Inputs], Lanes | Estimate]] = {"mu": mu, **CAST}
+CASES: dict[str, Callable[[Inputs], Floats | Estimate]] = {"mu": mu, **CAST}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors, columns, cross, dot, length, mirror
+from illumcli.arrays import Floats, Vectors, columns, cross, dot, length, mirror
 from illumcli.lights.point import Point
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.models.phong import Phong
@@ -18,12 +18,12 @@ Model = type[Phong] | type[BlinnPhong]
 LOBES: dict[str, Model] = {"r": Phong, "h": BlinnPhong}
 
 
-def phong(inputs: Inputs) -> Lanes:
+def phong(inputs: Inputs) -> Floats:
     """I = Ie + Ia ka + sum over lights of f(d) I (kd n.l + ks (r.v)^e)."""
     return intensity(Phong, inputs)[:, 0]
 
 
-def blinn_phong(inputs: Inputs) -> Lanes:
+def blinn_phong(inputs: Inputs) -> Floats:
     """The same with (n.h)^e."""
     return intensity(BlinnPhong, inputs)[:, 0]
 
@@ -78,13 +78,13 @@ def halfway(inputs: Inputs) -> Vectors:
     return terms.h(terms.s(inputs.unit("l"), inputs.unit("v")))[0]
 
 
-def nh_rv_angles(inputs: Inputs) -> Lanes:
+def nh_rv_angles(inputs: Inputs) -> Floats:
     """Angle between n and h, and between r and v."""
     n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
     return np.concatenate([angle(n, terms.s(l, v)), angle(mirror(l, n, dot(n, l)), v)])
 
 
-def angle(a: Vectors, b: Vectors) -> Lanes:
+def angle(a: Vectors, b: Vectors) -> Floats:
     """(N,) angle [rad] that keeps its digits near 0 and pi."""
     return np.arctan2(length(cross(a, b)), dot(a, b))
 

@@ -6,17 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from illumcli.arrays import Lanes, Vectors, dot
+from illumcli.arrays import Floats, Vectors, dot
 from illumcli.lights._attenuation import InverseSquare, InverseSquareFlux, Law, Polynomial
 from illumcli.lights.point import Point
 from illumcli.models.lambert import Lambert
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.shading.ambient import ambient_light, coupled
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import brdf, response
 
 WHITE = (1.0, 1.0, 1.0)
-HERE = Frame((0.0, 0.0, 0.0), 1.0)
+HERE = RenderSpace((0.0, 0.0, 0.0), 1.0)
 
 
 def polynomial(inputs: Inputs) -> Polynomial:
@@ -24,7 +24,7 @@ def polynomial(inputs: Inputs) -> Polynomial:
     return Polynomial(law="polynomial", **{key: inputs.number(key) for key in ("c1", "c2", "c3")})
 
 
-def attenuation(inputs: Inputs) -> Lanes:
+def attenuation(inputs: Inputs) -> Floats:
     laws: dict[str, Callable[[], Law]] = {
         "quadratic": lambda: polynomial(inputs),
         "inverse_square": lambda: InverseSquare(law="inverse_square"),
@@ -33,7 +33,7 @@ def attenuation(inputs: Inputs) -> Lanes:
     return inputs.choose("kind", laws)().factor(inputs.lanes("d"))
 
 
-def photometry_law(inputs: Inputs) -> Lanes:
+def photometry_law(inputs: Inputs) -> Floats:
     """E = I <n.l> / d^2."""
     x, y, z = inputs.vectors("light_position")[0]
     arriving = Point(light="point", position=(float(x), float(y), float(z))).arriving(
@@ -43,11 +43,11 @@ def photometry_law(inputs: Inputs) -> Lanes:
     return inputs.lanes("intensity") * arriving.strength * cosine
 
 
-def lambert_brdf(inputs: Inputs) -> Lanes:
+def lambert_brdf(inputs: Inputs) -> Floats:
     return brdf(Lambert(diffuse=inputs.color("albedo")), inputs)
 
 
-def lambert_radiance(inputs: Inputs) -> Lanes:
+def lambert_radiance(inputs: Inputs) -> Floats:
     """L = albedo / pi * <n.l> * I / d^2."""
     law = InverseSquare(law="inverse_square")
     n, l = inputs.unit("n"), inputs.unit("l")
@@ -56,7 +56,7 @@ def lambert_radiance(inputs: Inputs) -> Lanes:
     return response(model, n=n, l=l)[:, 0] * irradiance
 
 
-def lighting_12_75(inputs: Inputs) -> Lanes:
+def lighting_12_75(inputs: Inputs) -> Floats:
     """Ambient light times obscurance plus direct light: kept apart, or coupled as one text prints it."""
     n, kd, w = inputs.unit("n"), inputs.lanes("kd"), inputs.lanes("w")
     ambient = (inputs.lanes("ka") * inputs.lanes("Ia"))[:, None]

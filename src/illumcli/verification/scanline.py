@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Lanes, Vectors, columns, unit
+from illumcli.arrays import Floats, Vectors, columns, unit
 from illumcli.geometry.normals import cross_normal
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.interaction import bend
@@ -23,13 +23,13 @@ from illumcli.verification.phong import own_light, surface
 Point = NDArray[Any]  # (3,) or (2,)
 
 
-def lerp(inputs: Inputs) -> Lanes:
+def lerp(inputs: Inputs) -> Floats:
     """The value at the distance a from v1 and b from v2."""
     a, b = inputs.lanes("a"), inputs.lanes("b")
     return (b * inputs.lanes("v1") + a * inputs.lanes("v2")) / (a + b)
 
 
-def constant_shading(inputs: Inputs) -> Lanes:
+def constant_shading(inputs: Inputs) -> Floats:
     """One value per facet, light and eye along +z, no highlight."""
     n = unit(columns(cross_normal(inputs.vectors("vertices"), 0)[None], inputs.dtype))
     up = columns(np.array([[0, 0, 1]], inputs.dtype))
@@ -37,19 +37,19 @@ def constant_shading(inputs: Inputs) -> Lanes:
     return (own_light(inputs) + inputs.lanes("Ii") * response(model, n=n, l=up, v=up))[:, 0]
 
 
-def gouraud_triangle(inputs: Inputs) -> Lanes:
+def gouraud_triangle(inputs: Inputs) -> Floats:
     """Intensities on edge 1-2, on edge 1-3, and between them."""
     p1, p2, p3 = (inputs.points2(key) for key in ("p1", "p2", "p3"))
     return _gouraud(inputs, (p1, p2, "I1", "I2"), (p1, p3, "I1", "I3"))
 
 
-def gouraud_quad(inputs: Inputs) -> Lanes:
+def gouraud_quad(inputs: Inputs) -> Floats:
     """Intensities on edge 1-3, on edge 2-4, and between them."""
     p1, p2, p3, p4 = (inputs.points2(key) for key in ("p1", "p2", "p3", "p4"))
     return _gouraud(inputs, (p1, p3, "I1", "I3"), (p2, p4, "I2", "I4"))
 
 
-def _gouraud(inputs: Inputs, *edges: tuple[Point, Point, str, str]) -> Lanes:
+def _gouraud(inputs: Inputs, *edges: tuple[Point, Point, str, str]) -> Floats:
     y = inputs.lanes("y")
     ends = []
     for start, end, first, last in edges:
@@ -75,7 +75,7 @@ def phong_shading_normal(inputs: Inputs) -> Vectors:
     return unit(between(na, nb, pb - pa, ts))
 
 
-def phong_shading(inputs: Inputs) -> Lanes:
+def phong_shading(inputs: Inputs) -> Floats:
     """I of a pixel by Blinn-Phong with the interpolated normal."""
     n, l, v = columns(phong_shading_normal(inputs)), inputs.unit("l"), inputs.unit("v")
     lit = inputs.lanes("Ii")[:, None] * response(surface(BlinnPhong, inputs), n=n, l=l, v=v)
@@ -87,12 +87,12 @@ def quadratic_normal(inputs: Inputs) -> Vectors:
     return quadratic(inputs.unit("n0"), inputs.unit("n1"), inputs.vectors("delta"), inputs.lanes("s"))
 
 
-def linear(n0: Vectors, n1: Vectors, delta: Vectors, s: Lanes) -> Vectors:
+def linear(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
     """The normal between two, not unit (Phong 1975)."""
     return _mix(n0, n1, s[:, None])
 
 
-def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Lanes) -> Vectors:
+def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
     """The same by van Overveld and Wyvill (1997): the renderer's triangle, of which one edge is looked at."""
     origin, none = np.zeros_like(delta), np.zeros_like(s)
     corners = ((origin, n0, 1 - s), (delta, n1, s), (origin, n0, none))
@@ -101,7 +101,7 @@ def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Lanes) -> Vectors:
     return n
 
 
-def _along(y: Lanes, start: Point, end: Point) -> Lanes:
+def _along(y: Floats, start: Point, end: Point) -> Floats:
     """Where the scanline y crosses an edge, 0 at its start and 1 at its end."""
     return (y - start[1]) / (end[1] - start[1])
 

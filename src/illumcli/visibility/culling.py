@@ -24,7 +24,7 @@ from illumcli.arrays import columns
 from illumcli.geometry.spatial_order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 from illumcli.visibility.shadows import NEARBY, TERMINATOR_SHARE
 
 ROOM = 1e-4
@@ -43,7 +43,7 @@ Points = NDArray[np.float64]
 Planes = tuple[NDArray[np.float64], NDArray[np.float64]]  # (K, 3) unit n and (K,) d: n.x <= d is inside
 
 
-def frustum(camera: Any, frame: Frame, width: int, height: int, film_filter: Any | None) -> Planes:
+def frustum(camera: Any, frame: RenderSpace, width: int, height: int, film_filter: Any | None) -> Planes:
     """Five planes around all that a view's rays pass: four sides, and the eye's own; in radii.
 
     Parameters
@@ -52,7 +52,7 @@ def frustum(camera: Any, frame: Frame, width: int, height: int, film_filter: Any
         The pixel filter, None where each pixel looks through its centre.
     """
     right, up, forward = axes(camera)
-    eye = frame.inward(camera.position)
+    eye = frame.from_world(camera.position)
     ends = np.array([0.0, 0.5, 1 - 2.0**-32])
     u, v = (each.ravel() for each in np.meshgrid(ends, np.arange(65) / 64))
     spread = max(float(np.abs(part).max()) for part in offsets(u, v, film_filter))
@@ -89,7 +89,7 @@ def within(planes: Planes, low: Points, high: Points) -> Points:
     return corners[inside]
 
 
-def ways(points: Points, light: Light, frame: Frame) -> Points:
+def ways(points: Points, light: Light, frame: RenderSpace) -> Points:
     """The points and where the ways from them to a light end: their hull holds the ways from all its points.
 
     A light is one point or infinitely far away; a long way ends where nothing can stand any more, for all
@@ -149,7 +149,7 @@ def unseen(
     views: Sequence[Planes],
     lights: Iterable[Light],
     reach: float,
-    frame: Frame,
+    frame: RenderSpace,
 ) -> NDArray[np.bool_]:
     """(O,) True for objects that change no picture.
 

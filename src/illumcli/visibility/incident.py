@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Ids, Lanes, Vectors, dot, some
+from illumcli.arrays import Floats, Ids, Vectors, dot, some
 from illumcli.lights._base import Light
 from illumcli.records import Record
-from illumcli.render_space import Frame
+from illumcli.render_space import RenderSpace
 
 
-class Lit(Record):
+class LitPoints(Record):
     """The lanes that a light reaches if nothing stands between, and what arrives there."""
 
     lane: Ids  # (K,) lanes with n.l > 0 and some light
     count: int  # all lanes
     l: Vectors  # (K, 3)
-    distance: Lanes  # (K,) in radii
-    strength: Lanes  # (K,) per unit of the light's colour
+    distance: Floats  # (K,) in radii
+    strength: Floats  # (K,) per unit of the light's colour
 
 
-def lit(light: Light, frame: Frame, position: Vectors, n: Vectors | None = None) -> Lit:
+def lit(light: Light, frame: RenderSpace, position: Vectors, n: Vectors | None = None) -> LitPoints:
     """Lanes in the light's range that face it. Neither shadow rays nor models see the others.
 
     Without `n` no lane is taken to face away: vertices that a sample interpolates may face the light where
@@ -33,10 +33,10 @@ def lit(light: Light, frame: Frame, position: Vectors, n: Vectors | None = None)
         reached &= dot(n, arriving.l) > 0
     lane = np.flatnonzero(reached).astype(np.int32)
     parts = (some(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
-    return Lit(lane, len(position), *parts)
+    return LitPoints(lane, len(position), *parts)
 
 
-def reaching(light: Light, frame: Frame, position: Vectors, lanes: NDArray[np.intp]) -> Lit:
+def reaching(light: Light, frame: RenderSpace, position: Vectors, lanes: NDArray[np.intp]) -> LitPoints:
     """These lanes, which are known to be lit, in ascending order."""
     arriving = light.arriving(some(position, lanes), frame)
-    return Lit(lanes.astype(np.int32), len(position), arriving.l, arriving.distance, arriving.strength)
+    return LitPoints(lanes.astype(np.int32), len(position), arriving.l, arriving.distance, arriving.strength)

@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Lanes, Vectors, columns, dot, repeated, rows
+from illumcli.arrays import F, Floats, Vectors, columns, dot, repeated, rows
 from illumcli.rays.embree import Tracer
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.records import Record, Value
@@ -90,7 +90,7 @@ class Estimates(Record):
     """w at M points and what was seen on the way."""
 
     w: NDArray[np.float32]  # (M,) in [0, 1]
-    unevenness: NDArray[np.float32]  # (M,) sum of squared differences of mu between neighbouring rays
+    neighbor_variation: NDArray[np.float32]  # (M,) sum of squared differences of mu between neighbouring rays
     bent: Vectors | None = None  # (M, 3) float32 unit mean direction of what is open; 0 where nothing is
     skipped: int = 0  # points known to be open, which cast no ray
 
@@ -156,7 +156,7 @@ def estimates(
         mu = seen(tracer, origins, d, method).reshape(-1, method.samples)
         w[part] = shares(mu)
         if errors:
-            uneven[part] = unevenness(mu, method.sampler)
+            uneven[part] = neighbor_variation(mu, method.sampler)
         if mean is not None:
             ways = d.T.reshape(3, len(mu), -1).transpose(1, 0, 2)
             towards = np.matmul(ways, mu.astype(F)[:, :, None])[:, :, 0]
@@ -172,7 +172,7 @@ def shares(mu: NDArray[Any]) -> NDArray[np.float32]:
     return mu.mean(axis=1, dtype=np.float64).astype(F)
 
 
-def unevenness(mu: NDArray[Any], sampler: Sampler) -> NDArray[np.float32]:
+def neighbor_variation(mu: NDArray[Any], sampler: Sampler) -> NDArray[np.float32]:
     """(M,) how much mu changes between neighbouring rays, the sign by which the error of a set is known.
 
     On a golden-angle spiral points whose numbers differ by a Fibonacci number near sqrt(N) lie side by side.
@@ -218,7 +218,7 @@ def seen(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArra
     return weight > 0.5 if method.falloff.step else weight.astype(F)
 
 
-def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> Lanes:
+def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> Floats:
     """(R,) float32 distance to the first face that counts, inf where there is none.
 
     `one_sided`: a ray that first meets the back of a face ends there, unhindered. `ignore`: it goes on.
@@ -279,7 +279,7 @@ def mirror_below(d: Vectors, over: Hemispheres, method: Method) -> None:
         component[ray] += up * along
 
 
-def below_at_most(cosine: Lanes, method: Method) -> NDArray[np.int64]:
+def below_at_most(cosine: Floats, method: Method) -> NDArray[np.int64]:
     """(M,) how many rays, the last of each pattern, may point below a plane.
 
     Ray i of a spiral leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose
@@ -362,20 +362,20 @@ class Errors(Value):
             return cls(0.0, 0.0, 0.0, 0)
         half = np.square(a.w.astype(np.float64) - b.w) / 2
         square = np.tile(half * np.square(samples, dtype=np.float64), 2)
-        x = np.concatenate([a.unevenness, b.unevenness]).astype(np.float64)
+        x = np.concatenate([a.neighbor_variation, b.neighbor_variation]).astype(np.float64)
         weight = 1 / np.square(1 + x)  # a variance is known in proportion to itself
         still, slope = _line(x, square, weight)
         # where no ray of any pair met anything, that is how little is known to be in the way
         least = (3 / 1.96 / (2 * len(a.w))) ** 2
         return cls(max(still, least), slope, float(np.sqrt(half.mean())), len(a.w))
 
-    def at(self, unevenness: Lanes, samples: NDArray[Any] | int) -> NDArray[np.float32]:
+    def at(self, neighbor_variation: Floats, samples: NDArray[Any] | int) -> NDArray[np.float32]:
         """(M,) standard error of each estimate."""
-        square = self.still + self.slope * unevenness.astype(np.float64)
+        square = self.still + self.slope * neighbor_variation.astype(np.float64)
         return (np.sqrt(square) / samples).astype(F)
 
 
-def _line(x: Lanes, y: Lanes, weight: Lanes) -> tuple[float, float]:
+def _line(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
     """Weighted least squares of y = a + b x with neither below 0."""
     s, sx, sy, sxx, sxy = (float(np.sum(weight * v)) for v in (np.ones_like(x), x, y, x * x, x * y))
     wide = s * sxx - sx * sx

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, columns, dot, rows
-from illumcli.geometry.scene_geometry import World
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
 from illumcli.rays.interaction import facets, facing
 from illumcli.rays.offsets import SHARE
@@ -57,7 +57,7 @@ class Groups(Record):
     room: NDArray[np.float64]  # (G,)
 
 
-class Horizon:
+class ClusterTree:
     """The vertices of occluders, asked what is above a plane; safe to ask from threads.
 
     The tree is built when a point is asked about that the vertices farthest out do not settle.
@@ -191,7 +191,7 @@ class Horizon:
         return group, cluster, told
 
 
-class OpenFacets:
+class OpenTriangles:
     """Which triangles have nothing above their plane, on either side; safe to ask from threads.
 
     All samples of a triangle look up from one plane, so each is settled once, with 63 others in a row: an
@@ -199,9 +199,9 @@ class OpenFacets:
     is open, as on a scanned mesh, no other is looked at.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SceneGeometry) -> None:
         self._world = world
-        self._horizon = Horizon(world.vertices, world.triangles)
+        self._horizon = ClusterTree(world.vertices, world.triangles)
         self._blocks = -(-len(world.triangles) // GROUP)  # of either side
         self._asked = np.zeros(2 * self._blocks, bool)
         self._clear = np.zeros(2 * self._blocks * GROUP, bool)
@@ -235,7 +235,7 @@ class OpenFacets:
 
 
 def facet_planes(
-    world: World, triangle: Ids, behind: NDArray[np.bool_]
+    world: SceneGeometry, triangle: Ids, behind: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Origins and unit normals of the planes of N triangles, (N, 3) each, on the side that is seen, lifted as
     rays are."""
@@ -245,7 +245,8 @@ def facet_planes(
     v0 = facet.position
     others = (rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
-    # no ray starts lower: |ng|.|p| of `lifted` is at least the distance of the plane from the centre
+    # no ray starts lower: |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the
+    # centre
     step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
     o = v0 + step[:, None] * n
     return np.ascontiguousarray(o), np.ascontiguousarray(n)

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Lanes, Vectors, columns, dot, length, rows, unit
-from illumcli.geometry.scene_geometry import CornerVectors, World
+from illumcli.arrays import F, Floats, Ids, Vectors, columns, dot, length, rows, unit
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.rays.embree import Tracer
-from illumcli.rays.interaction import Facets, facing
-from illumcli.rays.offsets import bounded, lifted, to_tangent_plane
+from illumcli.rays.interaction import SurfaceInteraction, facing
+from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.records import Record
-from illumcli.visibility.incident import Lit
+from illumcli.visibility.incident import LitPoints
 
 TERMINATOR_SHARE = 1 / 3
 """Of the diagonal of a polygon's bounding box: how far off it a shadow ray may start at most; normals may say
@@ -34,21 +34,21 @@ NEARBY = 2.0
 class SmoothSurface(Record):
     """The samples of a tile on the smooth surfaces that their normals imply."""
 
-    world: World
+    world: SceneGeometry
     normals: CornerVectors
     parts: SmoothParts
     weights: CornerWeights
-    facets: Facets
+    facets: SurfaceInteraction
     flat: NDArray[np.bool_]  # (O,) objects whose shadow rays start on their polygons
 
 
-def ray_origins(facets: Facets) -> Vectors:
+def ray_origins(facets: SurfaceInteraction) -> Vectors:
     """(M, 3) float32 where shadow and obscurance rays start: on the facet, off it by rounding alone."""
-    return lifted(facets.position, facets.ng, facets.edge)
+    return offset_ray_origins(facets.position, facets.ng, facets.edge)
 
 
 def shadow(
-    tracer: Tracer, origins: Vectors, lit: Lit, smooth: SmoothSurface | None = None
+    tracer: Tracer, origins: Vectors, lit: LitPoints, smooth: SmoothSurface | None = None
 ) -> NDArray[np.float32]:
     """(M,) delta: 1 where the light arrives, 0 in shadow and on samples that the light does not reach.
 
@@ -65,7 +65,7 @@ def shadow(
 
 
 def _implied_reached(
-    tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Lanes
+    tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Floats
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
     # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
@@ -80,7 +80,7 @@ def _implied_reached(
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
     ng, edge = rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))
-    starts = lifted(_at(position, curved) + _at(offset, curved), ng, edge)
+    starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
     curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
     height = length(_at(offset, curved))
     own = columns(rows(origins, sample.take(curved)))
@@ -112,7 +112,7 @@ def _terminator_offset(
     return weights.joined(way)
 
 
-def _box_diagonals(world: World, weights: CornerWeights) -> Lanes:
+def _box_diagonals(world: SceneGeometry, weights: CornerWeights) -> Floats:
     """(B,) the diagonal of the bounding box of the polygon under each sample, in radii."""
     out = np.empty(len(weights), F)
     for group in weights.groups:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, ClassVar, TypeAlias
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.schema.description import Description
 from illumcli.schema.fields import LARGEST, After, By, Positive, Tag
 
@@ -44,6 +44,6 @@ class Falloff(Description):
             return float("inf")
         return float(limit[:-1]) * radius if isinstance(limit, str) else limit
 
-    def weight(self, distance: Lanes, reach: float, radius: float) -> Any:
+    def weight(self, distance: Floats, reach: float, radius: float) -> Any:
         """(N,) mu at `distance` [scene units], which is inf where nothing was hit."""
         raise NotImplementedError

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.schema.fields import Positive
 from illumcli.visibility.falloffs._base import Falloff
 
@@ -24,7 +24,7 @@ class Exponential(Falloff):
     relative: bool = False
     """True: tau is counted per radius of the scene, so that scaling a scene changes nothing."""
 
-    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+    def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
         """(N,) by expm1, so that tau d of 1e-12 keeps its digits."""
         tau = self.tau / radius if self.relative else self.tau
         full = -np.expm1(-tau * reach)

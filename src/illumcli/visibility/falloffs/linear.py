@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.visibility.falloffs._base import Distance, Falloff
 
 
@@ -15,6 +15,6 @@ class Linear(Falloff):
     max_distance: Distance
     """d_max, scene units or `0.5r`."""
 
-    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+    def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
         """(N,) min(1, d / d_max)."""
         return np.minimum(distance / reach, 1).astype(distance.dtype)

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.schema.fields import Positive
 from illumcli.visibility.falloffs._base import Distance, Falloff
 
@@ -18,6 +18,6 @@ class Power(Falloff):
     exponent: Positive = 0.5
     """Below 1 near occluders matter most; 1 is the linear falloff."""
 
-    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+    def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
         """(N,) min(1, d / d_max)^exponent."""
         return np.power(np.minimum(distance / reach, 1), self.exponent).astype(distance.dtype)

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Lanes
+from illumcli.arrays import Floats
 from illumcli.visibility.falloffs._base import Falloff
 
 
@@ -15,6 +15,6 @@ class Step(Falloff):
 
     step: ClassVar[bool] = True
 
-    def weight(self, distance: Lanes, reach: float, radius: float) -> Lanes:
+    def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
         """(N,) 1 at and beyond reach, 0 before."""
         return (distance >= min(reach, float(np.finfo(distance.dtype).max))).astype(distance.dtype)

@@ -259,7 +259,8 @@ def test_faults_names_what_is_not_sound(store):
 
 
 def test_an_entry_that_another_process_took_away_is_no_fault(store, monkeypatch):
-    store.save(KEY, {}, arrays())
+    for key in (KEY, "b" * 32):
+        store.save(key, {}, arrays())
     found = store.entries()
     path_of(store).unlink()
     monkeypatch.setattr(store, "entries", lambda: found)
@@ -345,6 +346,23 @@ def test_the_end_of_a_run_that_kept_something_prunes(store, saves):
     again.limit = 8_100
     again.finish()
     assert path_of(store, "a" * 32).exists() != saves
+
+
+@pytest.mark.parametrize(("key", "prunes"), [("0" * 32, True), ("f" * 32, False)])
+def test_a_run_that_added_little_prunes_where_its_key_says_so(tmp_path, key, prunes):
+    large = Store(tmp_path)
+    large.save("a" * 32, {}, [np.zeros(60_000)])
+    os.utime(path_of(large, "a" * 32), (1000, 1000))
+    store = Store(tmp_path, limit=460_000)
+    store.save(key, {}, [np.zeros(3)])
+    store.finish()
+    assert path_of(store, "a" * 32).exists() != prunes
+
+
+def test_entries_that_stay_are_not_listed(store, monkeypatch):
+    store.save(KEY, {}, arrays())
+    monkeypatch.setattr(store, "entries", lambda: pytest.fail("listed"))
+    assert store.prune(store.limit).gone == ()
 
 
 def test_a_signal_leaves_no_part_of_an_entry(store):

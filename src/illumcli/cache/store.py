@@ -44,6 +44,9 @@ LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
 LARGEST_SHARE = 4
 """No entry takes more than this part of the limit."""
+SMALL, COUNTED = 1024, "00"
+"""A run that adds less than this part of the limit leaves the pruning to others, unless one of its keys
+begins with `COUNTED`, as one of 256 does: the limit may be outgrown by a quarter at worst, on average."""
 LONGEST = 1 << 24  # [bytes] of a description
 LARGE = 1 << 26
 """An entry of so many bytes is read only where it takes no more than `MEMORY_SHARE` of the free memory."""
@@ -56,6 +59,7 @@ _PIECE = 16 * 8 * _WORDS  # [bytes] read at a time: summed while the processor's
 _TYPE = re.compile("[<>|][biuf][1248]")
 _ENTRY = re.compile(r"[0-9a-f]+\.illum")
 _PART = re.compile(r"\.[0-9a-f]+\.[0-9]+\.[0-9a-f]{8}\.part")
+_ENTRY_OR_PART = re.compile(f"{_ENTRY.pattern}|{_PART.pattern}")
 """Names of what the store writes: nothing else in its folder is looked at or removed."""
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
@@ -102,7 +106,8 @@ class Store:
         self.limit = limit
         self.warning: str | None = None
         self._writes = True
-        self._fresh: int | None = None  # bytes added since the last pruning
+        self._fresh = 0  # bytes added since the last pruning
+        self._counts = False  # is the end of this run to prune?
 
     @property
     def largest(self) -> int:
@@ -176,31 +181,36 @@ class Store:
         fact = getattr(error, "strerror", None) or error
         self._warn(f"{self.folder}: cannot be written: {fact}; nothing more is kept there")
 
-    def saved(self, size: int) -> None:
+    def saved(self, key: str, size: int) -> None:
         """Note that an entry of so many bytes was added."""
-        self._fresh = (self._fresh or 0) + size
+        self._fresh += size
+        self._counts |= self._fresh * SMALL > self.limit or key.startswith(COUNTED)
         if (
             self._fresh > self.largest
         ):  # a long run does not outgrow the limit by more than one entry may take
             self._prune()
 
     def finish(self) -> None:
-        """Remove what killed runs left, and prune where this run added anything."""
+        """Remove what killed runs left, and prune where this run added much, or an entry whose key says so.
+
+        To count all entries takes 10 us each, to count them after every small run the square of their number.
+        """
         if self._writes and self._is_trusted():
-            if self._fresh is None:
-                self._remove_left_over()
-            else:
+            if self._counts:
                 self._prune()
+            else:
+                self._remove_left_over()
 
     def _prune(self) -> None:
         """Prune; what cannot be removed is a warning."""
-        self._fresh = 0
+        self._fresh, self._counts = 0, False
         for path, fact in self.prune(self.limit).stayed.items():
             self._warn(f"{path}: cannot be removed: {fact}; the cache takes more than its limit")
 
     def entries(self) -> list[Entry]:
         """Every entry, the least recently used first."""
-        return sorted(self._files(_ENTRY), key=lambda entry: (entry.used, entry.path))
+        found = sorted((used, name, size) for name, size, used in self._files(_ENTRY))
+        return [Entry(self.folder / name, size, used) for used, name, size in found]
 
     def faults(self) -> dict[Path, str]:
         """What is wrong with each entry that is not sound."""
@@ -218,8 +228,11 @@ class Store:
         """Take the least recently used entries away until all fit into `limit` bytes, those in the making
         included."""
         self._remove_left_over()
+        # entries that all stay are counted one by one, not listed: a record takes a kilobyte
+        if sum(size for _, size, _ in self._files(_ENTRY_OR_PART)) <= limit:
+            return Pruned((), {})
         entries, gone, stayed = self.entries(), [], {}
-        total = sum(entry.bytes for entry in [*entries, *self._files(_PART)])
+        total = sum(entry.bytes for entry in entries) + sum(size for _, size, _ in self._files(_PART))
         for entry in entries:
             if total <= limit:
                 break
@@ -233,11 +246,11 @@ class Store:
 
     def _remove_left_over(self) -> None:
         """Remove the temporary files of killed runs."""
-        for part in self._files(_PART):
-            if time.time() - part.used > ABANDONED:
-                removed(part.path)
+        for name, _, used in list(self._files(_PART)):
+            if time.time() - used > ABANDONED:
+                removed(self.folder / name)
             else:
-                atomic.remove_abandoned(part.path)
+                atomic.remove_abandoned(self.folder / name)
 
     def _is_trusted(self) -> bool:
         """May nobody but the user and root write to the folder, or is it not there?"""
@@ -249,17 +262,15 @@ class Store:
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}{SUFFIX}"
 
-    def _files(self, names: re.Pattern[str]) -> Iterator[Entry]:
-        try:
-            found = list(os.scandir(self.folder))
-        except OSError:
-            return
-        for each in found:
-            if names.fullmatch(each.name):
-                with suppress(OSError):
-                    status = each.stat(follow_symlinks=False)
-                    if not stat.S_ISDIR(status.st_mode):
-                        yield Entry(Path(each.path), status.st_size, status.st_mtime)
+    def _files(self, names: re.Pattern[str]) -> Iterator[tuple[str, int, float]]:
+        """Name, bytes and last use [s since the epoch] of each file whose name is one of `names`."""
+        with suppress(OSError), os.scandir(self.folder) as listing:
+            for each in listing:
+                if names.fullmatch(each.name):  # most stop at their first letter
+                    with suppress(OSError):
+                        status = each.stat(follow_symlinks=False)
+                        if not stat.S_ISDIR(status.st_mode):
+                            yield each.name, status.st_size, status.st_mtime
 
     def _warn(self, text: str) -> None:
         self.warning = self.warning or f"cache: {text}"
@@ -325,7 +336,7 @@ class Writer:
         with suppress(OSError):
             self._file.close()
         atomic.forget(self._part)
-        self._store.saved(self.bytes)
+        self._store.saved(self._target.stem, self.bytes)
 
     def _try(self, action: Any) -> None:
         if self._failed:

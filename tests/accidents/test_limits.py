@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 
 from illumcli import memory
-from illumcli.commands import limits
 from illumcli.errors import InputError, LimitError
+from illumcli.render_graph import limits
 
 TOO_LARGE = {
     "film": "film: {width: 1000000, height: 1000000}",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.commands.repairs import repairs
 from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
 from illumcli.render_graph.execute import RenderStats, bands, run_once
+from illumcli.render_graph.repairs import repairs
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load, unused_lines
 

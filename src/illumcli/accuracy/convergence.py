@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from illumcli import __version__
 from illumcli.accuracy.sampled import Sampler, Sampling, Subject, subject
 from illumcli.cache.store import Store
-from illumcli.commands.limits import expected_memory, refuse_memory
 from illumcli.commands.render import opened_store, versions
 from illumcli.errors import InputError
 from illumcli.rays.sampling import stream
 from illumcli.records import Value
 from illumcli.render_graph.keys import Keys, code, digest
+from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 

@@ -21,9 +21,7 @@ from illumcli.baking.outputs import shapes_of
 from illumcli.baking.points import Surfaces, Vertices, vertex_points
 from illumcli.baking.sampling import MOST_SAMPLES, BakeSampler, Occluders
 from illumcli.baking.values import baked_values
-from illumcli.commands.limits import expected_memory, refuse_memory
 from illumcli.commands.render import peak_memory
-from illumcli.commands.repairs import refuse_repairs, repairs_data
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import is_full
 from illumcli.files.journal import Journal, place, tidy
@@ -46,6 +44,8 @@ from illumcli.records import Record, Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.keys import code, digest
+from illumcli.render_graph.limits import expected_memory, refuse_memory
+from illumcli.render_graph.repairs import refuse_repairs, repairs_data
 from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.visibility.obscurance import Method

@@ -154,7 +154,7 @@ def ao_bake(
     from illumcli.baking.bake import Settings
     from illumcli.cli._progress import reporter
     from illumcli.commands import bake as job
-    from illumcli.commands.repairs import told
+    from illumcli.render_graph.repairs import repair_lines
 
     if samples is not None and target_error is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")
@@ -182,7 +182,7 @@ def ao_bake(
         if not quiet:
             for kept in done.kept:
                 click.echo(f"{kept}: kept, its content is the same", err=True)
-            for line in told(done.repairs, verbose):
+            for line in repair_lines(done.repairs, verbose):
                 click.echo(f"{source}: {line}", err=True)
             for text in dict.fromkeys(done.left_out):
                 click.echo(f"left out: {text}", err=True)

@@ -81,7 +81,7 @@ def render(
     """
     from illumcli.cli._progress import reporter
     from illumcli.commands import render_all as job
-    from illumcli.commands.repairs import told
+    from illumcli.render_graph.repairs import repair_lines
 
     def written(done: Rendered) -> None:
         found = done.report
@@ -92,7 +92,7 @@ def render(
             click.echo(path)
         for kept in [] if quiet else found.kept:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in [] if quiet else told(found.repairs, verbose):
+        for line in [] if quiet else repair_lines(found.repairs, verbose):
             click.echo(f"{done.scene}: {line}", err=True)
         for warning in found.warnings:
             click.echo(warning, err=True)

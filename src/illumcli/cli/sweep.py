@@ -94,7 +94,7 @@ def sweep(
     """
     from illumcli.cli._progress import reporter
     from illumcli.commands import sweep as job
-    from illumcli.commands.repairs import told
+    from illumcli.render_graph.repairs import repair_lines
 
     said: set[str] = set()
 
@@ -109,7 +109,7 @@ def sweep(
             click.echo(path)
         for kept in outcome.report.kept if not quiet else []:
             click.echo(f"{kept}: kept, its content is the same", err=True)
-        for line in told(outcome.report.repairs, verbose) if not quiet else []:
+        for line in repair_lines(outcome.report.repairs, verbose) if not quiet else []:
             if line not in said:
                 click.echo(f"{scene}: {line}", err=True)
             said.add(line)

@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from illumcli.commands.limits import expected_memory, refuse_memory
 from illumcli.commands.render import opened_store
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, why_all, without
 from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.framing import framed
+from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.schedule import Plan, plan, reusing
 from illumcli.scene.load import load
 

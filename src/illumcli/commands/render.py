@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.cache.store import Store, default_folder, default_limit
-from illumcli.commands.limits import expected_memory, refuse_disk, refuse_memory
-from illumcli.commands.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.outputs import is_kept, refresh
@@ -35,7 +33,9 @@ from illumcli.render_graph.culling import unseen_objects, without
 from illumcli.render_graph.execute import Planes, RenderStats, bands, run_once
 from illumcli.render_graph.framing import framed
 from illumcli.render_graph.keys import digest
+from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory
 from illumcli.render_graph.proportions import disproportion
+from illumcli.render_graph.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.render_graph.schedule import Plan, content_key, plan, read_by_others, reusing
 from illumcli.render_graph.stages import MOST, Tile
 from illumcli.scene.load import SceneFile, lacking_lines, load, refuse_outside, told, unused_lines

@@ -20,7 +20,7 @@ _TELLING = (
 """Buffers that say what was put right."""
 
 
-def told(repairs: Repairs, verbose: bool = True) -> list[str]:
+def repair_lines(repairs: Repairs, verbose: bool = True) -> list[str]:
     """A line per class; those of `HARMLESS` only if `verbose`."""
     return [
         f"{what}: {each.count}{f', the first is {each.first}' if each.first else ''}"
@@ -34,7 +34,7 @@ def refuse_repairs(place: str, repairs: Repairs) -> None:
     wrong = {what: each for what, each in repairs.items() if what not in APPROXIMATED}
     if wrong:
         way = "mend it, or leave --strict out"
-        raise InputError([f"{place}: {line}; {way}" for line in told(wrong)])
+        raise InputError([f"{place}: {line}; {way}" for line in repair_lines(wrong)])
 
 
 def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:

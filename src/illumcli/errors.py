@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 from collections.abc import Iterable
 
 
@@ -43,13 +44,14 @@ class OutputError(IllumError):
     exit_code = 5
 
 
-LITTLE_MEMORY = "out of memory; make the film, the meshes or the samples smaller"
+_SMALLER = "make the film, the meshes or the samples smaller"
+LITTLE_MEMORY = f"out of memory; {_SMALLER}"
 
 _LITTLE_MEMORY_TOO = ("start new thread", "allocate lock", "allocate read lock")
 """What Python calls RuntimeError where it has no memory."""
 
-_NO_REASON = ("without exception set", "without setting an exception")
-"""What becomes of a function of numpy that gets no memory."""
+_NO_REASON = re.compile("error return without exception set|<.*> returned NULL without setting an exception")
+"""What Python says of a function of a library that failed and gave no reason, as without memory."""
 
 
 def known(error: BaseException) -> IllumError | None:
@@ -70,6 +72,6 @@ def known(error: BaseException) -> IllumError | None:
             return LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again")
         case RuntimeError() if any(fact in str(error) for fact in _LITTLE_MEMORY_TOO):
             return LimitError(LITTLE_MEMORY)
-        case SystemError() if any(fact in str(error) for fact in _NO_REASON):
-            return LimitError(LITTLE_MEMORY)
+        case SystemError() if _NO_REASON.fullmatch(str(error)):
+            return LimitError(f"{error}: most often for want of memory; {_SMALLER}, or report it as a fault")
     return None

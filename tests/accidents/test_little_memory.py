@@ -14,10 +14,14 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from illumcli.errors import LimitError, known
+from illumcli.images.oiio import ExrFile
+from illumcli.images.writer import Refused
 from illumcli.schema.families import modules
 
 SHIM = """
@@ -148,6 +152,24 @@ def test_too_little_memory_is_known_by_all_its_names():
         assert isinstance(known(error), LimitError), error
     assert known(RuntimeError("other")) is None
     assert known(SystemError("other")) is None
+
+
+def test_a_library_that_gives_no_reason_is_named_and_a_quotation_of_it_is_another_fault():
+    said = "<ufunc 'add'> returned NULL without setting an exception"
+    assert said in str(known(SystemError(said)))
+    assert "report it" in str(known(SystemError(said)))
+    assert known(SystemError(f"a check of ours: {said} was expected")) is None
+
+
+def test_an_exr_that_gets_no_memory_to_be_compressed_is_beyond_a_limit(tmp_path):
+    file = ExrFile(tmp_path / "a.exr", 8, 8, {"Y": "half"}, {})
+    band = np.zeros((8, 8, 1), np.float16)
+    said = 'Failed OpenEXR write: Failed to write pixel data to image file "a.exr". '
+    for fact, kind in (("Unable to run compression routine", MemoryError), ("No space left", Refused)):
+        answers = {"geterror": lambda fact=fact: said + fact, "write_scanlines": lambda *_: False}
+        file._output = SimpleNamespace(**answers)
+        with pytest.raises(kind):
+            file.write(band)
 
 
 def test_a_folder_of_modules_that_cannot_be_listed_is_not_taken_for_an_empty_one(monkeypatch):

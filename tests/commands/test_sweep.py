@@ -279,6 +279,14 @@ def test_faults_of_values_are_told_first_and_the_other_variants_are_done(illum, 
     assert "t.csv: a different file is there" in mended.stderr
 
 
+def test_warnings_are_told_where_a_variant_failed_too(illum, scene):
+    tent = "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"
+    done = illum("sweep", scene, "-D", "materials.clay.exponent=-1,4", "-D", tent)
+    assert done.returncode == 2
+    assert "a single sample looks" in done.stderr
+    assert "1 of 2 variants failed" in done.stderr
+
+
 def test_names_that_clash_are_told_before_anything_is_rendered(illum, scene, tmp_path):
     clash = illum("sweep", scene, "-D", "ambient=0.1,0.2", "-o", "same.png")
     assert clash.returncode == 2

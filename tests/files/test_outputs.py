@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 
@@ -61,6 +62,18 @@ def test_images_say_their_content(tmp_path, suffix):
     assert is_kept(path, ["one"])
     with pytest.raises(OutputError):
         is_kept(path, ["two"])
+
+
+def test_a_file_that_cannot_be_read_is_told_so(tmp_path, monkeypatch):
+    def refuse(path):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    path = tmp_path / "p.png"
+    path.write_bytes(b"")
+    monkeypatch.setattr(outputs, "is_sealed", refuse)
+    with pytest.raises(OutputError, match="cannot be read: Permission denied; use --force"):
+        is_kept(path, ["one"])
+    assert not is_kept(path, ["one"], force=True)
 
 
 def test_what_was_incomplete_is_replaced(tmp_path):

@@ -149,7 +149,7 @@ def run(
     if any(outcome.report for outcome in sweep.outcomes):
         spared = to_write.write(sweep.outcomes)
         sweep.kept = list(to_write.kept)
-    batch.finish(*spared)
+    batch.finish(*sweep.warnings, *spared)
     return sweep
 
 

@@ -44,7 +44,7 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
     """
     with refusals(str(path)):
         if path.is_file() and not force:
-            stored = stored_contents(path)
+            stored = _readable_contents(path)
             if stored == list(contents) and INCOMPLETE not in stored:
                 return True
             pairs = zip(stored, contents, strict=False)
@@ -55,6 +55,15 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
             refuse_empty_link(path)
     refuse_unwritable(path)
     return False
+
+
+def _readable_contents(path: Path) -> list[str]:
+    """The same as `stored_contents`; OutputError where the file there cannot be read."""
+    try:
+        return stored_contents(path)
+    except OSError as error:
+        fact = f"a file is there that cannot be read: {error.strerror or error}"
+        raise OutputError(f"{path}: {fact}; use --force to replace it, or another name") from error
 
 
 def refuse_empty_link(path: Path) -> None:

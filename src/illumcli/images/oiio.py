@@ -41,6 +41,8 @@ _HINTS: Mapping[str, Any] = {
     "colorInteropID": "lin_rec709_scene",
     "DateTime": "",  # no time of day: equal renders are equal files
 }
+# the last: deflate fails for nothing else
+_LITTLE_MEMORY = ("OUT_OF_MEMORY", "bad_alloc", "Unable to run compression routine")
 _SIGNATURES = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"RIFF": ".webp"}
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
@@ -133,7 +135,7 @@ class ExrFile:
         """Neither the answer nor the message alone can be trusted to tell of a failure."""
         message = self._output.geterror()
         if not success or message:
-            if "OUT_OF_MEMORY" in message or "bad_alloc" in message:
+            if any(fact in message for fact in _LITTLE_MEMORY):
                 raise MemoryError
             raise Refused(message or "no reason given")
 

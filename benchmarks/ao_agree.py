@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from _bench import SMALL, header
-from illumcli.arrays import F, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, column_major, cross, dot, length, take_rows, unit
 from illumcli.baking.bake import Settings, run
 from illumcli.files.vertex_data import read_npz
 from illumcli.graph import order
@@ -56,7 +56,10 @@ class Pictures:
         """(M,) obscurance at points on triangles with (M, 3) barycentric weights."""
         world = self.known["world"]
         triangle, (_, u, v) = triangle.astype(np.int32), weights.T.astype(F)
-        a, b, c = (columns(rows(world.vertices, world.triangles[triangle, k]), np.float64) for k in range(3))
+        a, b, c = (
+            column_major(take_rows(world.vertices, world.triangles[triangle, k]), np.float64)
+            for k in range(3)
+        )
         own = dict(self.known)
         own["hits"] = Hits(np.arange(len(triangle), dtype=np.int32), triangle, u, v)
         own["facets"] = facets(world, triangle, u, v, unit(cross(b - a, c - a)))
@@ -70,13 +73,13 @@ class Pictures:
 def around(pictures: Pictures, corner: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
     """(K * AROUND,) triangles and (K * AROUND, 3) weights of points close to K corners."""
     world, normals = pictures.known["world"], pictures.known["corner_normals"]
-    places = [columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+    places = [column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
     ahead, back = ([places[(k + s) % 3] - places[k] for k in range(3)] for s in (1, 2))
     areas = [length(cross(a, b)) for a, b in zip(ahead, back, strict=True)]
     angle = np.stack(
         [np.arctan2(areas[k], dot(ahead[k], back[k])) * (areas[k] > 0) for k in range(3)], axis=1
     )
-    vertex, own = world.triangles.ravel(), rows(normals.values, normals.index[world.corners.ravel()])
+    vertex, own = world.triangles.ravel(), take_rows(normals.values, normals.index[world.corners.ravel()])
     by_vertex = np.argsort(vertex, kind="stable")
     begins = np.searchsorted(vertex[by_vertex], np.arange(len(world.vertices) + 1))
     triangles, weights = [], []
@@ -129,7 +132,7 @@ def agreement(path: Path, folder: Path) -> list[float]:
     z = (w[at] - found.mean(axis=1)) / np.hypot(spread, error[at])
 
     # all over the area
-    a, b, c = (columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
+    a, b, c = (column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
     area = length(cross(b - a, c - a))
     triangle = random.choice(len(area), POINTS, p=area / area.sum())
     weights = random.dirichlet((1, 1, 1), POINTS)

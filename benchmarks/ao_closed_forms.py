@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from illumcli.arrays import F, columns
+from illumcli.arrays import F, column_major
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place
 from illumcli.rays.embree import Tracer
@@ -110,7 +110,7 @@ def estimated(case: Any, samples: int) -> Found:
     rng = np.random.default_rng(1)
 
     def cast(count: int) -> Estimates:
-        ng = columns(np.tile([0.0, 0.0, 1.0], (count, 1)), F)
+        ng = column_major(np.tile([0.0, 0.0, 1.0], (count, 1)), F)
         here = np.tile(world.frame.from_world(np.zeros(3)), (count, 1))
         origins = offset_ray_origins(here, ng, np.full(count, edge))
         method = Method(samples, falloff, world.frame.radius)

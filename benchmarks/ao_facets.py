@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from _bench import SMALL, header
-from illumcli.arrays import F, columns, dot, length, rows, unit
+from illumcli.arrays import F, column_major, dot, length, take_rows, unit
 from illumcli.baking.bake import bare
 from illumcli.graph import order
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
@@ -50,10 +50,12 @@ def beside(world: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
     weights[np.arange(len(side)), k] = INSIDE
     u, v = weights[:, 1], weights[:, 2]
     triangle = triangle.astype(np.int32)
-    corner = [columns(rows(world.vertices, world.triangles[triangle, k]), np.float64) for k in range(3)]
+    corner = [
+        column_major(take_rows(world.vertices, world.triangles[triangle, k]), np.float64) for k in range(3)
+    ]
     front = unit(np.cross(corner[1] - corner[0], corner[2] - corner[0]))
     hits = Hits(np.arange(len(side), dtype=np.int32), triangle, u, v)
-    return hits, facets(world, triangle, u, v, columns(front, np.float64))
+    return hits, facets(world, triangle, u, v, column_major(front, np.float64))
 
 
 def jumps(path: Path) -> tuple[int, float, float, float]:
@@ -80,9 +82,9 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     method = Method(RAYS, Step(), world.frame.radius)
     found = []
     for seed, (_, facet, normal) in enumerate([*sides, sides[0]]):
-        own = SurfaceInteraction(*(rows(values, few) for values in vars(facet).values()))
+        own = SurfaceInteraction(*(take_rows(values, few) for values in vars(facet).values()))
         origins, draws = ray_origins(own), np.random.default_rng(seed).random((2, len(few)))
-        about = Hemispheres(own.ng, origins), Hemispheres(rows(normal, few), origins, own.ng)
+        about = Hemispheres(own.ng, origins), Hemispheres(take_rows(normal, few), origins, own.ng)
         found.append([estimates(made["tracer"], over, draws, method).w for over in about])
     geometric, shading = (float(np.abs(found[0][k] - found[1][k]).mean()) for k in (0, 1))
     return len(few), geometric, shading, float(np.abs(found[0][1] - found[2][1]).mean())

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from ao_error import caster
-from illumcli.arrays import F, rows
+from illumcli.arrays import F, take_rows
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.visibility import obscurance
 from illumcli.visibility.obscurance import about, directions, mirror_below
@@ -48,7 +48,7 @@ def main() -> None:
             over = bake.points.hemispheres(part, draws[2])
             d = directions(about(over.n, draws, bake.method), draws, bake.method)
             mirror_below(d, over, bake.method)
-            origins = rows(over.origins, over.of_rays(SAMPLES))
+            origins = take_rows(over.origins, over.of_rays(SAMPLES))
             calls.append((np.ascontiguousarray(origins), np.ascontiguousarray(d)))
         return calls
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from illumcli.arrays import F, columns, cross, unit
+from illumcli.arrays import F, column_major, cross, unit
 from illumcli.schema.families import member, tags
 from illumcli.shading import terms
 
@@ -38,9 +38,9 @@ def best(run: Callable[[], object]) -> float:
 def lanes() -> dict[str, np.ndarray]:
     """Directions above a surface whose normal and tangent turn from lane to lane."""
     random = np.random.default_rng(0)
-    n = unit(columns(random.normal(size=(LANES, 3)), F))
-    t = unit(cross(n, unit(columns(random.normal(size=(LANES, 3)), F))))
-    l, v = (unit(unit(columns(random.normal(size=(LANES, 3)), F)) + n) for _ in range(2))
+    n = unit(column_major(random.normal(size=(LANES, 3)), F))
+    t = unit(cross(n, unit(column_major(random.normal(size=(LANES, 3)), F))))
+    l, v = (unit(unit(column_major(random.normal(size=(LANES, 3)), F)) + n) for _ in range(2))
     return {"n": n, "l": l, "v": v, "t": t, "light": np.ones((LANES, 3), F, order="F")}
 
 

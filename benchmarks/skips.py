@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from illumcli.arrays import rows
+from illumcli.arrays import take_rows
 from illumcli.models._base import IlluminationModel
 from illumcli.render_graph import build as recipes
 from illumcli.render_graph import stages
@@ -80,7 +80,9 @@ def asked(light, frame, points, shadow):
     """Every lane that is not in shadow, those that get nothing with strength 0."""
     lit = everywhere(light, frame, points.position, points.n)
     free = np.flatnonzero(shadow)
-    lane, l, distance, strength = (rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength))
+    lane, l, distance, strength = (
+        take_rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength)
+    )
     return arriving.LitPoints(lane, lit.count, l, distance, strength)
 
 

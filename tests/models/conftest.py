@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from illumcli.arrays import columns, dot, unit
+from illumcli.arrays import column_major, dot, unit
 from illumcli.shading.terms import TERMS, evaluate, steps
 
 Case = dict[str, Any]
@@ -21,7 +21,7 @@ Case = dict[str, Any]
 def unit_vectors(inputs: dict[str, Any]) -> dict[str, np.ndarray]:
     """(1, 3) unit vectors of a case in float64; the tangent at right angles to the normal."""
     words = {
-        word: unit(columns([inputs[word]], np.float64))
+        word: unit(column_major([inputs[word]], np.float64))
         for word in ("n", "l", "v", "t", "h")
         if word in inputs
     }

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
-from illumcli.arrays import columns, cross, dot, unit
+from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema import schema_of
 from illumcli.models._base import IlluminationModel
 from illumcli.schema.description import Description
@@ -113,8 +113,8 @@ def directions(seed, count, dtype=np.float64, least=0.0):
     With `least` > 0, light and eye are at least that cosine above the surface.
     """
     random = np.random.default_rng(seed)
-    n = unit(columns(random.normal(size=(count, 3))))
-    t = unit(cross(n, unit(columns(random.normal(size=(count, 3))))))
+    n = unit(column_major(random.normal(size=(count, 3))))
+    t = unit(cross(n, unit(column_major(random.normal(size=(count, 3))))))
     b = cross(n, t)
 
     def above():
@@ -124,7 +124,7 @@ def directions(seed, count, dtype=np.float64, least=0.0):
         height = least + (1 - least) * height
         turn = random.random(count) * 2 * np.pi
         level = np.sqrt((1 - height) * (1 + height))
-        return columns(
+        return column_major(
             height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
         )
 
@@ -141,9 +141,9 @@ def directions(seed, count, dtype=np.float64, least=0.0):
         v[kind == 5] = n[kind == 5]
         v = unit(v)
     given = {"n": n, "t": t, "l": l, "v": v}
-    given = {name: columns(value.astype(dtype)) for name, value in given.items()}
+    given = {name: column_major(value.astype(dtype)) for name, value in given.items()}
     lit = dot(given["n"], given["l"]) > 0
-    given = {name: columns(value[lit]) for name, value in given.items()}
+    given = {name: column_major(value[lit]) for name, value in given.items()}
     return given | {"light": np.array([1, 0.5, 0.25], dtype)}
 
 
@@ -236,7 +236,7 @@ def test_a_batch_equals_its_rows(Model, data, seed):
     batch = evaluate(lobes, given)
     for row in range(len(given["l"])):
         alone = evaluate(
-            lobes, {name: x if x.ndim == 1 else columns(x[row : row + 1]) for name, x in given.items()}
+            lobes, {name: x if x.ndim == 1 else column_major(x[row : row + 1]) for name, x in given.items()}
         )
         for name in lobes:
             np.testing.assert_array_equal(alone[name][0], batch[name][row])
@@ -261,7 +261,9 @@ def varied(part, count, prefix=""):
         annotation = str(type(part).fields()[name].kind)
         if isinstance(value, float | tuple) and "VertexValues" in annotation:
             found[prefix + name] = (
-                columns(np.tile(value, (count, 1))) if isinstance(value, tuple) else np.full(count, value)
+                column_major(np.tile(value, (count, 1)))
+                if isinstance(value, tuple)
+                else np.full(count, value)
             )
         elif isinstance(value, Description):
             found |= varied(value, count, f"{prefix}{name}.")
@@ -310,10 +312,10 @@ def albedo(model, cosine, turn=0.0):
     count = len(x)
     sine = np.sqrt(1 - cosine**2)
     given = {
-        "l": columns(np.stack([level * np.cos(p), level * np.sin(p), height], 1)),
-        "v": columns(np.tile([sine * np.cos(turn), sine * np.sin(turn), cosine], (count, 1))),
-        "n": columns(np.tile([0.0, 0.0, 1.0], (count, 1))),
-        "t": columns(np.tile([1.0, 0.0, 0.0], (count, 1))),
+        "l": column_major(np.stack([level * np.cos(p), level * np.sin(p), height], 1)),
+        "v": column_major(np.tile([sine * np.cos(turn), sine * np.sin(turn), cosine], (count, 1))),
+        "n": column_major(np.tile([0.0, 0.0, 1.0], (count, 1))),
+        "t": column_major(np.tile([1.0, 0.0, 0.0], (count, 1))),
         "light": np.ones(3),
     }
     area = np.repeat(weight / 2 * 2 * u, 96) * 2 * np.pi / 96
@@ -326,7 +328,7 @@ def turned(given, angle):
 
     def turn(w):
         along = dot(n, w)[:, None] * n
-        return columns(along + np.cos(angle) * (w - along) + np.sin(angle) * cross(n, w))
+        return column_major(along + np.cos(angle) * (w - along) + np.sin(angle) * cross(n, w))
 
     return given | {"l": turn(given["l"]), "v": turn(given["v"])}
 

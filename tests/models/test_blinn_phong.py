@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.arrays import columns
+from illumcli.arrays import column_major
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.shading.terms import evaluate
 
@@ -44,8 +44,8 @@ def test_the_half_vector_opens_half_as_fast_in_the_plane_of_incidence(respond):
 def test_normalised_reflects_its_shares_on_the_normal(exponent):
     node, weight = np.polynomial.legendre.leggauss(100)
     height = (1 + node) / 2
-    l = columns(np.stack([np.sqrt(1 - height**2), 0 * height, height], 1))
-    up = columns(np.tile([0.0, 0.0, 1.0], (len(l), 1)))
+    l = column_major(np.stack([np.sqrt(1 - height**2), 0 * height, height], 1))
+    up = column_major(np.tile([0.0, 0.0, 1.0], (len(l), 1)))
     model = BlinnPhong(diffuse=(0.5,) * 3, specular=(0.3,) * 3, exponent=exponent, normalised=True)
     lobes = evaluate(model.lobes(), {"n": up, "l": l, "v": up})
     for name, share in (("diffuse", 0.5), ("specular", 0.3)):

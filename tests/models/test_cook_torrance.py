@@ -74,13 +74,13 @@ def test_roughness_may_vary_over_the_surface(respond):
 @pytest.mark.parametrize("m", [0.3, 0.6])
 def test_a_mirror_surface_reflects_the_published_share(m):
     """Directional albedo at normal incidence with F = 1, four digits: 0.9956 and 0.7976."""
-    from illumcli.arrays import columns
+    from illumcli.arrays import column_major
     from illumcli.shading.terms import evaluate
 
     node, weight = np.polynomial.legendre.leggauss(200)
     theta = (1 + node) * np.pi / 4
-    l = columns(np.stack([np.sin(theta), 0 * theta, np.cos(theta)], 1))
-    up = columns(np.tile([0.0, 0.0, 1.0], (len(l), 1)))
+    l = column_major(np.stack([np.sin(theta), 0 * theta, np.cos(theta)], 1))
+    up = column_major(np.tile([0.0, 0.0, 1.0], (len(l), 1)))
     model = CookTorrance(
         diffuse_weight=0.0,
         specular_weight=1.0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.arrays import columns
+from illumcli.arrays import column_major
 from illumcli.models.lambert import Lambert
 from illumcli.models.oren_nayar import OrenNayar, oren_nayar_terms
 from illumcli.shading.terms import evaluate
@@ -57,9 +57,9 @@ def test_albedo_of_the_qualitative_form_in_closed_form(cases, agree):
             theta = low + (1 + node) * (high - low) / 2
             phi = (1 + node) * np.pi / 4  # the term is 0 beyond a right angle, symmetric about 0
             T, P = (grid.ravel() for grid in np.meshgrid(theta, phi))
-            l = columns(np.stack([np.sin(T) * np.cos(P), np.sin(T) * np.sin(P), np.cos(T)], 1))
-            v = columns(np.tile([np.sin(i["theta"]), 0, np.cos(i["theta"])], (len(T), 1)))
-            n = columns(np.tile([0.0, 0.0, 1.0], (len(T), 1)))
+            l = column_major(np.stack([np.sin(T) * np.cos(P), np.sin(T) * np.sin(P), np.cos(T)], 1))
+            v = column_major(np.tile([np.sin(i["theta"]), 0, np.cos(i["theta"])], (len(T), 1)))
+            n = column_major(np.tile([0.0, 0.0, 1.0], (len(T), 1)))
             lobes = grey(i, "qualitative").lobes()
             bright = evaluate(lobes, {"n": n, "l": l, "v": v})["diffuse"][:, 0]
             dark = evaluate(lobes, {"n": n, "l": l * [-1, -1, 1], "v": v})["diffuse"][:, 0]

@@ -33,16 +33,20 @@ def test_quadrature_of_a_constant_highlight_is_the_closed_form(cases, respond):
 
 @pytest.mark.parametrize("exponent", [0.5, 3.0, 100.0, 1e4, 1e6])
 def test_single_precision_holds_the_quadrature(exponent):
-    from illumcli.arrays import F, columns, cross, unit
+    from illumcli.arrays import F, column_major, cross, unit
     from illumcli.shading.terms import evaluate
 
     random = np.random.default_rng(3)
-    n = unit(columns(random.normal(size=(4000, 3))))
-    t = unit(cross(n, unit(columns(random.normal(size=(4000, 3))))))
-    l = unit(unit(columns(random.normal(size=(4000, 3)))) + 1.1 * n)
-    v = unit(2 * np.sum(n * l, 1)[:, None] * n - l + 0.1 * columns(random.normal(size=(4000, 3))) + 0.1 * n)
+    n = unit(column_major(random.normal(size=(4000, 3))))
+    t = unit(cross(n, unit(column_major(random.normal(size=(4000, 3))))))
+    l = unit(unit(column_major(random.normal(size=(4000, 3)))) + 1.1 * n)
+    v = unit(
+        2 * np.sum(n * l, 1)[:, None] * n - l + 0.1 * column_major(random.normal(size=(4000, 3))) + 0.1 * n
+    )
     seen = np.sum(n * v, 1) > 0.05
-    given = {name: columns(value[seen].astype(F)) for name, value in {"n": n, "t": t, "l": l, "v": v}.items()}
+    given = {
+        name: column_major(value[seen].astype(F)) for name, value in {"n": n, "t": t, "l": l, "v": v}.items()
+    }
     lobes = PoulinFournier(diffuse=(0, 0, 0), exponent=exponent).lobes()
     single = evaluate(lobes, given)["specular"]
     double = evaluate(lobes, {name: value.astype(float) for name, value in given.items()})["specular"]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from illumcli.arrays import columns
+from illumcli.arrays import column_major
 from illumcli.geometry import planar
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
@@ -246,11 +246,11 @@ def test_polygons_that_are_flat_by_their_normals_are_left_out_where_nothing_else
     up, lean = [0, 0, 1], [0.6, 0, 0.8]
     index = np.zeros(10, np.int32)
     index[8] = 1
-    found = planar_polygons(world, CornerVectors(columns([up, lean], F), index))
+    found = planar_polygons(world, CornerVectors(column_major([up, lean], F), index))
     assert (found.row >= 0).tolist() == [False] * 4 + [True] * 2
-    assert planar_polygons(world, CornerVectors(columns([up, lean], F), index * 0)) is None
-    assert planar_polygons(world, CornerVectors(-columns([up, lean], F), index * 0)) is None
-    leaning = planar_polygons(world, CornerVectors(columns([up, lean], F), index * 0 + 1))
+    assert planar_polygons(world, CornerVectors(column_major([up, lean], F), index * 0)) is None
+    assert planar_polygons(world, CornerVectors(-column_major([up, lean], F), index * 0)) is None
+    leaning = planar_polygons(world, CornerVectors(column_major([up, lean], F), index * 0 + 1))
     assert (leaning.row >= 0).all()
 
 
@@ -308,9 +308,9 @@ def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across(
         u, v = np.linalg.solve(np.stack([b - a, c - a], axis=1), (at - a).T)  # beyond the triangle too
         first = np.zeros(len(width), np.int32)
         weights = corner_weights(world, planar_polygons(world), first, u.astype(F), v.astype(F))
-        normals = CornerVectors(columns(lean[None], F), np.zeros(4, np.int32))
+        normals = CornerVectors(column_major(lean[None], F), np.zeros(4, np.int32))
         facets = SurfaceInteraction(
-            at, columns(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_)
+            at, column_major(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_)
         )
         bent = lean - (width * (1 - width) * 3 * 1.2)[:, None] * [1, 0, 0]
         wanted = bent / np.linalg.norm(bent, axis=1)[:, None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.arrays import columns, dot, length
+from illumcli.arrays import column_major, dot, length
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place, rotation, world_uvs
 from illumcli.geometry.shapes.cylinder import Cylinder
@@ -92,7 +92,7 @@ def test_rings_are_the_way_a_point_takes_when_the_object_turns(matrix):
     turned = own + 1e-6 * np.cross(axis, own - centre)
     linear = matrix[:3, :3]
     wanted = unit_rows((turned - own) @ linear.T)
-    found = rings(linear, axis, linear @ centre, columns(own @ linear.T))
+    found = rings(linear, axis, linear @ centre, column_major(own @ linear.T))
     np.testing.assert_allclose(found, wanted, atol=1e-8)
 
 
@@ -102,8 +102,8 @@ def test_on_the_axis_there_is_no_ring():
 
 def test_tangents_stand_on_the_normal_whatever_the_grain():
     random = np.random.default_rng(2)
-    n = columns(unit_rows(random.normal(size=(300, 3))), F)
-    grain = columns(unit_rows(random.normal(size=(300, 3))), F)
+    n = column_major(unit_rows(random.normal(size=(300, 3))), F)
+    grain = column_major(unit_rows(random.normal(size=(300, 3))), F)
     grain[:100] = n[:100] * random.choice([-1, 1], 100)[:, None]
     grain[100:200] = 0
     t = tangent(n, grain)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli import __version__
-from illumcli.arrays import F, columns, cross, rows, unit
+from illumcli.arrays import F, column_major, cross, take_rows, unit
 from illumcli.baking.outputs import shapes_of
 from illumcli.baking.points import Surfaces, Vertices, vertex_points
 from illumcli.baking.sampling import MOST_SAMPLES, BakeSampler, Occluders
@@ -415,8 +415,8 @@ def _occluders(world: SceneGeometry, things: tuple[int, ...], settings: Settings
         vertices, triangles = _with_ground(vertices, triangles, world.triangles, "xyz".index(settings.ground))
     facets = None
     if settings.faces != "count":
-        corner = [columns(rows(vertices, triangles[:, k]), np.float64) for k in range(3)]
-        facets = columns(unit(cross(corner[1] - corner[0], corner[2] - corner[0])), F)
+        corner = [column_major(take_rows(vertices, triangles[:, k]), np.float64) for k in range(3)]
+        facets = column_major(unit(cross(corner[1] - corner[0], corner[2] - corner[0])), F)
     return Occluders(Tracer(vertices, triangles), ClusterTree(vertices, triangles), facets)
 
 

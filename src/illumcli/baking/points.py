@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.rays.interaction import facets, with_facet
 from illumcli.rays.offsets import offset_ray_origins
@@ -109,25 +109,30 @@ class VertexPoints(Points):
         turn = place / STARTS * whole[own] - (upto - before - angle)[own]
         turn = turn.clip(0, angle[own]).astype(F)
         base, ahead, aside, ng = self._fans(wedge)
-        origins = rows(base, own)
-        origins += np.cos(turn)[:, None] * rows(ahead, own)
-        origins += np.sin(turn)[:, None] * rows(aside, own)
-        return Hemispheres(rows(self.n, lanes), origins, rows(ng, own))
+        origins = take_rows(base, own)
+        origins += np.cos(turn)[:, None] * take_rows(ahead, own)
+        origins += np.sin(turn)[:, None] * take_rows(aside, own)
+        return Hemispheres(take_rows(self.n, lanes), origins, take_rows(ng, own))
 
     def _fans(self, wedge: NDArray[np.int64]) -> tuple[Vectors, Vectors, Vectors, Vectors]:
         """Of some wedges: the corner, lifted off its triangle, and two steps inside, along the next edge and
         at right angles to it; the triangle's normal: (K, 3) float32 each."""
         vertex, triangle = self.wedges.vertex[wedge], self.wedges.triangle[wedge]
         corner, following, last = (
-            columns(rows(self.world.vertices, vertex[:, k]), np.float64) for k in range(3)
+            column_major(take_rows(self.world.vertices, vertex[:, k]), np.float64) for k in range(3)
         )
         of = self.triangles
-        ng, edge, height = (rows(values, triangle) for values in (of.ng, of.edge, of.height))
+        ng, edge, height = (take_rows(values, triangle) for values in (of.ng, of.edge, of.height))
         ahead, back = following - corner, last - corner
         reach = np.minimum(INSIDE * np.sqrt(np.minimum(dot(ahead, ahead), dot(back, back))), height / 4)
         normal = ng.astype(np.float64)
         along = unit(ahead - dot(ahead, normal)[:, None] * normal) * reach[:, None]
-        return offset_ray_origins(corner, ng, edge), columns(along, F), columns(cross(normal, along), F), ng
+        return (
+            offset_ray_origins(corner, ng, edge),
+            column_major(along, F),
+            column_major(cross(normal, along), F),
+            ng,
+        )
 
     def above(self, clear: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if not len(self.number):
@@ -165,14 +170,18 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
 
     # the corners that can cast rays: those with a normal and a triangle beside them
     own = normals.index >= 0
-    n = rows(normals.values, np.maximum(normals.index, 0)) if len(normals.values) else np.zeros((0, 3), F)
+    n = (
+        take_rows(normals.values, np.maximum(normals.index, 0))
+        if len(normals.values)
+        else np.zeros((0, 3), F)
+    )
     corner_angle = np.bincount(owner, angle, len(vertex)).astype(np.float64)
     has = own & (dot(n, n) > 0.25) & (corner_angle > 0)
     casting = np.flatnonzero(has)
     thing = _thing_of_vertex(world)
-    side, first_corner = _sides(vertex[casting], rows(n, casting))
+    side, first_corner = _sides(vertex[casting], take_rows(n, casting))
     first_corner = casting[first_corner]
-    into, first = _points_of(world, thing, vertex[first_corner], rows(n, first_corner))
+    into, first = _points_of(world, thing, vertex[first_corner], take_rows(n, first_corner))
     row = np.full(len(vertex), -1, np.int64)
     row[casting] = into[side]
 
@@ -186,8 +195,8 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     at = vertex[corner]
     points = VertexPoints(
         world,
-        columns(rows(n, corner), F),
-        columns(rows(world.vertices, at), F),
+        column_major(take_rows(n, corner), F),
+        column_major(take_rows(world.vertices, at), F),
         _numbers(at, len(world.vertices)),
         thing[at],
         wedges,
@@ -219,7 +228,7 @@ def _triangles(world: SceneGeometry) -> Triangles:
     every = np.arange(len(world.triangles), dtype=np.int32)
     zero = np.zeros(len(every), F)
     facet = facets(world, every, zero, zero, np.zeros((len(every), 3), F))
-    corner = [columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+    corner = [column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
     edges = [corner[k - 2] - corner[k] for k in range(3)]
     area = length(cross(edges[0], edges[1]))
     longest = np.maximum.reduce([length(edge) for edge in edges])
@@ -243,7 +252,7 @@ def _wedges(
     vertices = np.concatenate(turned) if len(sound) else np.zeros((0, 3), np.int32)
     owner = np.concatenate([corner[:, k] for k in range(3)]).astype(np.int64)
     of = np.tile(sound.astype(np.int32), 3)
-    angle = np.concatenate([_angles(world, each, rows(ng, sound)) for each in turned])
+    angle = np.concatenate([_angles(world, each, take_rows(ng, sound)) for each in turned])
 
     # and at those that have none, between the nearest corners of their polygon that lie elsewhere
     alone = np.ones(len(vertex), bool)
@@ -261,13 +270,15 @@ def _wedges(
         more[~forwards] = more[~forwards][:, [0, 2, 1]]
         owner, of = np.concatenate([owner, left]), np.concatenate([of, own])
         vertices = np.concatenate([vertices, more])
-        angle = np.concatenate([angle, _angles(world, more, rows(ng, own))])
+        angle = np.concatenate([angle, _angles(world, more, take_rows(ng, own))])
     return owner, of, vertices, angle
 
 
 def _angles(world: SceneGeometry, vertex: NDArray[np.int32], ng: Vectors) -> NDArray[np.float64]:
     """(K,) from the next corner to the previous one about the normal, from 0 to a whole turn [rad]."""
-    corner, following, last = (columns(rows(world.vertices, vertex[:, k]), np.float64) for k in range(3))
+    corner, following, last = (
+        column_major(take_rows(world.vertices, vertex[:, k]), np.float64) for k in range(3)
+    )
     ahead, back = following - corner, last - corner
     angle: NDArray[np.float64] = np.arctan2(dot(cross(ahead, back), ng.astype(np.float64)), dot(ahead, back))
     return np.maximum(np.where(angle < -1e-6, angle + 2 * np.pi, angle), 1e-6)
@@ -310,9 +321,9 @@ def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], ND
     first = np.zeros(vertex.max(initial=-1) + 1, np.int64)
     first[vertex[::-1]] = corners[::-1]
     lowest = first[vertex]
-    others = np.flatnonzero((n != rows(n, lowest)).any(axis=1))
+    others = np.flatnonzero((n != take_rows(n, lowest)).any(axis=1))
     if others.size:
-        order, same = _equal_rows(np.ascontiguousarray(rows(n, others)), vertex[others])
+        order, same = _equal_rows(np.ascontiguousarray(take_rows(n, others)), vertex[others])
         begins = np.append(True, ~same)
         lowest[others[order]] = others[order][begins][np.cumsum(begins) - 1]
     is_first = lowest == corners
@@ -330,7 +341,7 @@ def _points_of(
     into = np.arange(len(vertex))
     for shift, lanes in _runs(same):
         a, b = order[lanes], order[lanes + shift]
-        near = np.flatnonzero(length(rows(n, a) - rows(n, b)) < SAME_NORMAL)
+        near = np.flatnonzero(length(take_rows(n, a) - take_rows(n, b)) < SAME_NORMAL)
         np.minimum.at(into, b[near], a[near])
     while (into[into] != into).any():
         into = into[into]
@@ -404,7 +415,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     """
     # how many on each triangle
     world, normals = surfaces.world, surfaces.normals
-    corner = [columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+    corner = [column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
     area = length(cross(corner[1] - corner[0], corner[2] - corner[0])) / 2
     total = area.sum()
     share = np.ceil(area * (count / total)) if total > 0 else np.zeros(len(area))
@@ -423,14 +434,14 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     facet = facets(world, triangle, a, b, np.zeros((len(triangle), 3), F))
     index = [normals.index.take(world.corners[:, k].take(triangle)) for k in range(3)]
     parts = [
-        weight.astype(F)[:, None] * np.where(row[:, None] >= 0, rows(normals.values, row), F(0))
+        weight.astype(F)[:, None] * np.where(row[:, None] >= 0, take_rows(normals.values, row), F(0))
         for weight, row in zip((1 - a - b, a, b), index, strict=True)
     ] if len(normals.values) else [np.zeros_like(facet.ng)] * 3  # fmt: skip
     n = with_facet(unit(parts[0] + parts[1] + parts[2]), facet.ng)
     return AreaPoints(
         world,
-        columns(n, F),
-        columns(facet.position, F),
+        column_major(n, F),
+        column_major(facet.position, F),
         np.arange(len(triangle), dtype=np.uint32),
         world.objects[triangle],
         offset_ray_origins(facet.position, facet.ng, facet.edge),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, columns, cross, dot, rows
+from illumcli.arrays import F, column_major, cross, dot, take_rows
 from illumcli.baking.points import Points
 from illumcli.files.journal import Journal
 from illumcli.geometry.spatial_order import compact
@@ -83,7 +83,9 @@ class BakeSampler:
     def open(self) -> NDArray[np.bool_]:
         """(M,) True where nothing is above the triangles that a point's rays leave."""
         world = self.points.world
-        corner = [columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+        corner = [
+            column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)
+        ]
         area = cross(corner[1] - corner[0], corner[2] - corner[0])
         along = compact(corner[0] + corner[1] + corner[2])
         along = along[dot(area, area)[along] > 0]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors, columns, cross, dot, unit
+from illumcli.arrays import Vectors, column_major, cross, dot, unit
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 
@@ -37,7 +37,7 @@ def values(
     if not (lit.size and lobes):
         return out
     at = {"n": n, "l": l, "v": v, "t": t}
-    given: dict[str, Any] = {word: columns(at[word][lit]) for word in words(lobes) & at.keys()}
+    given: dict[str, Any] = {word: column_major(at[word][lit]) for word in words(lobes) & at.keys()}
     if "light" in words(lobes):
         given["light"] = np.ones(3)
     out[lit] = sum(evaluate(lobes, given).values())
@@ -79,7 +79,7 @@ def polar_slice(
     """
     angles = slice_angles(incidence)
     theta = np.radians(angles)
-    v = columns(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1))
+    v = column_major(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1))
     return angles, _seen_from(model, incidence, v, times_cos)
 
 
@@ -97,7 +97,7 @@ def lobe(
     away = np.linspace(0, 1, steps + 1)[:, None] ** 2 * horizon
     x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
     v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
-    found = _seen_from(model, incidence, unit(columns(v.reshape(-1, 3))), times_cos)
+    found = _seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
     return v, np.reshape(found, v.shape)
 
 
@@ -110,10 +110,10 @@ def lit_sphere(model: IlluminationModel, size: int = 256) -> Doubles:
     """(size, size, 4) linear R, G, B and coverage of a ball under one light; its grain runs around y."""
     x, y, inside = _disc(2 * size)
     n = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1).reshape(-1, 3)
-    n = columns(n[inside.ravel()])
+    n = column_major(n[inside.ravel()])
     l, v = (np.broadcast_to(np.array(a) / np.linalg.norm(a), n.shape) for a in (SUN, (0.0, 0.0, 1.0)))
     t = unit(cross(np.broadcast_to((0.0, 1.0, 0.0), n.shape), n))
-    return _halved(values(model, n, columns(l), columns(v), t) * irradiance(model), inside)
+    return _halved(values(model, n, column_major(l), column_major(v), t) * irradiance(model), inside)
 
 
 def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
@@ -129,9 +129,9 @@ def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
     distance = eye[2] / -ray[..., 2]
     p = (eye + distance[..., None] * ray).reshape(-1, 3)
     inside = (np.abs(p[:, 0]) < 1.5) & (p[:, 1] < 2.6)
-    p = columns(p[inside])
+    p = column_major(p[inside])
     n, t = (np.broadcast_to(np.array(a), p.shape) for a in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
-    l, v = unit(columns(np.array(LAMP) - p)), unit(columns(eye - p))
+    l, v = unit(column_major(np.array(LAMP) - p)), unit(column_major(eye - p))
     return _halved(values(model, n, l, v, t) * irradiance(model), inside.reshape(across.shape))
 
 

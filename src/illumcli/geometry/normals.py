@@ -22,7 +22,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import Floats, Vectors, cross, dot, length, rows, unit
+from illumcli.arrays import Floats, Vectors, cross, dot, length, take_rows, unit
 from illumcli.geometry.components import components
 from illumcli.geometry.mesh import Mesh
 from illumcli.records import Record
@@ -76,12 +76,12 @@ def polygon_normals(mesh: Mesh, method: PolygonMethod = "newell") -> Vectors:
         return newell
     first = mesh.starts[:-1]
     if method == "cross":
-        normals = unit(rows(corner_crosses(mesh), first))
+        normals = unit(take_rows(corner_crosses(mesh), first))
     elif method == "edge_average":
         normals = unit(_per_polygon(unit(corner_crosses(mesh)), mesh.starts))
     else:
         a, b, fans = _fans(mesh)
-        normals = unit(cross(rows(a, fans[:-1]), rows(b, fans[:-1])))
+        normals = unit(cross(take_rows(a, fans[:-1]), take_rows(b, fans[:-1])))
         normals = normals * np.where(dot(normals, newell) < 0, -1.0, 1.0)[:, None]
     found = dot(normals, normals) > 0
     return np.where((found & (dot(newell, newell) > 0))[:, None], normals, newell)
@@ -98,7 +98,7 @@ def reversed_polygons(mesh: Mesh) -> NDArray[np.bool_] | None:
         return None
     own, good = _file_normals(mesh.normals)
     polygon = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
-    cosine = dot(rows(own, mesh.corner_normals), rows(polygon_normals(mesh), polygon))
+    cosine = dot(take_rows(own, mesh.corner_normals), take_rows(polygon_normals(mesh), polygon))
     against = (cosine < AGAINST) & (mesh.corner_normals >= 0) & good[mesh.corner_normals]
     found: NDArray[np.bool_] = np.logical_and.reduceat(against, mesh.starts[:-1])
     return found if found.any() else None
@@ -236,7 +236,7 @@ def _single(vertices: ArrayLike) -> Mesh:
 
 def _corner_points(mesh: Mesh) -> NDArray[np.float64]:
     """(C, 3) where each corner is, components contiguous."""
-    return rows(np.asfortranarray(mesh.vertices), mesh.corners)
+    return take_rows(np.asfortranarray(mesh.vertices), mesh.corners)
 
 
 def _ends(mesh: Mesh) -> tuple[Any, Any]:
@@ -266,14 +266,14 @@ def _fans(mesh: Mesh) -> tuple[Vectors, Vectors, NDArray[Any]]:
     fans = np.concatenate([[0], np.cumsum(count)])
     if (count == 1).all():
         vertices = np.asfortranarray(mesh.vertices)
-        origin, second, third = (rows(vertices, mesh.corners[k::3]) for k in range(3))
+        origin, second, third = (take_rows(vertices, mesh.corners[k::3]) for k in range(3))
     else:
         points = _corner_points(mesh)
         at = np.arange(fans[-1]) - np.repeat(fans[:-1] - mesh.starts[:-1] - 1, count)
         origin, second, third = (
-            rows(points, np.repeat(mesh.starts[:-1], count)),
-            rows(points, at),
-            rows(points, at + 1),
+            take_rows(points, np.repeat(mesh.starts[:-1], count)),
+            take_rows(points, at),
+            take_rows(points, at + 1),
         )
     return second - origin, third - origin, fans
 
@@ -321,7 +321,7 @@ def _computed(
 
     # Pools over which normals turn too far are split at their sharp edges.
     limit = np.radians(DEFAULT_CREASE if crease is None else crease)
-    wide = _wide(pool, by_angle, rows(polygons, owner), sums, limit) if limit < np.pi else pool[:0]
+    wide = _wide(pool, by_angle, take_rows(polygons, owner), sums, limit) if limit < np.pi else pool[:0]
     if wide.size:
         fan = _fans_between_edges(mesh, wide, polygons, owner, limit)
         parts = _sums(fan, None if weight is None else weight[wide], polygons, owner[wide])
@@ -340,7 +340,7 @@ def _with_polygons_own(
     if not len(lost):
         return CornerNormals(unit(sums), index.astype(np.int32), {})
     replaced, row = np.unique(owner[lost], return_inverse=True)
-    own = rows(polygons, replaced)
+    own = take_rows(polygons, replaced)
     some = dot(own, own)[row] > 0
     index = index.copy()
     index[lost] = np.where(some, len(sums) + row, -1)
@@ -360,7 +360,7 @@ def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Floats |
     normal = cross(following, previous)
     angle = np.arctan2(length(normal), dot(following, previous))
     if mesh.polygon_count and size.max() > 3:  # a reflex corner spans more than half a turn
-        reflex = dot(normal, rows(polygons, np.repeat(np.arange(len(size)), size))) < 0
+        reflex = dot(normal, take_rows(polygons, np.repeat(np.arange(len(size)), size))) < 0
         angle = np.where(reflex, 2 * np.pi - angle, angle)
     return angle
 
@@ -399,7 +399,7 @@ def _wide(
 ) -> NDArray[np.intp]:
     """Corners of the pools that may hold a sharp edge: of those where a polygon stands farther than half of
     `limit` [rad] from the mean; any two others stand within it."""
-    apart = rows(unit(sums), pool) - normal
+    apart = take_rows(unit(sums), pool) - normal
     far = (dot(apart, apart) > (2 * np.sin(limit / 4)) ** 2) & (dot(normal, normal) > 0)
     if by_angle is not None:
         far &= by_angle
@@ -434,7 +434,7 @@ def _fans_between_edges(
         if not same.size:
             break
         a, b = edge[same], edge[same + step]
-        apart = rows(polygons, owner[a]) - rows(polygons, owner[b])
+        apart = take_rows(polygons, owner[a]) - take_rows(polygons, owner[b])
         soft = dot(apart, apart) <= near * near
         a, b = a[soft], b[soft]
         against = mesh.corners[a] == mesh.corners[following[b]]  # as neighbours run along an edge

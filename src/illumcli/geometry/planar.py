@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, moved
@@ -80,7 +80,7 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
     starts = np.concatenate([[0], np.cumsum(size)])
     owner = np.repeat(np.arange(len(size)), size)
     centre = np.add.reduceat(points, starts[:-1], axis=0) / size[:, None]
-    away = points - rows(centre, owner)
+    away = points - take_rows(centre, owner)
     reach = np.maximum.reduceat(length(away), starts[:-1])
     away = away / np.where(reach > 0, reach, 1)[owner][:, None]
     vectors = area_vectors(Mesh(away, np.arange(len(away), dtype=np.int32), starts.astype(np.int32)))
@@ -88,11 +88,11 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
     normal = unit(vectors)
     along = _across(normal)
     flat: NDArray[np.float64] = np.stack(
-        [dot(away, rows(along, owner)), dot(away, rows(cross(normal, along), owner))], axis=1
+        [dot(away, take_rows(along, owner)), dot(away, take_rows(cross(normal, along), owner))], axis=1
     )
 
     # Which of them are flat, and covered once by their triangles.
-    off = np.maximum.reduceat(np.abs(dot(away, rows(normal, owner))), starts[:-1])
+    off = np.maximum.reduceat(np.abs(dot(away, take_rows(normal, owner))), starts[:-1])
     is_planar = (area > 0) & (off <= FLATNESS * area / 2)
     triangle_row = _rows_of_triangles(world, first, size)
     mine = np.flatnonzero(triangle_row >= 0)
@@ -111,14 +111,14 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
     size = size[is_planar]
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
     row = np.append(number, -1)[triangle_row].astype(np.int32)
-    first, flat, vertices = first[is_planar].astype(np.int32), columns(flat[kept]), vertices[kept]
+    first, flat, vertices = first[is_planar].astype(np.int32), column_major(flat[kept]), vertices[kept]
     padded = np.where(
         (size == 4) & (_smallest_corner(flat, starts, size) > CLEARLY_CONVEX * area[is_planar]),
         0,
         2 ** np.ceil(np.log2(size)).astype(np.int64),
     )
     triangle, u, v = _places(world, row, first, starts, flat)
-    normal = columns(normal[is_planar], F)
+    normal = column_major(normal[is_planar], F)
     return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
 
 
@@ -136,14 +136,14 @@ def _candidates(world: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vecto
         vertex = mesh.corners[corner]
         firsts.append(first + placed.first_corner)
         sizes.append(size)
-        places.append(world.frame.from_world(rows(moved(mesh, placed.matrix), vertex)))
+        places.append(world.frame.from_world(take_rows(moved(mesh, placed.matrix), vertex)))
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), places[0], vertices[0]
     return (
         np.concatenate(firsts),
         np.concatenate(sizes),
-        columns(np.concatenate(places)),
+        column_major(np.concatenate(places)),
         np.concatenate(vertices),
     )
 
@@ -154,9 +154,9 @@ def _is_flat(
     """(Q,) True for polygons whose corners all have one normal, the polygon's own."""
     starts = np.cumsum(size) - size
     corner = np.repeat(first - starts, size) + np.arange(size.sum())
-    n = rows(normals.values, normals.index.take(corner))
-    own = rows(n, starts)
-    apart = np.abs(n - rows(own, np.repeat(np.arange(len(size)), size))).max(axis=1)
+    n = take_rows(normals.values, normals.index.take(corner))
+    own = take_rows(n, starts)
+    apart = np.abs(n - take_rows(own, np.repeat(np.arange(len(size)), size))).max(axis=1)
     upright = np.abs(dot(own, normal)) > 1 - NEARLY_OWN**2 / 2
     return np.asarray((np.maximum.reduceat(apart, starts) <= ALIKE) & upright)
 

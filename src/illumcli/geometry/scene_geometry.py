@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, columns
+from illumcli.arrays import F, column_major
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import reversed_polygons
 from illumcli.geometry.triangulate import triangulate
@@ -200,9 +200,9 @@ def place(
     return SceneGeometry(
         frame=frame,
         placed=tuple(placed),
-        vertices=columns(_joined([frame.from_world(v) for v in vertices], np.zeros((0, 3))), F),
-        triangles=columns(_joined(triangles, np.zeros((0, 3), np.int32))),
-        corners=columns(_joined(corners, np.zeros((0, 3), np.int32))),
+        vertices=column_major(_joined([frame.from_world(v) for v in vertices], np.zeros((0, 3))), F),
+        triangles=column_major(_joined(triangles, np.zeros((0, 3), np.int32))),
+        corners=column_major(_joined(corners, np.zeros((0, 3), np.int32))),
         polygons=_joined(polygons, np.zeros(0, np.int32)),
         objects=_joined(objects, np.zeros(0, np.int32)),
     )
@@ -233,7 +233,9 @@ def world_normals(world: SceneGeometry, normals: Sequence[Any]) -> CornerVectors
         values.append(np.divide(turned, size, out=np.zeros_like(turned), where=size > 0))
         index.append(np.where(own.index >= 0, own.index + first, -1).astype(np.int32))
         first += len(own.normals)
-    return CornerVectors(columns(_joined(values, np.zeros((0, 3))), F), _joined(index, np.zeros(0, np.int32)))
+    return CornerVectors(
+        column_major(_joined(values, np.zeros((0, 3))), F), _joined(index, np.zeros(0, np.int32))
+    )
 
 
 def cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -253,7 +255,9 @@ def world_uvs(world: SceneGeometry) -> CornerVectors:
         values.append(mesh.uvs)
         index.append(np.where(mesh.corner_uvs >= 0, mesh.corner_uvs + first, -1).astype(np.int32))
         first += len(mesh.uvs)
-    return CornerVectors(columns(_joined(values, np.zeros((0, 2))), F), _joined(index, np.zeros(0, np.int32)))
+    return CornerVectors(
+        column_major(_joined(values, np.zeros((0, 2))), F), _joined(index, np.zeros(0, np.int32))
+    )
 
 
 class PolygonCentres(Record):
@@ -280,5 +284,5 @@ def polygon_centres(world: SceneGeometry) -> PolygonCentres:
         points = world.vertices[vertices[-1]].astype(np.float64)
         sums = np.add.reduceat(points, mesh.starts[:-1], axis=0)
         centres.append(sums / np.diff(mesh.starts)[:, None])
-    position = columns(_joined(centres, np.zeros((0, 3))), F)
+    position = column_major(_joined(centres, np.zeros((0, 3))), F)
     return PolygonCentres(position, np.concatenate(starts), np.concatenate(vertices))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors, cross, dot, rows
+from illumcli.arrays import Vectors, cross, dot, take_rows
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors, corner_crosses
 from illumcli.records import Record
@@ -60,7 +60,7 @@ def triangulate(mesh: Mesh) -> Triangulation:
 def _quads(mesh: Mesh, quads: NDArray[np.intp]) -> tuple[NDArray[Any], NDArray[Any]]:
     """(2 Q, 3) corners of the halves, and (2 Q,) their polygons."""
     corners = mesh.starts[quads][:, None] + np.arange(4, dtype=np.int32)
-    p = [rows(mesh.vertices, mesh.corners[corner]) for corner in corners.T]
+    p = [take_rows(mesh.vertices, mesh.corners[corner]) for corner in corners.T]
     even, odd = p[2] - p[0], p[3] - p[1]
     normal = cross(even, odd)
     turned = [
@@ -76,7 +76,9 @@ def _concave(mesh: Mesh, polygons: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Which of the polygons have a reflex corner that cuts off more than rounding."""
     part, _ = _part(mesh, polygons)
     normals = area_vectors(part)
-    turn = dot(corner_crosses(part), rows(normals, np.repeat(np.arange(len(polygons)), np.diff(part.starts))))
+    turn = dot(
+        corner_crosses(part), take_rows(normals, np.repeat(np.arange(len(polygons)), np.diff(part.starts)))
+    )
     return np.minimum.reduceat(turn, part.starts[:-1]) < -FLAT * dot(normals, normals)
 
 
@@ -85,7 +87,7 @@ def _part(mesh: Mesh, polygons: NDArray[np.intp]) -> tuple[Mesh, NDArray[np.int3
     size = np.diff(mesh.starts)[polygons]
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
     corners = np.arange(starts[-1], dtype=np.int32) + np.repeat(mesh.starts[polygons] - starts[:-1], size)
-    points = rows(mesh.vertices, mesh.corners[corners])
+    points = take_rows(mesh.vertices, mesh.corners[corners])
     return Mesh(points, np.arange(starts[-1], dtype=np.int32), starts), corners
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, columns, length
+from illumcli.arrays import Floats, Vectors, column_major, length
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 from illumcli.schema.description import Description
@@ -55,12 +55,12 @@ def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Floats]:
     loses anything; nearer ones in the precision of the positions.
     """
     far = np.abs(light).max() > 1e4
-    way = columns(light.astype(np.float64 if far else position.dtype) - position)
+    way = column_major(light.astype(np.float64 if far else position.dtype) - position)
     if not far and np.abs(way).max(initial=0) < 1e-15:
-        far, way = True, columns(way, np.float64)
+        far, way = True, column_major(way, np.float64)
     size = length(way)
     distance = np.maximum(size, NEAREST)
     l = way * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
     if far:
-        return columns(l, position.dtype), distance.astype(position.dtype)
+        return column_major(l, position.dtype), distance.astype(position.dtype)
     return l, distance

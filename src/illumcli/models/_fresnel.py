@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._lobes import channels
 from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
 from illumcli.schema.description import Description
@@ -121,7 +121,7 @@ class Dielectric(Description):
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(N,) at the cosine c."""
-        (eta,) = like(c, self.ior)
+        (eta,) = as_dtype_of(c, self.ior)
         return dielectric(c, eta)
 
 
@@ -182,7 +182,7 @@ class Shifted(Description):
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c; `light` is the light's colour, largest component 1."""
-        (eta,) = like(c, self.ior)
+        (eta,) = as_dtype_of(c, self.ior)
         grazing = channels(c, (1.0, 1.0, 1.0) if light is None else light)
         return color_shift(c, eta, channels(c, self.color), grazing)
 

@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
-from illumcli.arrays import Floats, like
+from illumcli.arrays import Floats, as_dtype_of
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
 from illumcli.schema.description import Description
@@ -120,7 +120,7 @@ class Gaussian(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) c exp(-(theta / m)^2)."""
-        m, c = like(n_h, self.m, gaussian_constant(self.m) if self.c is None else self.c)
+        m, c = as_dtype_of(n_h, self.m, gaussian_constant(self.m) if self.c is None else self.c)
         return c * gaussian(n_h, sin2_h, m)
 
 
@@ -133,7 +133,7 @@ class Beckmann(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with 1 / (m^2 cos^4), pi times that."""
-        (m,) = like(n_h, self.m)
+        (m,) = as_dtype_of(n_h, self.m)
         density = beckmann(n_h, sin2_h, m)
         return density * np.pi if printed else density
 
@@ -147,7 +147,7 @@ class Blinn(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
-        (exponent,) = like(n_h, power_of_half_height(self.beta))
+        (exponent,) = as_dtype_of(n_h, power_of_half_height(self.beta))
         height = 1 if printed else (exponent + 2) / (2 * np.pi)
         return power_cosine(n_h, sin2_h, exponent) * height
 
@@ -161,7 +161,7 @@ class PowerCosine(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) (n + 2) / (2 pi) cos^n, normalised."""
-        (exponent,) = like(n_h, self.exponent)
+        (exponent,) = as_dtype_of(n_h, self.exponent)
         return power_cosine(n_h, sin2_h, exponent) * ((exponent + 2) / (2 * np.pi))
 
 
@@ -175,7 +175,7 @@ class TorranceSparrow(Description):
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
         width = m_of_half_height(self.beta)
-        m, c = like(n_h, width, 1 if printed else gaussian_constant(width))
+        m, c = as_dtype_of(n_h, width, 1 if printed else gaussian_constant(width))
         return c * gaussian(n_h, sin2_h, m)
 
 
@@ -188,7 +188,7 @@ class TrowbridgeReitz(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
-        (alpha,) = like(n_h, alpha_of_half_height(self.beta))
+        (alpha,) = as_dtype_of(n_h, alpha_of_half_height(self.beta))
         density = ggx(n_h, sin2_h, alpha)
         return density * (np.pi * np.square(alpha)) if printed else density
 
@@ -202,7 +202,7 @@ class GGX(Description):
 
     def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
         """(N,) normalised."""
-        (alpha,) = like(n_h, self.alpha)
+        (alpha,) = as_dtype_of(n_h, self.alpha)
         return ggx(n_h, sin2_h, alpha)
 
 

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._fresnel import schlick
 from illumcli.models._lobes import channels, log_cos
@@ -57,7 +57,7 @@ class AshikhminShirley(IlluminationModel):
         self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, t_s: Floats, b_s: Floats
     ) -> Vectors:
         """(N, 3) n_l * specular."""
-        nu, nv = like(n_l, self.exponent_u, self.exponent_v)
+        nu, nv = as_dtype_of(n_l, self.exponent_u, self.exponent_v)
         along, across = np.square(t_s), np.square(b_s)
         tiny = np.finfo(s_s.dtype).tiny
         sin2 = (along + across) / np.maximum(s_s, tiny)

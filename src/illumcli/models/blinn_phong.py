@@ -23,7 +23,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -46,7 +46,7 @@ class BlinnPhong(IlluminationModel):
 
     def specular_lobe(self, n_l: Floats, gap_nh: Floats) -> Vectors:
         """(N, 3) ks * n_h**e, from gap_nh = 1 - n.h."""
-        (e,) = like(gap_nh, self.exponent)
+        (e,) = as_dtype_of(gap_nh, self.exponent)
         shape = lobe(gap_nh, e)
         if self.normalised:
             shape *= n_l * ((e + 2) / (8 * np.pi) * ((e + 4) / (e + np.exp2(-e / 2))))

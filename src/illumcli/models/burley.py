@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Share
@@ -36,7 +36,7 @@ class Burley(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats, s_s: Floats) -> Vectors:
         """(N, 3) n_l * rho / pi and both factors, of which (l.h)^2 = |l + v|^2 / 4."""
-        (r,) = like(n_l, self.roughness)
+        (r,) = as_dtype_of(n_l, self.roughness)
         edge = 0.5 + r * s_s / 2
         fall = (1 + (edge - 1) * _fifth(1 - n_l)) * (1 + (edge - 1) * _fifth(1 - n_v))
         return tint(self.diffuse, fall * n_l / np.pi)

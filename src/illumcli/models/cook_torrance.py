@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
@@ -72,7 +72,7 @@ class CookTorrance(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) kd * rho / pi * n_l."""
-        (kd,) = like(n_l, self._diffuse_weight())
+        (kd,) = as_dtype_of(n_l, self._diffuse_weight())
         return tint(self.diffuse, n_l * (kd / np.pi))
 
     def specular_lobe(
@@ -93,7 +93,7 @@ class CookTorrance(IlluminationModel):
     ) -> Vectors:
         """(N, 3) the specular lobe of a facet whose colour goes over to the light's at grazing."""
         printed = self.convention == "printed"
-        (ks,) = like(n_l, self.specular_weight)
+        (ks,) = as_dtype_of(n_l, self.specular_weight)
         shape = self.distribution.density(n_h, sin2_h, printed) * (n_l * vgroove_over_4ab(n_l, n_v, s_s))
         shape *= ks * (4 / np.pi) if printed else ks
         F = self.fresnel.reflectance(v_h, light)

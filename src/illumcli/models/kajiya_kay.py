@@ -20,7 +20,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -43,6 +43,6 @@ class KajiyaKay(IlluminationModel):
 
     def specular_lobe(self, sin_tl: Floats, sin_tv: Floats, t_l: Floats, t_v: Floats) -> Vectors:
         """(N, 3) ks * cos(angle to the cone)^e, the gap as half a squared distance in the strand's plane."""
-        (e,) = like(t_l, self.exponent)
+        (e,) = as_dtype_of(t_l, self.exponent)
         gap = (np.square(sin_tl - sin_tv) + np.square(t_l + t_v)) / 2
         return tint(self.specular, lobe(gap, e))

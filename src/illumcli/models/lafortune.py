@@ -19,7 +19,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
@@ -59,7 +59,7 @@ class Lafortune(IlluminationModel):
         self, n_l: Floats, n_v: Floats, t_l: Floats, t_v: Floats, b_l: Floats, b_v: Floats
     ) -> Vectors:
         """(N, 3) the lobe, its gap as half of |C l - v|^2 plus what C shortens l by."""
-        cx, cy, cz, e = like(n_l, self.cx, self.cy, self.cz, self.exponent)
+        cx, cy, cz, e = as_dtype_of(n_l, self.cx, self.cy, self.cz, self.exponent)
         gap = np.zeros_like(n_l)
         for c, l, v in ((cx, t_l, t_v), (cy, b_l, b_v), (cz, n_l, n_v)):
             gap += np.square(c * l - v) + (1 - c) * (1 + c) * np.square(l)

@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Varying
@@ -35,6 +35,6 @@ class Minnaert(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats) -> Vectors:
         """(N, 3) rho (k + 1) / (2 pi) n_l^k n_v^(k - 1)."""
-        (k,) = like(n_l, self.k)
+        (k,) = as_dtype_of(n_l, self.k)
         shape = np.exp(k * np.log(n_l) + (k - 1) * np.log(n_v))
         return tint(self.diffuse, shape * ((k + 1) / (2 * np.pi)))

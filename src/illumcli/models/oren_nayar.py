@@ -28,7 +28,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._lobes import channels, tint
 from illumcli.models._parameters import Albedo, Spread
@@ -96,12 +96,12 @@ class OrenNayar(IlluminationModel):
         self, n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, cos_phi: Floats
     ) -> Vectors:
         """(N, 3) n_l * max(0, f1 + f2)."""
-        (sigma,) = like(n_l, self.sigma)
+        (sigma,) = as_dtype_of(n_l, self.sigma)
         one, two = oren_nayar_terms(n_l, n_v, sin_l, sin_v, cos_phi, sigma)
         rho = channels(n_l, self.diffuse)
         return (np.maximum(one + rho * two, 0) * rho * (n_l / np.pi)).T
 
     def qualitative_lobe(self, n_l: Floats, n_v: Floats, l_v: Floats) -> Vectors:
         """(N, 3) n_l * rho / pi * (A + B ...)."""
-        (sigma,) = like(n_l, self.sigma)
+        (sigma,) = as_dtype_of(n_l, self.sigma)
         return tint(self.diffuse, oren_nayar_ab(n_l, n_v, l_v, sigma) * (n_l / np.pi))

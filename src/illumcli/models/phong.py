@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Color, NonNegative
@@ -44,6 +44,6 @@ class Phong(IlluminationModel):
 
     def specular_lobe(self, n_l: Floats, gap_rv: Floats) -> Vectors:
         """(N, 3) ks * r_v**e, from gap_rv = 1 - r.v."""
-        (e,) = like(gap_rv, self.exponent)
+        (e,) = as_dtype_of(gap_rv, self.exponent)
         shape = lobe(gap_rv, e)
         return tint(self.specular, shape * n_l * ((e + 2) / (2 * np.pi)) if self.normalised else shape)

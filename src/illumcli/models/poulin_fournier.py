@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
 from illumcli.models._parameters import Albedo, NonNegative, Varying
@@ -52,7 +52,7 @@ class PoulinFournier(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats, b_l: Floats, b_v: Floats) -> Vectors:
         """(N, 3) the diffuse part, integrated in closed form."""
-        (steepest,) = like(n_l, self.slope)
+        (steepest,) = as_dtype_of(n_l, self.slope)
         low, high = lit_and_seen(n_l, n_v, b_l, b_v, steepest)
         area = facing(n_l, n_v, b_l, b_v, low, high)
         return tint(self.diffuse, area / (2 * np.pi * np.sin(steepest) * n_v))
@@ -69,7 +69,7 @@ class PoulinFournier(IlluminationModel):
         b_s: Floats,
     ) -> Vectors:
         """(N, 3) the specular part, by quadrature: to 1e-5 in single precision, 1e-12 in double."""
-        e, steepest = like(n_l, self.exponent, self.slope)
+        e, steepest = as_dtype_of(n_l, self.exponent, self.slope)
         low, high = lit_and_seen(n_l, n_v, b_l, b_v, steepest)
         area = highlight(n_l, n_v, b_l, b_v, s_s, n_s, t_s, b_s, e, low, high)
         return tint(self.specular, area * ((e + 2) / (4 * np.pi * np.sin(steepest))) / n_v)

@@ -28,7 +28,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import channels, lobe, tint, weighed
 from illumcli.models._parameters import Albedo, Share
@@ -78,14 +78,14 @@ class Strauss(IlluminationModel):
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) n_l * r_d * d * c."""
-        s, m, t = like(n_l, self.smoothness, self.metalness, self.transparency)
+        s, m, t = as_dtype_of(n_l, self.smoothness, self.metalness, self.transparency)
         return tint(self.color, n_l * (_diffuse_share(s, t) * (1 - m * s)))
 
     def specular_lobe(
         self, n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, gap_rv: Floats
     ) -> Vectors:
         """(N, 3) r_s * c_s."""
-        s, m, t = like(n_l, self.smoothness, self.metalness, self.transparency)
+        s, m, t = as_dtype_of(n_l, self.smoothness, self.metalness, self.transparency)
         F, _, _, _, r_s = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, self.kj, self.kf, self.kg)
         metal = m * (1 - F)
         return ((1 + metal * (channels(n_l, self.color) - 1)) * r_s).T

@@ -23,7 +23,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from illumcli.arrays import Floats, Vectors, like
+from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
 from illumcli.models._parameters import Albedo, Roughness
@@ -65,7 +65,7 @@ class Ward(IlluminationModel):
         self, n_l: Floats, n_v: Floats, s_s: Floats, n_s: Floats, t_s: Floats, b_s: Floats
     ) -> Vectors:
         """(N, 3) the highlight."""
-        ax, ay = like(n_l, self.alpha_x, self.alpha_y)
+        ax, ay = as_dtype_of(n_l, self.alpha_x, self.alpha_y)
         E = elliptical_gaussian(t_s, b_s, n_s, ax, ay)
         if self.form == "ward":
             shape = E * np.sqrt(n_l / n_v) / 4

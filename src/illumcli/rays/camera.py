@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, columns
+from illumcli.arrays import F, Floats, Vectors, column_major
 from illumcli.render_space import RenderSpace
 
 PARALLEL = 1e-9
@@ -137,7 +137,7 @@ def camera_rays(
         plane = _combined((half * x, right), (half * y, up))
         skipped = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
         start = eye + skipped[0] * forward + plane if len(x) else plane
-    return columns(start, F), columns(d, F), skipped
+    return column_major(start, F), column_major(d, F), skipped
 
 
 CLEAR = 1.25

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, rows
+from illumcli.arrays import F, Floats, Ids, take_rows
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.records import Record
@@ -172,9 +172,9 @@ class PolygonCorners(Corners):
         total = super().mean(values)
         lanes = np.flatnonzero(self.outside)
         if lanes.size:
-            low = high = rows(values(0), lanes)
+            low = high = take_rows(values(0), lanes)
             for k in range(1, self.count):
-                own = rows(values(k), lanes)
+                own = take_rows(values(k), lanes)
                 low, high = np.minimum(low, own), np.maximum(high, own)
             total[lanes] = np.clip(total[lanes], low, high)
         return total
@@ -227,11 +227,11 @@ class CornerWeights(Record):
 
     def interpolate(self, world: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
         """(M, j) the vectors that `table` has at corners, interpolated; not made unit."""
-        return self.joined(lambda group, k: rows(table.values, table.index.take(group.corner(world, k))))
+        return self.joined(lambda group, k: take_rows(table.values, table.index.take(group.corner(world, k))))
 
     def interpolate_vertices(self, world: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
         """(M, j) of (V, j) values at the World's vertices."""
-        return self.joined(lambda group, k: rows(values, group.vertex(world, k)))
+        return self.joined(lambda group, k: take_rows(values, group.vertex(world, k)))
 
     def joined(self, values: Callable[[Any, int], NDArray[Any]]) -> NDArray[Any]:
         """(M, j) means by weight; `values` gives the (m, j) values at corner k of a group's hits."""
@@ -297,7 +297,7 @@ def corner_weights(
         if size:
             weights: NDArray[Any] = _mean_value(planar.flat, start, last, int(size), x, y)
         else:
-            weights = _bilinear([rows(planar.flat, start + k) for k in range(4)], x, y)
+            weights = _bilinear([take_rows(planar.flat, start + k) for k in range(4)], x, y)
         outside = np.any(weights < BELOW, axis=0)
         groups.append(PolygonCorners(lane, planar, polygon, last, weights, outside))
     some = tuple(group for group in groups if group.lane is not None and group.lane.size)

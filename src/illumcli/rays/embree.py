@@ -14,7 +14,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, repeated
+from illumcli.arrays import F, Floats, Ids, Vectors, repeat_rows
 from illumcli.errors import IllumError
 from illumcli.rays.embree_upload import upload
 from illumcli.records import Record
@@ -140,7 +140,7 @@ class Tracer:
             raise Interrupted
         each = _checked(origins, directions)
         self.rays += len(directions)
-        return origins if each == 1 else repeated(origins, each)
+        return origins if each == 1 else repeat_rows(origins, each)
 
 
 class _Errors(logging.Handler):

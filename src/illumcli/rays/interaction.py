@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, cofactors
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
@@ -49,11 +49,12 @@ def facets(
 ) -> SurfaceInteraction:
     """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
     v0, e1, e2 = (
-        columns(rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64) for k in range(3)
+        column_major(take_rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64)
+        for k in range(3)
     )
     e1 -= v0
     e2 -= v0
-    sides = columns(e1, F), columns(e2, F), columns(e2 - e1, F)
+    sides = column_major(e1, F), column_major(e2, F), column_major(e2 - e1, F)
     edge = np.sqrt(np.maximum(np.maximum(*(dot(side, side) for side in sides[:2])), dot(sides[2], sides[2])))
     normal = cross(e1, e2)
     area = length(normal)
@@ -63,7 +64,7 @@ def facets(
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
-    return SurfaceInteraction(position, columns(normal, F), effective_edge(edge, area), behind)
+    return SurfaceInteraction(position, column_major(normal, F), effective_edge(edge, area), behind)
 
 
 def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
@@ -86,7 +87,7 @@ def polygon_facing(triangle: Ids, facet: SurfaceInteraction, planar: PlanarPolyg
     own = np.flatnonzero(row >= 0)
     if planar is None or not own.size:
         return facet.ng
-    normal, ng = rows(planar.normal, row.take(own)), rows(facet.ng, own)
+    normal, ng = take_rows(planar.normal, row.take(own)), take_rows(facet.ng, own)
     out = facet.ng.copy(order="F")
     out[own] = facing(normal, dot(normal, ng) < 0)
     return out
@@ -128,18 +129,18 @@ def quadratic(
     ----------
     van Overveld, C. W. A. M. and Wyvill, B. (1997). Phong normal interpolation revisited. ACM TOG 16(4).
     """
-    n = columns(weights.interpolate(world, normals))
+    n = column_major(weights.interpolate(world, normals))
     for group in weights.groups:
 
         def corner(k: int, group: Corners = group) -> Corner:
-            end = rows(normals.values, normals.index.take(group.corner(world, k)))
-            return rows(world.vertices, group.vertex(world, k)), end, group.end_weight(k)
+            end = take_rows(normals.values, normals.index.take(group.corner(world, k)))
+            return take_rows(world.vertices, group.vertex(world, k)), end, group.end_weight(k)
 
         share = np.multiply if isinstance(group, TriangleCorners) else between
         if group.lane is None:
             bend(n, group.count, corner, share)
         else:
-            part = rows(n, group.lane)
+            part = take_rows(n, group.lane)
             bend(part, group.count, corner, share)
             n[group.lane] = part
     return with_facet(facing(unit(n), facet.behind), facet.ng)
@@ -196,7 +197,7 @@ def _with_all(world: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDA
     has = np.minimum.reduce(index) >= 0
     if not has.any():
         return np.zeros((len(has), 2), F, order="F")
-    found = corners.mean(lambda k: rows(uvs.values, index[k]))
+    found = corners.mean(lambda k: take_rows(uvs.values, index[k]))
     return np.asarray(np.where(has[:, None], found, F(0)))
 
 
@@ -206,7 +207,7 @@ def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
     the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
     """
-    points = [rows(world.vertices, corner).astype(np.float64) for corner in world.triangles.T]
+    points = [take_rows(world.vertices, corner).astype(np.float64) for corner in world.triangles.T]
     at = corner_rows(world, np.arange(len(world.triangles), dtype=np.int32), uvs)
     along, hand = _along_u(points, at, uvs)
     groups, parts = [], []
@@ -222,7 +223,7 @@ def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     none = np.zeros((1, 3))  # of corners that the cut skipped
     corner = np.full(len(uvs.index), len(sums), np.int32)
     corner[world.corners.ravel()] = index.ravel()
-    return CornerVectors(columns(np.concatenate([unit(sums), none]), F), corner)
+    return CornerVectors(column_major(np.concatenate([unit(sums), none]), F), corner)
 
 
 def _along_u(
@@ -231,7 +232,7 @@ def _along_u(
     """(T, 3) unit vectors where u grows on each triangle, and (T,) the handedness of its uv: 0, 1 flat, 2."""
     if not len(uvs.values):
         return np.zeros_like(points[0]), np.ones(len(points[0]), np.int64)
-    t0, t1, t2 = (rows(uvs.values, np.maximum(index, 0)).astype(np.float64) for index in at)
+    t0, t1, t2 = (take_rows(uvs.values, np.maximum(index, 0)).astype(np.float64) for index in at)
     a, b = t1 - t0, t2 - t0
     has = (at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0)
     hand = np.where(has, np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), 0)

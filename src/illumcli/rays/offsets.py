@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, columns, dot, length
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, length
 
 SHARE = 4 * 2.0**-24
 """Four times the distance at which false self-hits begin; contact gaps of 1e-6 radii still shade."""
@@ -52,7 +52,7 @@ def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats)
     size *= ULP
     step += np.copysign(size, ng, out=size)
     step += position
-    return columns(step, F)
+    return column_major(step, F)
 
 
 def to_tangent_plane(position: Vectors, corner: Vectors, normal: Vectors) -> Vectors:

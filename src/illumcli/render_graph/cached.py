@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, some
+from illumcli.arrays import F, take_or_all
 from illumcli.cache.store import Store, Stored
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
@@ -168,12 +168,12 @@ def load_hits(picture: Picture, tile: Tile) -> Hits:
     """The samples of a tile that see a surface, as they were kept."""
     triangle, u, v = picture.tile(tile)
     lane = np.flatnonzero(triangle >= 0).astype(np.int32)
-    return Hits(lane, some(triangle, lane), some(u, lane).view(F), some(v, lane).view(F))
+    return Hits(lane, take_or_all(triangle, lane), take_or_all(u, lane).view(F), take_or_all(v, lane).view(F))
 
 
 def load_tile(picture: Picture, tile: Tile, hits: Hits) -> Any:
     """A buffer of a tile as it was kept, at the samples seen."""
-    return picture.kind.unpack(some(picture.tile(tile).T, hits.lane).T, hits)
+    return picture.kind.unpack(take_or_all(picture.tile(tile).T, hits.lane).T, hits)
 
 
 def spread_out(kind: Kind, packed: NDArray[Any], hits: Hits, tile: Tile, per_pixel: int) -> NDArray[Any]:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import columns
+from illumcli.arrays import column_major
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.graph import Node
@@ -312,7 +312,7 @@ def _joined(
     }
     for name in {"alpha", *(layer.buffer for layer in plan.layers)}:
         values = np.concatenate([few[name][among], others[name]])
-        joined[name] = columns(values[order])
+        joined[name] = column_major(values[order])
     return joined
 
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, columns, cross, dot, length, rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
 from illumcli.geometry import planar
@@ -213,8 +213,10 @@ def open_facets(world: SceneGeometry) -> OpenTriangles | None:
 
 def facet_normals(world: SceneGeometry) -> Vectors:
     """(T, 3) float32 unit normals of all triangles."""
-    v0, v1, v2 = (columns(rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
-    return columns(unit(cross(v1 - v0, v2 - v0)), F)
+    v0, v1, v2 = (
+        column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)
+    )
+    return column_major(unit(cross(v1 - v0, v2 - v0)), F)
 
 
 class BakedValues(Record):
@@ -310,7 +312,7 @@ def polygon_normals(
         if placed.reversed is not None:
             sign = np.where(placed.reversed, -sign, sign)[:, None]
         parts.append(np.divide(sign * turned, size, out=np.zeros_like(turned), where=size > 0))
-    return columns(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
+    return column_major(np.concatenate(parts) if parts else np.zeros((0, 3)), F)
 
 
 def numbering(choices: tuple[Choice, ...], named: tuple[str, ...], world: SceneGeometry) -> Numbering:
@@ -483,7 +485,7 @@ def hits(tracer: Tracer, rays: Rays) -> Hits:
 
 def facets(world: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
     """Where they see it."""
-    towards_eye = -rows(rays.directions, hits.lane)
+    towards_eye = -take_rows(rays.directions, hits.lane)
     return surface.facets(world, hits.triangle, hits.u, hits.v, towards_eye)
 
 
@@ -556,7 +558,7 @@ def tangents(
             grain[lanes] = way / (np.linalg.norm(way) or 1.0)
         else:
             centre = world.frame.from_world(placed.matrix[:3, :3] @ own.centre + placed.matrix[:3, 3])
-            grain[lanes] = surface.rings(linear, own.axis, centre, rows(points.position, lanes))
+            grain[lanes] = surface.rings(linear, own.axis, centre, take_rows(points.position, lanes))
     return surface.tangent(points.n, surface.unit(grain))
 
 
@@ -570,7 +572,7 @@ def lit(light: Light, frame: RenderSpace, points: Points) -> LitPoints:
 
 def reach(light: Light, frame: RenderSpace, facets: SurfaceInteraction) -> LitPoints:
     """The samples whose vertices or polygons a light may reach."""
-    return lit_lanes(light, frame, columns(facets.position, F))
+    return lit_lanes(light, frame, column_major(facets.position, F))
 
 
 def same(lit: LitPoints) -> LitPoints:
@@ -658,7 +660,7 @@ def arriving_light(
 ) -> Vectors:
     """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
     out = np.zeros((lit.count, 3), F, order="F")
-    cosine = dot(rows(points.n, lit.lane), lit.l)
+    cosine = dot(take_rows(points.n, lit.lane), lit.l)
     out[lit.lane] = (lit.strength * cosine)[:, None] * np.asarray(color, F)
     return _shadowed(points.spread(out), shadow)
 
@@ -817,7 +819,7 @@ def distance(view: Any, frame: RenderSpace, facets: SurfaceInteraction) -> Float
 
 def world_position(frame: RenderSpace, facets: SurfaceInteraction) -> Vectors:
     """(M, 3) [scene units]."""
-    return columns(frame.to_world(facets.position), F)
+    return column_major(frame.to_world(facets.position), F)
 
 
 def normal(points: Points) -> Vectors:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, rows, some
+from illumcli.arrays import F, Ids, Vectors, take_or_all, take_rows
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.shading.textures import Parameters
@@ -27,7 +27,7 @@ def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
 
 def pick(values: NDArray[Any], lanes: Ids | slice) -> NDArray[Any]:
     """Values of these lanes, without a copy where it is all of them."""
-    return values if isinstance(lanes, slice) else rows(values, lanes)
+    return values if isinstance(lanes, slice) else take_rows(values, lanes)
 
 
 def response(
@@ -67,7 +67,7 @@ def response(
     place = np.full(lit.count, count, np.intp)  # where each point's light is among them
     power = np.asarray(color, F)
     first = 0
-    for number, lanes in groups(some(material, lit.lane), len(models)):
+    for number, lanes in groups(take_or_all(material, lit.lane), len(models)):
         if not lobes[number]:
             continue
         at = pick(lit.lane, lanes)
@@ -75,7 +75,7 @@ def response(
         if parameters is not None and parameters.of_material[number]:
             own = parameters.model(models[number], number, at).lobes()
         wanted = words(own)
-        here = {word: some(given[word], at) for word in wanted if word in given}
+        here = {word: take_or_all(given[word], at) for word in wanted if word in given}
         here["l"] = pick(lit.l, lanes)
         if "light" in wanted:
             here["light"] = power / max(power.max(), np.finfo(F).tiny)
@@ -88,4 +88,4 @@ def response(
         place[at] = np.arange(first, last)
         first = last
     # gathered: to scatter them takes four times as long
-    return {name: rows(columns.T, place) for name, columns in made.items()}
+    return {name: take_rows(columns.T, place) for name, columns in made.items()}

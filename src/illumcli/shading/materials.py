@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, rows
+from illumcli.arrays import F, Ids, Vectors, take_rows
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.repairs import Repairs, joined, located, path_of
 from illumcli.geometry.scene_geometry import SceneGeometry
@@ -223,4 +223,4 @@ def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> 
 def colors_at(table: Sequence[Any], material: Ids) -> Vectors:
     """(N, 3) float32 the colour of each lane's material; black where it is something that varies."""
     known = [color if isinstance(color, tuple) else (0.0, 0.0, 0.0) for color in table]
-    return rows(np.asfortranarray(np.asarray(known, F).reshape(-1, 3)), material)
+    return take_rows(np.asfortranarray(np.asarray(known, F).reshape(-1, 3)), material)

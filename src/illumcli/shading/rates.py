@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, columns, rows
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, take_rows
 from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.rays.corner_weights import (
     Corners,
@@ -91,7 +91,7 @@ def points(
         if not group.size:
             continue
         some = weights.take(group)
-        own = SurfaceInteraction(*(rows(values, group) for values in vars(facet).values()))
+        own = SurfaceInteraction(*(take_rows(values, group) for values in vars(facet).values()))
         groups.append(group)
         if name is None:
             n = _sample_normals(world, some, own, of_sample.take(group), normals)
@@ -111,7 +111,7 @@ def points(
         return out
 
     joined = {
-        name: columns(np.concatenate([getattr(part, name) for part in parts]))
+        name: column_major(np.concatenate([getattr(part, name) for part in parts]))
         for name in ("triangle", "u", "v", "position", "n")
     }
     own_weights = [
@@ -123,7 +123,7 @@ def points(
 
 def _samples(weights: CornerWeights, facet: SurfaceInteraction, n: Vectors) -> Points:
     hits = weights.hits
-    return Points(hits.triangle, hits.u, hits.v, columns(facet.position, F), n, as_they_are)
+    return Points(hits.triangle, hits.u, hits.v, column_major(facet.position, F), n, as_they_are)
 
 
 def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
@@ -149,7 +149,7 @@ def _sample_normals(
         if group.size == len(of_sample):
             return normal(world, normals, weights, facet)
         if group.size:
-            own = SurfaceInteraction(*(rows(values, group) for values in vars(facet).values()))
+            own = SurfaceInteraction(*(take_rows(values, group) for values in vars(facet).values()))
             out[group] = normal(world, normals, weights.take(group), own)
     return out
 
@@ -167,12 +167,18 @@ def _constant(
     key, first, back = np.unique(polygon * 2 + facet.behind, return_index=True, return_inverse=True)
     own = key // 2
     third = np.full(len(key), 1 / 3, F)
-    n = facing(rows(polygon_normals, own), facet.behind.take(first))
+    n = facing(take_rows(polygon_normals, own), facet.behind.take(first))
     triangle = np.searchsorted(world.polygons, own).astype(np.int32)
     first_triangle = TriangleCorners(None, triangle, third, third)
     mean = CornerWeights(first_triangle, (MeanCorners(None, centres, own),))
     return Points(
-        triangle, third, third, rows(centres.position, own), n, lambda values: rows(values, back), mean
+        triangle,
+        third,
+        third,
+        take_rows(centres.position, own),
+        n,
+        lambda values: take_rows(values, back),
+        mean,
     )
 
 
@@ -194,17 +200,17 @@ def _gouraud(
         _, first, back = np.unique(group.shape * np.int64(2) + behind, return_index=True, return_inverse=True)
         numbers[group], steps[group] = back.ravel() + count, len(first)
         for k in range(group.count):
-            corner, vertex = (rows(number(world, k), first) for number in (group.corner, group.vertex))
-            n = facing(rows(normals.values, normals.index.take(corner)), rows(behind, first))
-            at = (rows(part, first) for part in group.place(k))
-            found.append((*at, rows(world.vertices, vertex), n))
+            corner, vertex = (take_rows(number(world, k), first) for number in (group.corner, group.vertex))
+            n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(behind, first))
+            at = (take_rows(part, first) for part in group.place(k))
+            found.append((*at, take_rows(world.vertices, vertex), n))
             count += len(first)
 
     def spread(values: NDArray[Any]) -> NDArray[Any]:
-        return weights.joined(lambda group, k: rows(values, numbers[group] + k * steps[group]))
+        return weights.joined(lambda group, k: take_rows(values, numbers[group] + k * steps[group]))
 
     triangle, u, v, position, n = (
-        columns(np.concatenate([each[part] for each in found])) for part in range(5)
+        column_major(np.concatenate([each[part] for each in found])) for part in range(5)
     )
     there = TriangleCorners(None, triangle, u, v)
     return Points(triangle, u, v, position, n, spread, CornerWeights(there, (there,)))

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, columns, rows
+from illumcli.arrays import F, Ids, Vectors, column_major, take_rows
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
@@ -81,7 +81,7 @@ def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
 def _at(image: Floats, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
     """(N, C) texels of columns `x` from the left, rows `y` from the bottom."""
     height, width, channels = image.shape
-    return columns(image.reshape(-1, channels).take((height - 1 - y) * width + x, axis=0))
+    return column_major(image.reshape(-1, channels).take((height - 1 - y) * width + x, axis=0))
 
 
 def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:
@@ -311,7 +311,7 @@ class Parameters(Record):
         picked = {
             path: self.values[path, width][lanes]
             if isinstance(lanes, slice)
-            else rows(self.values[path, width], lanes)
+            else take_rows(self.values[path, width], lanes)
             for path, width in names
         }
         return model.at(picked)
@@ -360,7 +360,8 @@ def parameters(
             whole = values.setdefault(key, np.zeros((len(material), each.within.width), F, order="F"))
             whole[lanes] = np.clip(found, F(each.within.low), F(each.within.high))  # sums round beyond
     return Parameters(
-        tuple(names), {key: whole[:, 0] if key[1] == 1 else columns(whole) for key, whole in values.items()}
+        tuple(names),
+        {key: whole[:, 0] if key[1] == 1 else column_major(whole) for key, whole in values.items()},
     )
 
 

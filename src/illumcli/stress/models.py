@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import columns, cross, dot, unit
+from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema import schema_of
 from illumcli.schema.families import members
 from illumcli.shading.terms import evaluate
@@ -112,14 +112,14 @@ def _drawn(field: dict[str, Any], defs: dict[str, Any], random: np.random.Genera
 def directions(seed: int, count: int, dtype: Any) -> dict[str, NDArray[Any]]:
     """Unit n, t, l, v with n.l > 0: general, grazing to 1e-7, mirrored, along the light, below."""
     random = np.random.default_rng(seed)
-    n = unit(columns(random.normal(size=(count, 3))))
-    t = unit(cross(n, unit(columns(random.normal(size=(count, 3))))))
+    n = unit(column_major(random.normal(size=(count, 3))))
+    t = unit(cross(n, unit(column_major(random.normal(size=(count, 3))))))
     b = cross(n, t)
 
     def above() -> NDArray[np.float64]:
         height = 10.0 ** random.choice([-7, -4, -2, 0, 0], count) * random.random(count)
         turn, level = random.random(count) * 2 * np.pi, np.sqrt(1 - height * height)
-        return columns(
+        return column_major(
             height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
         )
 
@@ -128,7 +128,9 @@ def directions(seed: int, count: int, dtype: Any) -> dict[str, NDArray[Any]]:
     mirrored = 2 * dot(n, l)[:, None] * n - l
     for number, other in enumerate((mirrored, l, -l, n, t, v - 2 * dot(n, v)[:, None] * n)):
         v[kind == number] = other[kind == number]
-    v = columns(unit(v), np.float64)
-    given = {name: columns(x.astype(dtype)) for name, x in {"n": n, "t": t, "l": l, "v": v}.items()}
+    v = column_major(unit(v), np.float64)
+    given = {name: column_major(x.astype(dtype)) for name, x in {"n": n, "t": t, "l": l, "v": v}.items()}
     lit = dot(given["n"], given["l"]) > 0
-    return {name: columns(x[lit]) for name, x in given.items()} | {"light": np.array([1, 0.5, 0.25], dtype)}
+    return {name: column_major(x[lit]) for name, x in given.items()} | {
+        "light": np.array([1, 0.5, 0.25], dtype)
+    }

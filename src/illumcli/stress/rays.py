@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, columns, cross, dot, rows, unit
+from illumcli.arrays import F, column_major, cross, dot, take_rows, unit
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import SceneGeometry, place, rotation
 from illumcli.rays.embree import Tracer
@@ -109,8 +109,8 @@ def surface_points(
     u[over], v[over] = 1 - u[over], 1 - v[over]
     u[: count // 4] = 0
     v[: count // 8] = random.integers(0, 2, count // 8)
-    corners = [rows(world.vertices, world.triangles[triangle, k]).astype(np.float64) for k in range(3)]
-    outward = unit(columns(cross(corners[1] - corners[0], corners[2] - corners[0])))
+    corners = [take_rows(world.vertices, world.triangles[triangle, k]).astype(np.float64) for k in range(3)]
+    outward = unit(column_major(cross(corners[1] - corners[0], corners[2] - corners[0])))
     found = facets(world, triangle, u, v, outward)
     return found.position, found
 
@@ -119,9 +119,9 @@ def grazing(n: NDArray[Any], seed: int) -> NDArray[np.float32]:
     """(N, 3) directions above the plane of each normal, half of them within 1e-6 to 1e-1 of it."""
     random = np.random.default_rng(seed)
     count = len(n)
-    tangent = unit(columns(cross(n, columns(random.normal(size=(count, 3))))))
+    tangent = unit(column_major(cross(n, column_major(random.normal(size=(count, 3))))))
     height = np.where(random.random(count) < 0.5, 10 ** random.uniform(-6, -1, count), random.random(count))
-    return columns(np.sqrt(1 - height * height)[:, None] * tangent + height[:, None] * n, F)
+    return column_major(np.sqrt(1 - height * height)[:, None] * tangent + height[:, None] * n, F)
 
 
 def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
@@ -137,7 +137,7 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
         # rounding brings a ray of 1e-6 rad below the horizon now and then; such a one asks about the inside
         up = dot(way.astype(np.float64), facet.ng.astype(np.float64)) > 1e-7
         origins = offset_ray_origins(position, facet.ng, facet.edge)
-        hidden = tracer.occluded(columns(origins[up]), columns(way[up]), limit)
+        hidden = tracer.occluded(column_major(origins[up]), column_major(way[up]), limit)
         rim = np.flatnonzero(up) < part // 4
         for k, where in enumerate((~rim, rim)):
             hits[k] += np.count_nonzero(hidden & where)
@@ -175,11 +175,11 @@ def _gaps(count: int) -> Row:
         tracer = Tracer(world.vertices, world.triangles)
         weight = random.uniform(0.3, 0.7, (count, 2))  # of the floor's square, under the plate
         corner = [world.vertices[k].astype(np.float64) for k in range(4)]
-        position = columns(
+        position = column_major(
             corner[0] + weight[:, :1] * (corner[1] - corner[0]) + weight[:, 1:] * (corner[3] - corner[0])
         )
-        up = unit(columns(np.cross(corner[3] - corner[0], corner[1] - corner[0])[None]))
-        n = columns(np.repeat(up, count, axis=0), F)
+        up = unit(column_major(np.cross(corner[3] - corner[0], corner[1] - corner[0])[None]))
+        n = column_major(np.repeat(up, count, axis=0), F)
         origins = offset_ray_origins(position, n, np.full(count, np.linalg.norm(corner[2] - corner[0]), F))
         hidden = tracer.occluded(origins, n)
         lit[gap] = float(np.mean(~hidden))
@@ -202,14 +202,14 @@ def _leaks(divisions: int, count: int) -> list[Row]:
         missed = done = 0
         for first in range(0, count, 1 << 18):
             part = min(1 << 18, count - first)
-            inside = columns(random.uniform(-0.3, 0.3, (part, 3)), F)
+            inside = column_major(random.uniform(-0.3, 0.3, (part, 3)), F)
             triangle = random.integers(len(world.triangles), size=part)
             a, b, c = (world.vertices[world.triangles[triangle, k]].astype(np.float64) for k in range(3))
             u, v = random.random((2, part, 1)) / 2
             target = {"faces": a + u * (b - a) + v * (c - a), "edges": a + u * 2 * (b - a), "vertices": a}[
                 aim
             ]
-            closest = tracer.closest(inside, columns(unit(columns(target - inside)), F))
+            closest = tracer.closest(inside, column_major(unit(column_major(target - inside)), F))
             missed, done = missed + int(np.count_nonzero(closest.triangle < 0)), done + part
         check = f"from inside a closed ball of {len(world.triangles):,} faces"
         found.append(Row(f"leaks at {aim}", check, f"{missed} of {done:,} rays", not missed))

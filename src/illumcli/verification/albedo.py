@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors, columns
+from illumcli.arrays import Vectors, column_major
 from illumcli.models._base import IlluminationModel
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.models.lambert import Lambert
@@ -83,7 +83,7 @@ def _response(
     v = np.broadcast_to([np.sin(eye), 0, np.cos(eye)], l.shape)
     n = np.broadcast_to([0.0, 0, 1], l.shape)
     lanes: dict[str, Vectors] = {
-        name: columns(way, inputs.dtype) for name, way in (("n", n), ("l", l), ("v", v))
+        name: column_major(way, inputs.dtype) for name, way in (("n", n), ("l", l), ("v", v))
     }
     return response(model, **lanes)[:, 0].astype(np.float64)
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from illumcli.arrays import Floats, Vectors, columns
+from illumcli.arrays import Floats, Vectors, column_major
 from illumcli.errors import InputError
 from illumcli.records import Value
 from illumcli.schema.families import suggestion
@@ -55,7 +55,7 @@ class Inputs(Value):
 
     def vectors(self, key: str) -> Vectors:
         """(k, 3) points or vectors as they are; one vector is (1, 3), a list of k is (k, 3)."""
-        return columns(self._array(key, (3,), (None, 3)).reshape(-1, 3))
+        return column_major(self._array(key, (3,), (None, 3)).reshape(-1, 3))
 
     def points2(self, key: str) -> NDArray[Any]:
         """(2,) the first two components of a point."""
@@ -67,19 +67,19 @@ class Inputs(Value):
         size = np.linalg.norm(vector)
         if not size > 0:
             raise InputError(f"{self.place}: inputs '{key}' must not be the zero vector")
-        return columns(self._round(key, vector / size).reshape(1, 3))
+        return column_major(self._round(key, vector / size).reshape(1, 3))
 
     def tangent(self) -> Vectors:
         """(1, 3) unit: the direction `t` made perpendicular to `n` in float64 before it is rounded."""
         n, t = self._exact("n", (3,)), self._exact("t", (3,))
         t = t - (t @ n) / (n @ n) * n
-        return columns(self._round("t", t / np.linalg.norm(t)).reshape(1, 3))
+        return column_major(self._round("t", t / np.linalg.norm(t)).reshape(1, 3))
 
     def between(self, start: str, end: str) -> Vectors:
         """(1, 3) unit direction from one point to another, in float64 before it is rounded."""
         way = self._exact(end, (3,)) - self._exact(start, (3,))
         key = start if start in self.rounded else end
-        return columns(self._round(key, way / np.linalg.norm(way)).reshape(1, 3))
+        return column_major(self._round(key, way / np.linalg.norm(way)).reshape(1, 3))
 
     def part(self, key: str) -> Inputs:
         """The inputs inside an object."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, dot, rows
+from illumcli.arrays import Floats, Vectors, dot, take_rows
 from illumcli.models._base import IlluminationModel
 from illumcli.models.ashikhmin_shirley import AshikhminShirley
 from illumcli.models.kajiya_kay import KajiyaKay
@@ -32,7 +32,7 @@ def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) 
     lit = np.flatnonzero(dot(n, l) > 0)
     if lit.size:
         given = {"n": n, "l": l, **more}
-        given = {name: value if value.ndim == 1 else rows(value, lit) for name, value in given.items()}
+        given = {name: value if value.ndim == 1 else take_rows(value, lit) for name, value in given.items()}
         out[lit] = sum(evaluate(model.lobes(), given).values())
     return out
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from illumcli.arrays import F, Floats, columns
+from illumcli.arrays import F, Floats, column_major
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place
 from illumcli.rays.embree import tracer
@@ -60,7 +60,7 @@ def obscured(inputs: Inputs) -> Estimate:
 def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
     world = place([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
-    ng = columns(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
+    ng = column_major(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
     here = np.tile(world.frame.from_world(np.zeros(3)), (PATTERNS, 1))
     corners = around.vertices[around.triangles[0]]
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, columns, cross, dot, length, mirror
+from illumcli.arrays import Floats, Vectors, column_major, cross, dot, length, mirror
 from illumcli.lights.point import Point
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.models.phong import Phong
@@ -66,7 +66,7 @@ def surface(Lobe: Model, inputs: Inputs) -> Phong | BlinnPhong:
 def own_light(inputs: Inputs) -> Vectors:
     """(1, 3) Ie + Ia ka."""
     emitted, ambient, ka = (np.asarray(inputs.color(key), inputs.dtype) for key in ("Ie", "Ia", "ka"))
-    return columns((emitted + ambient * ka)[None])
+    return column_major((emitted + ambient * ka)[None])
 
 
 def reflect(inputs: Inputs) -> Vectors:

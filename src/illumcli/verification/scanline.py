@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, columns, unit
+from illumcli.arrays import Floats, Vectors, column_major, unit
 from illumcli.geometry.normals import cross_normal
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.interaction import bend
@@ -31,8 +31,8 @@ def lerp(inputs: Inputs) -> Floats:
 
 def constant_shading(inputs: Inputs) -> Floats:
     """One value per facet, light and eye along +z, no highlight."""
-    n = unit(columns(cross_normal(inputs.vectors("vertices"), 0)[None], inputs.dtype))
-    up = columns(np.array([[0, 0, 1]], inputs.dtype))
+    n = unit(column_major(cross_normal(inputs.vectors("vertices"), 0)[None], inputs.dtype))
+    up = column_major(np.array([[0, 0, 1]], inputs.dtype))
     model = BlinnPhong(diffuse=inputs.color("kd"), specular=(0.0, 0.0, 0.0))
     return (own_light(inputs) + inputs.lanes("Ii") * response(model, n=n, l=up, v=up))[:, 0]
 
@@ -77,7 +77,7 @@ def phong_shading_normal(inputs: Inputs) -> Vectors:
 
 def phong_shading(inputs: Inputs) -> Floats:
     """I of a pixel by Blinn-Phong with the interpolated normal."""
-    n, l, v = columns(phong_shading_normal(inputs)), inputs.unit("l"), inputs.unit("v")
+    n, l, v = column_major(phong_shading_normal(inputs)), inputs.unit("l"), inputs.unit("v")
     lit = inputs.lanes("Ii")[:, None] * response(surface(BlinnPhong, inputs), n=n, l=l, v=v)
     return (own_light(inputs) + lit)[:, 0]
 

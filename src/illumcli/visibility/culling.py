@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import columns
+from illumcli.arrays import column_major
 from illumcli.geometry.spatial_order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
@@ -95,7 +95,7 @@ def ways(points: Points, light: Light, frame: RenderSpace) -> Points:
     A light is one point or infinitely far away; a long way ends where nothing can stand any more, for all
     points at the same share of it.
     """
-    arriving = light.arriving(columns(points), frame)
+    arriving = light.arriving(column_major(points), frame)
     nearest = float(arriving.distance.min())
     if np.isinf(nearest):
         ends = points + BEYOND * arriving.l

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Ids, Vectors, dot, some
+from illumcli.arrays import Floats, Ids, Vectors, dot, take_or_all
 from illumcli.lights._base import Light
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
@@ -32,11 +32,11 @@ def lit(light: Light, frame: RenderSpace, position: Vectors, n: Vectors | None =
     if n is not None:
         reached &= dot(n, arriving.l) > 0
     lane = np.flatnonzero(reached).astype(np.int32)
-    parts = (some(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
+    parts = (take_or_all(part, lane) for part in (arriving.l, arriving.distance, arriving.strength))
     return LitPoints(lane, len(position), *parts)
 
 
 def reaching(light: Light, frame: RenderSpace, position: Vectors, lanes: NDArray[np.intp]) -> LitPoints:
     """These lanes, which are known to be lit, in ascending order."""
-    arriving = light.arriving(some(position, lanes), frame)
+    arriving = light.arriving(take_or_all(position, lanes), frame)
     return LitPoints(lanes.astype(np.int32), len(position), arriving.l, arriving.distance, arriving.strength)

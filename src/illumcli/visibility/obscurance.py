@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, columns, dot, repeated, rows
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, repeat_rows, take_rows
 from illumcli.rays.embree import Tracer
 from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.records import Record, Value
@@ -75,7 +75,7 @@ class Hemispheres(Record):
             own = lanes if each == 1 else (lanes[:, None] * each + np.arange(each)).ravel()
 
         def part(of: Vectors, which: Any) -> Vectors:
-            return of[which] if isinstance(which, slice) else rows(of, which)
+            return of[which] if isinstance(which, slice) else take_rows(of, which)
 
         ng = None if self.ng is None else part(self.ng, own)
         return Hemispheres(part(self.n, lanes), part(self.origins, own), ng)
@@ -152,7 +152,7 @@ def estimates(
         d = directions(frames[part], draws[:, part], method)
         if own.ng is not None:
             mirror_below(d, own, method)
-        origins = own.origins if own.starts == 1 else rows(own.origins, own.of_rays(method.samples))
+        origins = own.origins if own.starts == 1 else take_rows(own.origins, own.of_rays(method.samples))
         mu = seen(tracer, origins, d, method).reshape(-1, method.samples)
         w[part] = shares(mu)
         if errors:
@@ -213,7 +213,7 @@ def seen(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArra
         far = tracer.distance(origins, d)
     else:
         each = len(d) // max(len(origins), 1)
-        far = facing_distance(tracer, origins if each == 1 else repeated(origins, each), d, method)
+        far = facing_distance(tracer, origins if each == 1 else repeat_rows(origins, each), d, method)
     weight = method.falloff.weight(far.astype(np.float64) * method.radius, reach, method.radius)
     return weight > 0.5 if method.falloff.step else weight.astype(F)
 
@@ -229,7 +229,7 @@ def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> F
     for _ in range(MOST_SHEETS):
         closest = tracer.closest(start, d[lane])
         hit = closest.triangle >= 0
-        behind = hit & (dot(rows(method.facets, np.maximum(closest.triangle, 0)), d[lane]) > 0)
+        behind = hit & (dot(take_rows(method.facets, np.maximum(closest.triangle, 0)), d[lane]) > 0)
         front = hit & ~behind
         far[lane[front]] = passed[front] + closest.distance[front]
         if method.faces == "one_sided" or not behind.any():
@@ -237,7 +237,7 @@ def facing_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> F
         # past the face by a few roundings of the coordinates, which are at most about 1
         step = closest.distance[behind] + F(4 * 2.0**-23)
         lane, passed = lane[behind], passed[behind] + step
-        start = columns(start[behind] + step[:, None] * d[lane], F)
+        start = column_major(start[behind] + step[:, None] * d[lane], F)
     return far
 
 
@@ -262,7 +262,7 @@ def mirror_below(d: Vectors, over: Hemispheres, method: Method) -> None:
     # the candidates of each point: of a pattern in the order of growing angles only the last
     assert over.ng is not None
     each = over.starts
-    axes = over.n if each == 1 else repeated(over.n, each)
+    axes = over.n if each == 1 else repeat_rows(over.n, each)
     number = below_at_most(dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1), method)
     point = np.repeat(np.arange(len(over.n)), number)
     last = np.arange(len(point)) - np.repeat(np.cumsum(number) - number, number)
@@ -270,12 +270,12 @@ def mirror_below(d: Vectors, over: Hemispheres, method: Method) -> None:
     start = point if each == 1 else point * each + (method.samples - 1 - last) * STRIDE % each
 
     # those that are below go as far above
-    normal = rows(over.ng, start)
-    height = dot(rows(d, ray), normal)
+    normal = take_rows(over.ng, start)
+    height = dot(take_rows(d, ray), normal)
     below = np.flatnonzero(height < GRAZING)
     height, ray = height[below], ray[below]
     up = np.maximum(-height, F(GRAZING)) - height
-    for component, along in zip(d.T, rows(normal, below).T, strict=True):
+    for component, along in zip(d.T, take_rows(normal, below).T, strict=True):
         component[ray] += up * along
 
 

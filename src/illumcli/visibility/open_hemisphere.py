@@ -12,7 +12,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, columns, dot, rows
+from illumcli.arrays import F, Ids, Vectors, column_major, dot, take_rows
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
 from illumcli.rays.interaction import facets, facing
@@ -243,7 +243,7 @@ def facet_planes(
     facet = facets(world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
     n = facing(facet.ng, behind).astype(np.float64)
     v0 = facet.position
-    others = (rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
+    others = (take_rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
     # no ray starts lower: |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the
     # centre
@@ -307,5 +307,5 @@ def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
     spread = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
     if not len(points):
         return points
-    near, spread = columns(points, F), spread.astype(F)
+    near, spread = column_major(points, F), spread.astype(F)
     return points[np.unique([int(np.argmax(near @ d)) for d in spread])].astype(F)

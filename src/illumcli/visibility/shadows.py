@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, columns, dot, length, rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, length, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.rays.corner_weights import Corners, CornerWeights
@@ -55,10 +55,10 @@ def shadow(
     With `smooth` a false terminator is taken away; the samples are then those of its tile.
     """
     delta = np.zeros(lit.count, F)
-    hidden = tracer.occluded(columns(rows(origins, lit.lane)), lit.l, lit.distance)
+    hidden = tracer.occluded(column_major(take_rows(origins, lit.lane)), lit.l, lit.distance)
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
         sample = lit.lane.take(blocked)
-        l, distance = columns(rows(lit.l, blocked)), lit.distance.take(blocked)
+        l, distance = column_major(take_rows(lit.l, blocked)), lit.distance.take(blocked)
         hidden[blocked] = ~_implied_reached(tracer, smooth, origins, sample, l, distance)
     delta[lit.lane] = ~hidden
     return delta
@@ -71,23 +71,23 @@ def _implied_reached(
     # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
     facets = smooth.facets
     weights = smooth.weights.take(sample)
-    position = rows(facets.position, sample)
+    position = take_rows(facets.position, sample)
     width = _box_diagonals(smooth.world, weights)
-    offset = _terminator_offset(smooth, weights, columns(position, F), facets.behind.take(sample))
+    offset = _terminator_offset(smooth, weights, column_major(position, F), facets.behind.take(sample))
     offset = bounded(offset, TERMINATOR_SHARE * width)
     flat = smooth.flat.take(smooth.world.objects.take(weights.hits.triangle))
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
-    ng, edge = rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))
+    ng, edge = take_rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))
     starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
     curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
     height = length(_at(offset, curved))
-    own = columns(rows(origins, sample.take(curved)))
-    curved = curved[~tracer.occluded(own, columns(_at(offset, curved) / height[:, None]), height)]
+    own = column_major(take_rows(origins, sample.take(curved)))
+    curved = curved[~tracer.occluded(own, column_major(_at(offset, curved) / height[:, None]), height)]
 
     # What stands nearby in the light's direction shadows the sample, unless it is the surface itself.
-    own, ng = columns(rows(origins, sample.take(curved))), rows(facets.ng, sample.take(curved))
+    own, ng = column_major(take_rows(origins, sample.take(curved))), take_rows(facets.ng, sample.take(curved))
     hit = tracer.closest(own, _above(_at(l, curved), ng))
     near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
     same = smooth.parts.joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
@@ -103,11 +103,13 @@ def _terminator_offset(
     world, normals = smooth.world, smooth.normals
 
     def way(group: Corners, k: int) -> Vectors:
-        normal = rows(normals.values, normals.index.take(group.corner(world, k)))
-        corner = rows(world.vertices, group.vertex(world, k))
+        normal = take_rows(normals.values, normals.index.take(group.corner(world, k)))
+        corner = take_rows(world.vertices, group.vertex(world, k))
         if group.lane is None:
             return to_tangent_plane(position, corner, facing(normal, behind))
-        return to_tangent_plane(rows(position, group.lane), corner, facing(normal, behind.take(group.lane)))
+        return to_tangent_plane(
+            take_rows(position, group.lane), corner, facing(normal, behind.take(group.lane))
+        )
 
     return weights.joined(way)
 
@@ -116,17 +118,17 @@ def _box_diagonals(world: SceneGeometry, weights: CornerWeights) -> Floats:
     """(B,) the diagonal of the bounding box of the polygon under each sample, in radii."""
     out = np.empty(len(weights), F)
     for group in weights.groups:
-        corners = [rows(world.vertices, group.vertex(world, k)) for k in range(group.count)]
+        corners = [take_rows(world.vertices, group.vertex(world, k)) for k in range(group.count)]
         size = length(np.maximum.reduce(corners) - np.minimum.reduce(corners))
         out[slice(None) if group.lane is None else group.lane] = size
     return out
 
 
 def _at(values: NDArray[Any], index: NDArray[np.intp]) -> NDArray[Any]:
-    return columns(rows(values, index))
+    return column_major(take_rows(values, index))
 
 
 def _above(l: Vectors, ng: Vectors) -> Vectors:
     """(N, 3) float32 `l`, taken along the polygon's plane where it points below it."""
     below = np.minimum(dot(l, ng), 0)
-    return columns(unit(l - below[:, None] * ng), F)
+    return column_major(unit(l - below[:, None] * ng), F)

@@ -25,7 +25,7 @@ from _bench import SMALL, header
 from illumcli.arrays import F, column_major, cross, dot, length, take_rows, unit
 from illumcli.baking.bake import Settings, run
 from illumcli.files.vertex_data import read_npz
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, facets
 from illumcli.render_graph.build import recipes
 from illumcli.scene.load import SceneFile, load
@@ -43,14 +43,14 @@ class Pictures:
     def __init__(self, loaded: SceneFile) -> None:
         self.book = recipes(loaded.scene, loaded)
         given = ("hits", "facets", "obscurance_draws", "view", "tile")
-        self.steps = order(self.book, [*MADE, "obscurance"], given)
+        self.steps = topological_order(self.book, [*MADE, "obscurance"], given)
         self.known: dict[str, Any] = {}
         self.at: set[str] = {"hits", "facets", "obscurance_draws"}
         for step in self.steps:
-            if self.at & set(step.needs.values()):
-                self.at.add(step.makes)
+            if self.at & set(step.inputs.values()):
+                self.at.add(step.output)
             else:
-                self.known[step.makes] = step.make(self.known)
+                self.known[step.output] = step.run(self.known)
 
     def w(self, triangle: np.ndarray, weights: np.ndarray, seed: int = 0) -> np.ndarray:
         """(M,) obscurance at points on triangles with (M, 3) barycentric weights."""
@@ -65,8 +65,8 @@ class Pictures:
         own["facets"] = facets(world, triangle, u, v, unit(cross(b - a, c - a)))
         own["obscurance_draws"] = np.random.default_rng(seed).random((2, len(triangle)))
         for step in self.steps:
-            if step.makes in self.at:
-                own[step.makes] = step.make(own)
+            if step.output in self.at:
+                own[step.output] = step.run(own)
         return np.asarray(own["obscurance"], np.float64)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, dot, length, take_rows, unit
 from illumcli.baking.bake import bare
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
@@ -62,10 +62,10 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     """Edges, and the mean jump of w about geometric and about shading normals, and of nothing but noise."""
     loaded = bare(path, ())
     made: dict[str, Any] = {}
-    for step in order(
+    for step in topological_order(
         recipes(loaded.scene, loaded), ["world", "tracer", "corner_normals", "planar_polygons"]
     ):
-        made[step.makes] = step.make(made)
+        made[step.output] = step.run(made)
     world = made["world"]
     sides = []
     for side in shared_edges(world.triangles).T:

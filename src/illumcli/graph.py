@@ -1,4 +1,4 @@
-"""Which named functions must run to make what is asked for, and in what order."""
+"""Nodes of a graph of named functions, and the order in which those run that some outputs need."""
 
 from __future__ import annotations
 
@@ -11,25 +11,40 @@ from illumcli.records import Value
 
 
 class Node(Value):
-    """A function, the buffer it makes, and the buffer behind each of its parameters."""
+    """A function, the buffer it computes, and the buffer that each of its parameters takes."""
 
-    makes: str
+    output: str
     function: Callable[..., Any]
-    needs: Mapping[str, str]  # parameter -> buffer
+    inputs: Mapping[str, str]  # parameter -> buffer
+    kind: str = ""
+    """What the output is, where its name before a colon does not say it: keeps the name of a renamed node."""
 
     @classmethod
-    def of(cls, function: Callable[..., Any], makes: str | None = None, **renamed: str) -> Node:
-        """A recipe whose needs are the function's own parameter names, `renamed` where given.
+    def of(cls, function: Callable[..., Any], output: str | None = None, **renamed: str) -> Node:
+        """A node whose inputs are the function's own parameter names, `renamed` where given.
 
-        A parameter with a default is needed only when `renamed` names its buffer.
+        A parameter with a default is an input only when `renamed` names its buffer.
         """
-        name = makes or str(getattr(function, "__name__", ""))
-        needs = {p: renamed.pop(p, p) for p in required(function)}
-        return cls(name, function, {**needs, **renamed})
+        name = output or str(getattr(function, "__name__", ""))
+        inputs = {p: renamed.pop(p, p) for p in required(function)}
+        return cls(name, function, {**inputs, **renamed})
 
-    def make(self, buffers: Mapping[str, Any]) -> Any:
-        """Run the function on the buffers it needs."""
-        return self.function(**{parameter: buffers[name] for parameter, name in self.needs.items()})
+    @property
+    def name(self) -> str:
+        """What a cache knows the node by, beside the values bound in its function: the kind of its output and
+        the function's short name. It does not say in which module the function lives."""
+        return f"{self.kind or self.output.partition(':')[0]}={short_name(self.function)}"
+
+    def run(self, buffers: Mapping[str, Any]) -> Any:
+        """Call the function with the buffers of its inputs."""
+        return self.function(**{parameter: buffers[name] for parameter, name in self.inputs.items()})
+
+
+def short_name(function: Callable[..., Any]) -> str:
+    """The name of a function within its module; of a partial one, the name of the function it binds."""
+    while isinstance(function, partial):
+        function = function.func
+    return str(function.__qualname__)
 
 
 def required(function: Callable[..., Any]) -> tuple[str, ...]:
@@ -48,34 +63,38 @@ def _parameters(function: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(p.name for p in parameters if p.default is p.empty)
 
 
-def order(book: Mapping[str, Node], outputs: Iterable[str], given: Iterable[str] = ()) -> list[Node]:
-    """The recipes that `outputs` reach, each after all it needs; `given` buffers need no recipe.
+def topological_order(
+    nodes: Mapping[str, Node], outputs: Iterable[str], given: Iterable[str] = ()
+) -> list[Node]:
+    """The nodes that `outputs` need, each after its inputs; `given` buffers need no node.
 
     Raises
     ------
     KeyError
-        A buffer that no recipe makes.
+        A buffer that no node computes.
     ValueError
         Nodes that need each other in a circle.
     """
-    done, steps = set(given), []  # type: set[str], list[Node]
+    done, ordered = set(given), []  # type: set[str], list[Node]
     for name in outputs:
-        _visit(name, book, done, [], steps)
-    return steps
+        _visit(name, nodes, done, [], ordered)
+    return ordered
 
 
-def _visit(name: str, book: Mapping[str, Node], done: set[str], path: list[str], steps: list[Node]) -> None:
-    """Add the recipe of `name` behind all it needs; `path` led here.
+def _visit(
+    name: str, nodes: Mapping[str, Node], done: set[str], path: list[str], ordered: list[Node]
+) -> None:
+    """Add the node of `name` after its inputs; `path` led here.
 
-    Not a function inside `order`: one that calls itself there is a reference cycle, and keeps the book and
-    every array that its recipes hold until the garbage collector comes by.
+    Not a function inside `topological_order`: one that calls itself there is a reference cycle, and keeps the
+    nodes and every array bound in them until the garbage collector runs.
     """
     if name in done:
         return
     if name in path:
         raise ValueError(" -> ".join([*path[path.index(name) :], name]))
-    recipe = book[name]
-    for need in recipe.needs.values():
-        _visit(need, book, done, [*path, name], steps)
+    node = nodes[name]
+    for need in node.inputs.values():
+        _visit(need, nodes, done, [*path, name], ordered)
     done.add(name)
-    steps.append(recipe)
+    ordered.append(node)

@@ -54,7 +54,7 @@ def term() -> Callable[..., Any]:
     def value(name: str, **given: np.ndarray) -> np.ndarray:
         buffers = dict(given)
         for recipe in steps((name,), tuple(given)):
-            buffers[recipe.makes] = recipe.make(buffers)
+            buffers[recipe.output] = recipe.run(buffers)
         assert name in TERMS
         return buffers[name]
 

@@ -93,7 +93,7 @@ def picture(path, *overrides, store=None, memory=None, only=ALL, threads=1, side
     shared = run_once(narrowed, tally, artifacts)
     parts = list(bands(narrowed, shared, made.views[0], threads, tally, side=side, artifacts=artifacts))
     layers = {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}
-    steps = {step.makes for step in (*narrowed.once, *narrowed.tile)} - narrowed.reused.keys()
+    steps = {step.output for step in (*narrowed.once, *narrowed.tile)} - narrowed.reused.keys()
     return layers, steps, dict(tally.rays), narrowed.reused
 
 

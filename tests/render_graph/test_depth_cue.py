@@ -33,7 +33,7 @@ def rendered(tmp_path):
         steps = plan(loaded.scene, loaded)
         made = list(bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats()))
         layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
-        return layers, {step.makes for step in steps.tile}
+        return layers, {step.output for step in steps.tile}
 
     return render
 

@@ -241,7 +241,7 @@ def test_what_a_layer_does_not_reach_is_not_run(tmp_path):
     path.write_text(SCENE)
     loaded = load(path)
     p = plan(loaded.scene, loaded, ["depth"])
-    made = {step.makes for step in (*p.once, *p.tile)}
+    made = {step.output for step in (*p.once, *p.tile)}
     assert not made & {"corner_normals", "points", "shadow:key", "obscurance", "lit:key", "uvs"}
     assert p.skipped["shadow:sun"] == "the light casts no shadows"
     assert p.expected_rays == {"primary": 83 * 61 * 3}
@@ -252,7 +252,7 @@ def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
     path.write_text(SCENE)
     loaded = load(path, ["lights.key.intensity=0", "ambient=0", "obscurance=null"])
     p = plan(loaded.scene, loaded)
-    made = {step.makes for step in p.tile}
+    made = {step.output for step in p.tile}
     assert not made & {"lit:key", "shadow:key", "obscurance", "ambient"}
     assert p.skipped["shadow:key"] == "the light's intensity is 0"
     assert "lit:rim" in made

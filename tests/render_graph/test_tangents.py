@@ -100,7 +100,7 @@ def test_a_grain_costs_no_uv(tmp_path):
     path.write_text(SCENE.format(more="grain: [1, 0, 0]", mesh=DISC))
     loaded = load(path)
     steps = plan(loaded.scene, loaded)
-    assert "uv_tangents" not in {step.makes for step in steps.once}
+    assert "uv_tangents" not in {step.output for step in steps.once}
     path.write_text(
         SCENE.format(more="grain: [1, 0, 0]", mesh=DISC)
         .replace("alpha_x: 0.05, alpha_y: 0.4", "")
@@ -108,4 +108,4 @@ def test_a_grain_costs_no_uv(tmp_path):
         .replace(", specular: 0.3,", "")
     )
     loaded = load(path)
-    assert "t" not in {step.makes for step in plan(loaded.scene, loaded).tile}
+    assert "t" not in {step.output for step in plan(loaded.scene, loaded).tile}

@@ -8,7 +8,7 @@ import weakref
 import numpy as np
 import pytest
 
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.lambert import Lambert
 from illumcli.models.ward import Ward
@@ -18,12 +18,12 @@ from illumcli.shading.terms import GIVEN, TERMS, evaluate, steps, words
 def term(name, **given):
     buffers = dict(given)
     for recipe in steps((name,), tuple(given)):
-        buffers[recipe.makes] = recipe.make(buffers)
+        buffers[recipe.output] = recipe.run(buffers)
     return buffers[name]
 
 
 def test_every_term_stands_on_given_words():
-    assert len(order(TERMS, TERMS, GIVEN)) == len(TERMS)
+    assert len(topological_order(TERMS, TERMS, GIVEN)) == len(TERMS)
 
 
 def test_models_reach_only_the_words_they_need():
@@ -33,7 +33,7 @@ def test_models_reach_only_the_words_they_need():
 
 
 def test_terms_that_lobes_share_are_formed_once():
-    formed = [step.makes for step in steps(("n_l", "n_v", "s_s", "v_h", "n_h", "sin2_h"))]
+    formed = [step.output for step in steps(("n_l", "n_v", "s_s", "v_h", "n_h", "sin2_h"))]
     assert len(formed) == len(set(formed))
 
 

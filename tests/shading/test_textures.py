@@ -317,7 +317,7 @@ def test_a_missing_texture_is_named_with_its_place(scene, print_):
 def test_images_are_read_only_for_what_is_made(scene, print_, only, material, read):
     loaded = load(scene(material))
     steps = plan(loaded.scene, loaded, only)
-    assert [step.makes for step in steps.once if step.makes.endswith("_textures")] == read
+    assert [step.output for step in steps.once if step.output.endswith("_textures")] == read
 
 
 def test_an_image_that_several_parameters_name_is_read_once(scene, picture, print_, monkeypatch):

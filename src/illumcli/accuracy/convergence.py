@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.accuracy.sampled import Sampler, Sampling, Subject, subject
+from illumcli.cache.fingerprint import digest
 from illumcli.cache.store import Store
 from illumcli.commands.render import opened_store, versions
 from illumcli.errors import InputError
 from illumcli.rays.sampling import stream
 from illumcli.records import Value
-from illumcli.render_graph.keys import Keys, code, digest
+from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
@@ -254,7 +255,7 @@ def _count(sampling: Sampling, vary: Vary) -> int:
 def _check(own: Subject, vary: Vary) -> None:
     """Refuse a layer that what is varied does not change."""
     steps, _ = own.planned(Sampling(1, 1, "spiral", 0))
-    if vary == "obscurance" and "obscurance" not in {step.makes for step in steps.tile}:
+    if vary == "obscurance" and "obscurance" not in {step.output for step in steps.tile}:
         raise InputError(
             f"layer '{own.layer.name}' casts no obscurance ray; use --vary pixels or another --layer"
         )

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from illumcli.accuracy.convergence import Convergence, Curve
+from illumcli.cache.fingerprint import digest
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix, refuse_unwritable
 from illumcli.files.seal import BLANK, sealed_csv, sealed_png, sealed_text
-from illumcli.render_graph.keys import digest
 
 COLUMNS = (
     "scene", "camera", "layer", "width", "height", "vary", "sampler", "pixel_samples", "obscurance_rays",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.layers import Layer
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
@@ -57,9 +57,9 @@ class Subject(Record):
         """The same from another view, all of whose pixels get all samples."""
         if view.camera.fit is not None:
             name = f"camera:{view.name}"
-            for step in order(recipes(self.scene, self.loaded), [name]):
-                if step.makes not in self.shared:
-                    self.shared[step.makes] = step.make(self.shared)
+            for step in topological_order(recipes(self.scene, self.loaded), [name]):
+                if step.output not in self.shared:
+                    self.shared[step.output] = step.run(self.shared)
             view = placed(view, self.shared[name])
         return replace(self, view=replace(view, adaptive=None))
 
@@ -71,8 +71,8 @@ class Subject(Record):
             update["obscurance"] = self.scene.obscurance.replaced(**finer)
         steps = plan(self.scene.replaced(**update), self.loaded, [self.layer.name])
         for step in steps.once:
-            if step.makes not in self.shared:
-                self.shared[step.makes] = step.make(self.shared)
+            if step.output not in self.shared:
+                self.shared[step.output] = step.run(self.shared)
         return steps, replace(self.view, samples=sampling.pixel)
 
     def picture(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:

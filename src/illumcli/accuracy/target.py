@@ -139,7 +139,7 @@ def chosen(
     layer = min(means, key=lambda layer: layer.buffer != "beauty")
     first = subject(loaded, layer.name, threads)
     subjects = tuple(map(first.seen_by, views(loaded.scene)))
-    has_rays = "obscurance" in {step.makes for step in steps.tile} and loaded.scene.obscurance is not None
+    has_rays = "obscurance" in {step.output for step in steps.tile} and loaded.scene.obscurance is not None
     pilots = [Pilot(each, has_rays) for each in subjects]
     goal = (MARGIN * target) ** 2
     aim, rays = goal, 0

@@ -21,6 +21,7 @@ from illumcli.baking.outputs import shapes_of
 from illumcli.baking.points import Surfaces, Vertices, vertex_points
 from illumcli.baking.sampling import MOST_SAMPLES, BakeSampler, Occluders
 from illumcli.baking.values import baked_values
+from illumcli.cache.fingerprint import digest
 from illumcli.commands.render import peak_memory
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import is_full
@@ -38,12 +39,12 @@ from illumcli.files.vertex_data import (
 )
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record, Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.build import recipes
-from illumcli.render_graph.keys import code, digest
+from illumcli.render_graph.keys import code
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs, repairs_data
 from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
@@ -256,8 +257,8 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The scene's meshes in their places, made as a render makes them, and the normals that w is taken about;
     what was put right."""
     buffers: dict[str, Any] = {}
-    for step in order(recipes(scene, loaded), ["world", "corner_normals", "repairs"]):
-        buffers[step.makes] = step.make(buffers)
+    for step in topological_order(recipes(scene, loaded), ["world", "corner_normals", "repairs"]):
+        buffers[step.output] = step.run(buffers)
     world, normals = buffers["world"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":
         normals = stages.corner_normals(("flat",) * len(world.placed), buffers["meshes"], world)

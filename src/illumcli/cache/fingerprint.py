@@ -1,31 +1,84 @@
-"""Files known by what is in them, never by their dates."""
+"""What values and files are known by: equal text for equal content, in every process.
+
+`fingerprint` writes a value as text, `digest` hashes it. A class may have a method `fingerprint()` that
+writes its own, as `FileFingerprint` does: it stands for the content of a file, not for its path or date.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
-from dataclasses import field
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, fields
+from functools import cached_property, partial
+from inspect import ismethod
 from pathlib import Path
+from types import FunctionType
 
 from illumcli.errors import InputError
+from illumcli.graph import short_name
 from illumcli.records import Value
 
 
-def _alone(path: Path) -> Iterable[Path]:
+def fingerprint(value: object) -> str:
+    """Text that equal values have in every process, and different values do not.
+
+    Of functions their short name and the values bound to them, of records the fields that their `repr` shows,
+    of descriptions of a scene all fields.
+
+    Raises
+    ------
+    TypeError
+        A value that has no text of its own: an array, an arbitrary object.
+    """
+    if value is None or isinstance(value, str | int | float | bytes):
+        return repr(value)
+    if isinstance(value, tuple | list):
+        return f"({', '.join(map(fingerprint, value))})"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{fingerprint(key)}: {fingerprint(each)}' for key, each in value.items())}}}"
+    if isinstance(value, type | FunctionType):
+        return short_name(value)
+    if isinstance(value, partial):
+        return fingerprint((value.func, value.args, sorted(value.keywords.items())))
+    if ismethod(value):
+        return fingerprint((value.__func__, value.__self__))
+    if (own_text := getattr(value, "fingerprint", None)) is not None:
+        return str(own_text())
+    if isinstance(value, Value):
+        named = {part.name: getattr(value, part.name) for part in fields(value) if part.repr}
+    elif isinstance(value, Iterable) and type(value).__module__.startswith("illumcli."):
+        named = dict(value)  # descriptions list their fields
+    else:
+        raise TypeError(f"{type(value).__name__} has no fingerprint")
+    return type(value).__name__ + fingerprint(named)
+
+
+def digest(value: object) -> str:
+    """32 hexadecimal digits that stand for the fingerprint of a value."""
+    return hashlib.blake2b(fingerprint(value).encode(), digest_size=16).hexdigest()
+
+
+def _none(path: Path) -> Iterable[Path]:
     return ()
 
 
 class FileFingerprint(Value):
-    """The content of a file and of those beside it that it names; equal contents have equal `repr`.
-
-    It is read when it is asked for.
-    """
+    """The content of a file and of those beside it that it names, read when it is first needed."""
 
     locate: Callable[[], Path]
-    """Finds the file; an error of its is raised when the content is asked for."""
-    beside: Callable[[Path], Iterable[Path]] = field(default=_alone)
-    """The files that `path` names, whether they are there or not."""
+    """Finds the file; its errors are raised when the content is needed."""
+    beside: Callable[[Path], Iterable[Path]] = field(default=_none)
+    """The files that `path` names, whether they exist or not."""
+
+    def fingerprint(self) -> str:
+        """Text that stands for the content.
+
+        Raises
+        ------
+        InputError
+            A file that cannot be read.
+        """
+        return f"Content({self.digest})"
 
     @cached_property
     def path(self) -> Path:
@@ -35,19 +88,16 @@ class FileFingerprint(Value):
     @cached_property
     def digest(self) -> str:
         """32 hexadecimal digits."""
-        own = file_digest(self.path)
+        content = file_digest(self.path)
         others = [
             (path.name, file_digest(path) if path.is_file() else None) for path in self.beside(self.path)
         ]
-        return hashlib.blake2b(repr((own, others)).encode(), digest_size=16).hexdigest() if others else own
+        return digest((content, others)) if others else content
 
     @property
     def has_changed(self) -> bool:
-        """Is the content other than when it was asked for first? Not where it never was."""
+        """Is the content another one than when it was first needed? False where it never was."""
         return "digest" in vars(self) and FileFingerprint(self.locate, self.beside).digest != self.digest
-
-    def __repr__(self) -> str:
-        return f"Content({self.digest})"
 
 
 def file_digest(path: Path) -> str:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from illumcli.baking.bake import Report, Settings, Work, baked, prepared
+from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.render import Progress
 from illumcli.files.names import check_unique, expand
 from illumcli.records import Value
-from illumcli.render_graph.keys import digest
 
 
 class Asked(Value):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli import __version__
-from illumcli.cache.fingerprint import file_digest
+from illumcli.cache.fingerprint import digest, file_digest
 from illumcli.errors import InputError, ThresholdError
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix
 from illumcli.film.heat import heat
@@ -19,7 +19,6 @@ from illumcli.film.metrics import Difference, absolute_difference, difference
 from illumcli.images.oiio import Image, flip, layers, read_image
 from illumcli.images.writer import ChannelType, ImageWriter
 from illumcli.records import Value
-from illumcli.render_graph.keys import digest
 from illumcli.schema.families import suggestion
 
 LIMITS = {

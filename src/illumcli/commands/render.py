@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli import __version__
+from illumcli.cache.fingerprint import digest
 from illumcli.cache.store import Store, default_folder, default_limit
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
@@ -32,7 +33,6 @@ from illumcli.render_graph.cached import Artifacts, Memory
 from illumcli.render_graph.culling import unseen_objects, without
 from illumcli.render_graph.execute import Planes, RenderStats, bands, run_once
 from illumcli.render_graph.framing import framed
-from illumcli.render_graph.keys import digest
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory
 from illumcli.render_graph.proportions import disproportion
 from illumcli.render_graph.repairs import refuse_repairs, repairs, repairs_data
@@ -292,7 +292,7 @@ def rendered(
 
 def proportions(work: Work, steps: Plan, standing: ObjectBounds | None) -> list[str]:
     """A line where rays that leave surfaces start visibly far off those around some object."""
-    if standing is None or all(step.makes != "ray_origins" for step in steps.tile):
+    if standing is None or all(step.output != "ray_origins" for step in steps.tile):
         return []
     found = disproportion(standing, steps.views)
     if found is None:

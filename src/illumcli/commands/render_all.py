@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.render import Progress, Report, Work, prepared, run_prepared
 from illumcli.files.names import check_unique
 from illumcli.records import Value
-from illumcli.render_graph.keys import digest
 from illumcli.scene.load import load
 
 

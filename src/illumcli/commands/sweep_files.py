@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.cache.fingerprint import file_digest
+from illumcli.cache.fingerprint import digest, file_digest
 from illumcli.commands.render import channels
 from illumcli.errors import InputError, OutputError
 from illumcli.files.outputs import INCOMPLETE, is_kept, is_whole, refresh, refuse_suffix
 from illumcli.files.seal import sealed_csv, sealed_json
 from illumcli.memory import refuse_beyond
 from illumcli.records import Record, Value
-from illumcli.render_graph.keys import digest
 
 if TYPE_CHECKING:
     from illumcli.commands.sweep import Outcome

@@ -230,7 +230,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     implied = {"smooth": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
     for name, light in scene.named_lights().items():
         book += _light(name, light, eye, at_samples, implied)
-    made = {recipe.makes: recipe for recipe in [*book, *_sums(scene)]}
+    made = {recipe.output: recipe for recipe in [*book, *_sums(scene)]}
     counts = [view.samples for view in views(scene)]
     made |= {f"camera:{view.name}": recipe for view, recipe in _framings(scene, unseen)}
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)

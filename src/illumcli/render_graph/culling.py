@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from illumcli.geometry.scene_geometry import ObjectBounds
-from illumcli.graph import order
+from illumcli.graph import topological_order
 from illumcli.render_graph.build import SMOOTH, active_lights, rates
 from illumcli.render_graph.cached import Artifacts, Book
 from illumcli.render_graph.execute import RenderStats, run_once
@@ -36,7 +36,7 @@ def why_all(made: Plan) -> str | None:
 
 def _reach(made: Plan, radius: float) -> float:
     """How far obscurance rays of the plan tell anything [scene units]; 0 where it casts none."""
-    steps = {step.makes for step in made.tile}
+    steps = {step.output for step in made.tile}
     if made.scene is None or not {"obscurance", "obscurance_draws"} <= steps:
         return 0.0
     return (made.scene.obscurance or Obscurance()).falloff.reach(radius)
@@ -62,7 +62,7 @@ def unseen_objects(
         frustum(view.camera, frame, view.width, view.height, film.filter if view.samples > 1 else None)
         for view in made.views
     ]
-    steps = {step.makes for step in made.tile}
+    steps = {step.output for step in made.tile}
     lights = [
         light for name, light in active_lights(scene).items() if light.shadows and f"shadow:{name}" in steps
     ]
@@ -94,13 +94,13 @@ def asked(
 ) -> Any:
     """A buffer of the whole scene, before the plan runs; None where it would have to be made and must not."""
     book = Book(made.book, made.views[0], artifacts)
-    steps = order(book, [name], GIVEN)
+    steps = topological_order(book, [name], GIVEN)
     if at_hand and name not in artifacts.reused:
         return None
     new = [
-        step.makes
+        step.output
         for step in steps
-        if step.makes not in artifacts.reused and book.keys_of(step.makes) not in artifacts.made
+        if step.output not in artifacts.reused and book.keys_of(step.output) not in artifacts.made
     ]
     kept = {each: book.keys_of(each) for each in new if artifacts.keeps(each)}
     first = replace(made, once=tuple(steps), reused=artifacts.reused, keeps=kept)

@@ -93,17 +93,17 @@ def run_once(
     pending: dict[str, Future[Any]] = {}
 
     def make(step: Node) -> Any:
-        needs = {name: pending[name].result() for name in step.needs.values()}  # handed out before it
+        needs = {name: pending[name].result() for name in step.inputs.values()}  # handed out before it
         start = time.perf_counter()
-        made = step.make(needs)
-        tally.add({step.makes: time.perf_counter() - start}, {})
+        made = step.run(needs)
+        tally.add({step.output: time.perf_counter() - start}, {})
         return made
 
     buffers: dict[str, Any] = {}
     pool = ThreadPoolExecutor(threads, thread_name_prefix="once")
     try:
         for step in plan.once:
-            pending[step.makes] = pool.submit(make, step)
+            pending[step.output] = pool.submit(make, step)
         for name, future in pending.items():
             buffers[name] = future.result()
             if artifacts is not None and name in plan.keeps:
@@ -227,15 +227,15 @@ def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept
         if common.stop.is_set():
             raise Interrupted
         start, before = time.perf_counter(), tracer.rays if tracer else 0
-        made = buffers[step.makes] = step.make(buffers)
-        seconds[step.makes] = time.perf_counter() - start
+        made = buffers[step.output] = step.run(buffers)
+        seconds[step.output] = time.perf_counter() - start
         if tracer and tracer.rays > before:
-            rays[step.makes] = tracer.rays - before
+            rays[step.output] = tracer.rays - before
         if isinstance(made, LitPoints):
-            lanes[step.makes] = made.count - len(made.lane)
-        if step.makes in common.keeper.names:
-            kept[step.makes] = common.keeper.take(step.makes, buffers, tile)
-        for name in step.needs.values():
+            lanes[step.output] = made.count - len(made.lane)
+        if step.output in common.keeper.names:
+            kept[step.output] = common.keeper.take(step.output, buffers, tile)
+        for name in step.inputs.values():
             if common.last_use.get(name) == number:
                 buffers.pop(name, None)
     common.tally.add(seconds, rays, lanes)

@@ -1,15 +1,16 @@
-"""What a buffer depends on, as one hash: its recipe, the values bound in it, and the keys of what it needs.
+"""What a buffer depends on, as one hash: its node, the values bound in it, and the keys of its inputs.
 
-Nothing is listed by hand. A recipe binds only the parts of the scene that its function reads, so the wiring
-itself says that a colour changes no hit, and that a lamp's place changes that lamp's shadow alone.
+Nothing is listed by hand. A node binds only the parts of the scene that its function reads, so the wiring
+itself says that a colour changes no hit, and that a light's position changes only that light's shadow. Nodes
+are known by name, not by the module of their function: a function that moves keeps its keys.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping
-from functools import cache, partial
+from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,76 +18,73 @@ from typing import Any
 
 import numpy
 
+from illumcli.cache.fingerprint import digest, fingerprint
 from illumcli.graph import Node
 
-MAKERS = (
-    "geometry",
-    "mesh_files",
-    "rays",
-    "visibility",
-    "lights",
-    "shading",
-    "render_graph",
-    "models",
+SOURCES = (
     "arrays.py",
+    "files/vertex_data.py",
+    "film",
+    "geometry",
+    "lights",
+    "mesh_files",
+    "models",
+    "rays",
+    "render_graph",
     "render_space.py",
+    "shading",
+    "visibility",
 )
-"""Sources that decide about the content of what is kept between runs."""
+"""Source files and folders that decide about the content of what is kept between runs. A test follows the
+imports of all nodes' functions and fails where one of them leads elsewhere."""
 
 
 class Keys:
-    """The key of every buffer in a book, 32 hexadecimal digits, found when asked for."""
+    """The key of every buffer of a graph, 32 hexadecimal digits, computed when first needed."""
 
-    def __init__(self, book: Mapping[str, Node], view: Any, salt: str) -> None:
-        self._book = book
+    def __init__(self, graph: Mapping[str, Node], view: Any, salt: str) -> None:
+        self._graph = graph
         self._salt = salt
-        self._known = {"tile": "tile", "view": repr(view)}
+        self._known = {"tile": "tile", "view": fingerprint(view)}
 
     def __call__(self, name: str) -> str:
         """The key of the buffer `name`, of all tiles together."""
         if name not in self._known:
-            recipe = self._book[name]
-            needs = [(parameter, self(need)) for parameter, need in recipe.needs.items()]
-            self._known[name] = digest((self._salt, identity(recipe.function), needs))
+            node = self._graph[name]
+            inputs = [(parameter, self(buffer)) for parameter, buffer in node.inputs.items()]
+            self._known[name] = digest((self._salt, node.name, node.function, inputs))
         return self._known[name]
 
 
-def digest(value: object) -> str:
-    """32 hexadecimal digits that stand for the `repr` of a value."""
-    return hashlib.blake2b(repr(value).encode(), digest_size=16).hexdigest()
-
-
-def identity(function: Callable[..., Any]) -> str:
-    """A function by name with the values bound in it; the same text in every process."""
-    if isinstance(function, partial):
-        return repr((identity(function.func), function.args, sorted(function.keywords.items())))
-    return f"{function.__module__}.{function.__qualname__}"
-
-
 def _installed(library: str) -> list[str]:
-    """The version of a library by the name of its metadata folder: nothing is imported for it, and
+    """The version of a library, by the name of its metadata folder. Nothing is imported for it, and
     `importlib.metadata` takes longer than all the hashing."""
     spec = find_spec(library)
     places = spec.submodule_search_locations if spec else None
-    return sorted(found.name for place in places or () for found in Path(place).parent.glob(f"{library}-*"))
+    return sorted(path.name for place in places or () for path in Path(place).parent.glob(f"{library}-*"))
+
+
+def source_files(root: str) -> list[str]:
+    """The paths of all Python files that `SOURCES` names below a package's folder."""
+    paths = []
+    for name in SOURCES:
+        place = os.path.join(root, name)
+        files = [os.path.join(folder, each) for folder, _, names in os.walk(place) for each in names]
+        paths += [path for path in sorted(files or [place]) if path.endswith(".py")]
+    return paths
 
 
 @cache
 def code() -> str:
-    """Hash of the sources that make what is kept, and of the numpy, ray core and processor they run on.
+    """Hash of the sources that compute what is kept, and of the numpy, ray core and processor they run on.
 
-    Processors differ in the instructions they have, and with them the last bits of their results.
+    The sources count by their text, not by their places. Processors differ in the instructions they have, and
+    with them the last bits of their results.
     """
     features: dict[str, bool] = import_module("numpy._core._multiarray_umath").__cpu_features__
-    digest = hashlib.blake2b(digest_size=16)
-    root = os.path.dirname(os.path.dirname(__file__))
-    for name in MAKERS:
-        place = os.path.join(root, name)
-        found = [os.path.join(folder, each) for folder, _, files in os.walk(place) for each in files]
-        for path in sorted(found or [place]):
-            if path.endswith(".py"):
-                with open(path, "rb", buffering=0) as source:
-                    digest.update(f"{path[len(root) :]}\0".encode() + source.read())
+    texts = []
+    for path in source_files(os.path.dirname(os.path.dirname(__file__))):
+        with open(path, "rb", buffering=0) as source:
+            texts.append(hashlib.blake2b(source.read(), digest_size=16).digest())
     libraries = [numpy.__version__, *_installed("embreex")]
-    digest.update(repr((libraries, sorted(name for name, has in features.items() if has))).encode())
-    return digest.hexdigest()
+    return digest((sorted(texts), libraries, sorted(name for name, has in features.items() if has)))

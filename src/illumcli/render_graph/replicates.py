@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.film.reconstruct import pixel_means
-from illumcli.graph import Node, order
+from illumcli.graph import Node, topological_order
 from illumcli.rays import sampling
 from illumcli.rays.interaction import Hits
 from illumcli.render_graph.stages import Samples, Tile
@@ -51,23 +51,23 @@ def error_recipes(
     given : names
         Buffers that need no recipe.
     """
-    steps = order(book, ["beauty"], given)
-    traced = "obscurance_draws" in {step.makes for step in steps}
+    steps = topological_order(book, ["beauty"], given)
+    traced = "obscurance_draws" in {step.output for step in steps}
     if max(samples) == 1 and not traced:
         return {"error": Node.of(no_error, "error")}
     copied = {"samples"}
     made = [Node.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
     for step in steps:
-        if copied.isdisjoint(step.needs.values()):
+        if copied.isdisjoint(step.inputs.values()):
             continue
-        copied.add(step.makes)
-        needs = {p: f"{AGAIN}{need}" if need in copied else need for p, need in step.needs.items()}
-        function = partial(doubled_draws, seed) if step.makes == "obscurance_draws" else step.function
-        made.append(Node(f"{AGAIN}{step.makes}", function, needs))
+        copied.add(step.output)
+        needs = {p: f"{AGAIN}{need}" if need in copied else need for p, need in step.inputs.items()}
+        function = partial(doubled_draws, seed) if step.output == "obscurance_draws" else step.function
+        made.append(Node(f"{AGAIN}{step.output}", function, needs))
     two = {f"{which}_{what}": f"{prefix}{what}" for which, prefix in (("first", ""), ("second", AGAIN))
            for what in ("samples", "hits", "beauty")}  # fmt: skip
     made.append(Node.of(partial(standard_error, background or (0.0, 0.0, 0.0)), "error", **two))
-    return {recipe.makes: recipe for recipe in made}
+    return {recipe.output: recipe for recipe in made}
 
 
 def doubled_count(width: int, height: int) -> int:

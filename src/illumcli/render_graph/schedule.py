@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from illumcli import __version__
+from illumcli.cache.fingerprint import digest
 from illumcli.errors import InputError, LimitError
-from illumcli.graph import Node, order
+from illumcli.graph import Node, topological_order
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import (
@@ -27,7 +28,7 @@ from illumcli.render_graph.build import (
     views,
 )
 from illumcli.render_graph.cached import Artifacts, Book, Picture, kind_of
-from illumcli.render_graph.keys import Keys, code, digest
+from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.replicates import AGAIN, BLOCK, doubled_count
 from illumcli.render_graph.stages import tile_side
 from illumcli.scene.spec import Scene
@@ -61,10 +62,10 @@ class Plan(Value):
         # the film reads them
         kept = {layer.buffer for layer in self.layers} | {"hits", "samples", "alpha"}
         kept |= set(SHAPE) if any(view.is_adaptive for view in self.views) else set()
-        made = {step.makes for step in self.tile}
+        made = {step.output for step in self.tile}
         last: dict[str, int] = {}
         for number, step in enumerate(self.tile):
-            for name in step.needs.values():
+            for name in step.inputs.values():
                 if name in made and name not in kept:
                     last[name] = number
         return last
@@ -79,8 +80,8 @@ class Plan(Value):
             ],
             "layers": [layer.name for layer in self.layers],
             "objects": self.objects,
-            "once": [step.makes for step in self.once],
-            "tile": [step.makes for step in self.tile],
+            "once": [step.output for step in self.once],
+            "tile": [step.output for step in self.tile],
             "skipped": dict(self.skipped),
             "expected_rays": dict(self.expected_rays),
             "reused": dict(self.reused),
@@ -113,7 +114,7 @@ class Plan(Value):
             each = open_names.pop()
             if each not in needs and each not in self.reused and each not in GIVEN:
                 needs.add(each)
-                open_names += self.book[each].needs.values()
+                open_names += self.book[each].inputs.values()
         return frozenset(needs)
 
 
@@ -137,7 +138,7 @@ def plan(scene: Scene, loaded: Any, only: Sequence[str] = (), unseen: tuple[int,
             "the layer error is that of a fixed number of samples; leave it out, or film.adaptive"
         )
     once, tile = _steps(book, wanted, all_views)
-    made = {step.makes for step in (*once, *tile)}
+    made = {step.output for step in (*once, *tile)}
     rays = _expected_rays(scene, all_views, made)
     _refuse(all_views, rays)
     reasons = _why_not(scene, book, made)
@@ -150,13 +151,13 @@ def reusing(made: Plan, view: View, artifacts: Artifacts) -> Plan:
     """The plan for one view, with what is at hand loaded instead of made."""
     book = Book(made.book, view, artifacts)
     once, tile = _steps(book, made.layers, (view,))
-    steps = {step.makes for step in (*once, *tile)}
+    steps = {step.output for step in (*once, *tile)}
     found = {name: where for name, where in artifacts.reused.items() if name in steps}
     rays = _expected_rays(made.scene, (view,), steps - found.keys())
     skipped = dict(made.skipped)
     for step in (*made.once, *made.tile):
-        if step.makes not in steps and book.keys_of(step.makes) not in artifacts.made:
-            skipped[step.makes] = "all that needs it is at hand"
+        if step.output not in steps and book.keys_of(step.output) not in artifacts.made:
+            skipped[step.output] = "all that needs it is at hand"
     new = [name for name in steps - found.keys() if book.keys_of(name) not in artifacts.made]
     kept = {name: book.keys_of(name) for name in new if artifacts.keeps(name)}
     return replace(
@@ -187,12 +188,12 @@ def read_by_others(made: Plan, following: Plan | None) -> frozenset[str]:
         if view not in made.views:
             continue
         own, other = (Keys(each.book, view, code()) for each in (made, following))
-        common = {step.makes for step in following.tile if step.makes in made.book}
+        common = {step.output for step in following.tile if step.output in made.book}
         common = {name for name in common if own(name) == other(name)}
         asked = {layer.buffer for layer in following.layers} | {"hits", "samples", "alpha"}
-        read = {need for step in following.tile if step.makes not in common for need in step.needs.values()}
+        read = {need for step in following.tile if step.output not in common for need in step.inputs.values()}
         wanted |= {other(name) for name in common & (asked | read)}
-        wanted |= {other(name) for name in ("implied_widths", *(step.makes for step in following.once))}
+        wanted |= {other(name) for name in ("implied_widths", *(step.output for step in following.once))}
     return frozenset(wanted)
 
 
@@ -207,12 +208,12 @@ def _steps(
         filled |= dict.fromkeys(SHAPE)
         coverage = ["alpha"]
     told = [name for name in ("repairs", "undirected", "unnamed") if name in book]
-    steps = order(book, [*filled, *coverage, *nearest, "hits", "frame", *told], GIVEN)
+    steps = topological_order(book, [*filled, *coverage, *nearest, "hits", "frame", *told], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []
     for step in steps:
-        if in_tile & set(step.needs.values()):
-            in_tile.add(step.makes)
+        if in_tile & set(step.inputs.values()):
+            in_tile.add(step.output)
             tile.append(step)
         else:
             once.append(step)

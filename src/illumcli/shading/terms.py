@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from illumcli.arrays import Floats, Vectors, cross, dot, length, mirror, unit
-from illumcli.graph import Node, order, required
+from illumcli.graph import Node, required, topological_order
 
 GIVEN = ("n", "l", "v", "t", "light")
 
@@ -180,7 +180,7 @@ TERMS: dict[str, Node] = {function.__name__: Node.of(function) for function in F
 @cache
 def steps(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Node, ...]:
     """The terms that `needs` reach, each after those it is formed from."""
-    return tuple(order(TERMS, needs, given))
+    return tuple(topological_order(TERMS, needs, given))
 
 
 def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dict[str, Any]:
@@ -201,14 +201,14 @@ def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dic
     """
     buffers = dict(given)
     for recipe in steps(_needs(lobes), tuple(given)):
-        buffers[recipe.makes] = recipe.make(buffers)
+        buffers[recipe.output] = recipe.run(buffers)
     return {name: lobe(**{need: buffers[need] for need in required(lobe)}) for name, lobe in lobes.items()}
 
 
 def words(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
     """The given words (`n`, `l`, `v`, `t`, `light`) that these lobes reach."""
     needs = _needs(lobes)
-    reached = {need for step in steps(needs) for need in step.needs.values()}
+    reached = {need for step in steps(needs) for need in step.inputs.values()}
     return frozenset(reached.union(needs).intersection(GIVEN))
 
 

@@ -56,7 +56,7 @@ def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
     """Terms of the renderer by name, from the case's n, l and v and `more` words."""
     buffers: dict[str, Any] = {key: inputs.unit(key) for key in ("n", "l", "v")} | more
     for recipe in terms.steps(names, tuple(buffers)):
-        buffers[recipe.makes] = recipe.make(buffers)
+        buffers[recipe.output] = recipe.run(buffers)
     return [buffers[name] for name in names]
 
 

@@ -57,7 +57,9 @@ print(refusals)
 
 @pytest.mark.parametrize("step", [2048, pytest.param(128, marks=pytest.mark.slow)])
 def test_a_disk_full_at_any_byte_leaves_whole_files_or_none(python, folder, step):
-    assert int(python(FULL, step)) > 3
+    refused = int(python(FULL, step))
+    print(f"every {step} bytes: {refused} disks were full")  # pytest -rP shows it
+    assert refused > 3
 
 
 FAILING = (
@@ -124,5 +126,6 @@ OFTEN = ("open", "fsync", "replace")
     "call", [call if call in OFTEN else pytest.param(call, marks=pytest.mark.slow) for call in CALLS]
 )
 def test_the_nth_system_call_that_fails_is_an_error_and_no_half_file(python, folder, call):
-    tried, _ = map(int, python(FAILING, call, CALLS[call]).split())
+    tried, refused = map(int, python(FAILING, call, CALLS[call]).split())
+    print(f"{call}: {tried} tries, {refused} errors")  # pytest -rP shows it
     assert tried >= 1

@@ -67,11 +67,13 @@ def known(error: BaseException) -> IllumError | None:
             if error.errno in (errno.EMFILE, errno.ENFILE):
                 return LimitError(f"{fact}; raise the limit on open files (ulimit -n)")
             return OutputError(f"{fact}; check the disk and the permissions")
-        case ImportError():  # most often too little memory to map a library
+        case ImportError() | SyntaxError():  # most often too little memory to map a library, or to compile
             said = str(error).strip().splitlines()[-1:] or ["no reason given"]
             return LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again")
         case RuntimeError() if any(fact in str(error) for fact in _LITTLE_MEMORY_TOO):
             return LimitError(LITTLE_MEMORY)
+        case ValueError() if str(error).startswith("field '") and " is required for " in str(error):
+            return LimitError(LITTLE_MEMORY)  # the compiler's tree lacks a part that got no memory
         case SystemError() if _NO_REASON.fullmatch(str(error)):
             return LimitError(f"{error}: most often for want of memory; {_SMALLER}, or report it as a fault")
     return None

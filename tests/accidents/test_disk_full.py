@@ -7,7 +7,7 @@ import pytest
 COMMON = """
 import os, sys, hashlib, shutil
 from pathlib import Path
-from illumcli.errors import IllumError, OutputError
+from illumcli.errors import OutputError, known
 from illumcli.commands.render import run
 from illumcli.images import oiio as images
 
@@ -91,10 +91,12 @@ while True:
     try:
         run(Path("scene.yaml"), threads=1)
         complete = True
-    except IllumError as error:
+    except Exception as error:
         complete = False
         refused += 1
-        assert len(str(error).splitlines()) <= 4, str(error)
+        fault = known(error)
+        assert fault is not None and fault.exit_code in (4, 5), repr(error)
+        assert len(str(fault).splitlines()) <= 4, str(fault)
     done = state["calls"] < n
     state["fail"] = 0
     found = files() if os.path.isdir("out") else {}

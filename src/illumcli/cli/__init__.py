@@ -14,7 +14,7 @@ import click
 
 from illumcli import __version__
 from illumcli.cli._streams import open_standard_streams
-from illumcli.errors import IllumError, OutputError, known
+from illumcli.errors import LITTLE_MEMORY, IllumError, LimitError, OutputError, known
 from illumcli.memory import refuse_little
 
 _TO_LOAD = 160 << 20
@@ -90,9 +90,9 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # threads are ours: those of numpy's linear algebra would only spin beside them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    output = open_standard_streams()
     status = 1
     try:
+        output = open_standard_streams()
         status = _status()
         sys.stdout.flush()
         if output.fault is not None and status == 0:
@@ -101,6 +101,8 @@ def main() -> None:
         sys.stderr.flush()
     except _Stopped as stop:
         _die_by(stop.number)
+    except MemoryError:
+        status = _told(LimitError(LITTLE_MEMORY))
     # to take the interpreter apart costs an eighth of a small render, and after an error it may wait for
     # threads of the ray core that could not start
     os._exit(status)

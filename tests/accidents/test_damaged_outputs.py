@@ -49,7 +49,7 @@ def swept(folder, name):
 
     def make(force=False):
         pattern = str(folder / "o" / "{ambient}.png")
-        settings = sweep.Settings(pattern, only=("beauty",), cache=False, force=force, threads=1)
+        settings = sweep.Settings(pattern=pattern, only=("beauty",), cache=False, force=force, threads=1)
         files = sweep.Files(**{name.partition(".")[0]: folder / name})
         variants = sweep.variants_of(["ambient=0.1,0.2", "film.width=16", "film.height=12"])
         return list(map(str, sweep.run(folder / "scene.yaml", variants, settings, files).kept))

@@ -47,10 +47,10 @@ def test_no_end_is_a_traceback(error):
 LINGERING = """
 import time
 import illumcli.cli as cli
-from illumcli.files.atomic import Part
+from illumcli.files.atomic import AtomicFile
 
 def lingers(*words, **more):
-    part = Part("picture.exr")
+    part = AtomicFile("picture.exr")
     try:
         print("open", flush=True)
         time.sleep(60)

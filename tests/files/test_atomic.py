@@ -162,8 +162,8 @@ def test_parts_that_nobody_holds_are_removed_and_no_others(tmp_path):
 
 LIVE = """
 import sys, time
-from illumcli.files.atomic import Part
-with Part(sys.argv[1]) as part:
+from illumcli.files.atomic import AtomicFile
+with AtomicFile(sys.argv[1]) as part:
     part.path.write_text("theirs")
     print("there", flush=True)
     sys.stdin.read()
@@ -271,8 +271,8 @@ def test_a_system_without_names_for_open_files_or_without_locks_writes_too(tmp_p
 def test_killed_process_leaves_no_file_and_the_next_run_tidies_up(tmp_path):
     script = f"""
 import os, signal
-from illumcli.files.atomic import Part
-with Part({str(tmp_path / "a.txt")!r}) as part:
+from illumcli.files.atomic import AtomicFile
+with AtomicFile({str(tmp_path / "a.txt")!r}) as part:
     part.path.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
 """

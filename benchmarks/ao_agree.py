@@ -24,11 +24,11 @@ import numpy as np
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, cross, dot, length, take_rows, unit
 from illumcli.baking.bake import Settings, run
-from illumcli.files.vertex_data import read_npz
 from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, facets
 from illumcli.render_graph.build import recipes
 from illumcli.scene.load import SceneFile, load
+from illumcli.visibility.baked import read_npz
 
 POINTS = 20 if SMALL else 2000
 RAYS = 64 if SMALL else 256

@@ -39,7 +39,7 @@ from _bench import (
     spread,
     table,
 )
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 
 ERROR = 0.01
 SIZE = (64, 36) if SMALL else (1280, 720)

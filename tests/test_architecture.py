@@ -27,7 +27,6 @@ FOLDERS = (
 """From the top down: a folder imports from those below its line, and from single files beside them."""
 NOT_YET = {
     ("schema/faults.py", "scene"),
-    ("files/outputs.py", "images"),
     ("accuracy/convergence.py", "commands"),
     ("baking/bake.py", "commands"),
 }
@@ -38,7 +37,7 @@ HOMES = {
     "yaml": ("scene/source.py",),
     "pydantic": ("commands/schema.py",),
     "embreex": ("rays/",),
-    "OpenImageIO": ("images/oiio.py",),
+    "OpenImageIO": ("images/openimageio.py",),
     "matplotlib": ("brdf/", "accuracy/"),
 }
 

@@ -9,7 +9,7 @@ import os, sys, hashlib, shutil
 from pathlib import Path
 from illumcli.errors import OutputError, known
 from illumcli.commands.render import run
-from illumcli.images import oiio as images
+from illumcli.images import exr  # loaded before files may not grow
 
 def files(folder="out"):
     return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(Path(folder).glob("*"))}

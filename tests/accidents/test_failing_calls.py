@@ -8,7 +8,7 @@ SCRIPT = """
 import builtins, errno, fcntl, gc, hashlib, io, os, sys
 from pathlib import Path
 
-import illumcli.images.oiio
+import illumcli.images.exr
 from illumcli.cli import illum
 from illumcli.errors import IllumError, known
 

@@ -193,7 +193,7 @@ def hook(event, words):
 from pathlib import Path
 from illumcli.errors import IllumError
 from illumcli.commands.render import run
-from illumcli.images import oiio as images
+from illumcli.images import exr
 import illumcli.commands.check
 os.chdir(root)
 sys.addaudithook(hook)

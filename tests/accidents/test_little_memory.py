@@ -24,8 +24,8 @@ import numpy as np
 import pytest
 
 from illumcli.errors import LimitError, known
-from illumcli.images.oiio import ExrFile
-from illumcli.images.writer import Refused
+from illumcli.images.exr import ExrFile
+from illumcli.images.format import WriteError
 from illumcli.schema.families import modules
 
 SHIM = """
@@ -87,7 +87,7 @@ from pathlib import Path
 
 import numpy as np
 
-import illumcli.images.oiio, illumcli.render_graph.execute, illumcli.scene.load
+import illumcli.images.exr, illumcli.render_graph.execute, illumcli.scene.load
 from embreex import mesh_construction, rtcore_scene
 from illumcli.cli import main
 from illumcli.errors import known
@@ -272,7 +272,7 @@ def test_an_exr_that_gets_no_memory_to_be_compressed_is_beyond_a_limit(tmp_path)
     file = ExrFile(tmp_path / "a.exr", 8, 8, {"Y": "half"}, {})
     band = np.zeros((8, 8, 1), np.float16)
     said = 'Failed OpenEXR write: Failed to write pixel data to image file "a.exr". '
-    for fact, kind in (("Unable to run compression routine", MemoryError), ("No space left", Refused)):
+    for fact, kind in (("Unable to run compression routine", MemoryError), ("No space left", WriteError)):
         answers = {"geterror": lambda fact=fact: said + fact, "write_scanlines": lambda *_: False}
         file._output = SimpleNamespace(**answers)
         with pytest.raises(kind):

@@ -10,7 +10,8 @@ from click.testing import CliRunner
 
 from illumcli.cli.compare import compare
 from illumcli.errors import InputError, ThresholdError
-from illumcli.images.writer import ImageWriter, channel_types
+from illumcli.images.channels import channel_types
+from illumcli.images.writer import ImageWriter
 
 
 @pytest.fixture

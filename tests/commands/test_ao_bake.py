@@ -14,13 +14,13 @@ from illumcli.baking.bake import Settings, run
 from illumcli.baking.sampling import BakeSampler
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
-from illumcli.files.vertex_data import read_npz
 from illumcli.geometry.normals import corner_normals
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
+from illumcli.visibility.baked import read_npz
 
 CUBE = """
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1

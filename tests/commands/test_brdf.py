@@ -11,7 +11,7 @@ import pytest
 from illumcli.brdf import VIEWS, described, run
 from illumcli.brdf.views import lit_plane, lit_sphere, lobe, polar_slice, slice_angles
 from illumcli.errors import IllumError, InputError, OutputError
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 from illumcli.schema.families import tags
 
 

@@ -11,8 +11,9 @@ import pytest
 
 from illumcli.commands.compare import LIMITS, as_data, as_table, check, run
 from illumcli.errors import InputError, ThresholdError
-from illumcli.images.oiio import read_image, read_metadata
-from illumcli.images.writer import ImageWriter, channel_types
+from illumcli.images.channels import channel_types
+from illumcli.images.reader import read_image, read_metadata
+from illumcli.images.writer import ImageWriter
 
 NAMES = ("R", "G", "B", "A", "Z", "key.R", "key.G", "key.B")
 

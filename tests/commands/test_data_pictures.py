@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.commands.render import run
-from illumcli.images.oiio import read_image, read_metadata
+from illumcli.images.reader import read_image, read_metadata
 
 SCENE = """version: 1
 film: {width: 40, height: 30, samples: 1, exposure: 1.5}

@@ -12,7 +12,7 @@ import time
 import numpy as np
 import pytest
 
-from illumcli.images.oiio import read_image, read_metadata
+from illumcli.images.reader import read_image, read_metadata
 
 SCENE = """
 version: 1

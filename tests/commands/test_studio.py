@@ -8,7 +8,7 @@ from pydantic_core import ValidationError
 
 from illumcli.commands.render import run
 from illumcli.errors import InputError
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 from illumcli.images.writer import ImageWriter
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.camera import MARGIN

@@ -11,7 +11,7 @@ import pytest
 
 from illumcli.commands.sweep import Files, Settings, at_frame, axis_of, run, split, variants_of
 from illumcli.errors import InputError, LimitError, OutputError
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 
 SCENE = """
 version: 1

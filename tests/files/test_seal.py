@@ -7,9 +7,12 @@ import random
 import numpy as np
 import pytest
 
-from illumcli.files.seal import BLANK, is_sealed, sealed_csv, sealed_json, sealed_text
-from illumcli.files.vertex_data import Baked, Shape, write_glb, write_npz, write_ply
+from illumcli.baking.files import write_baked_glb, write_baked_ply
+from illumcli.files.reports import sealed_csv, sealed_json
+from illumcli.files.seal import BLANK, is_sealed, sealed_text
 from illumcli.images.writer import ImageWriter
+from illumcli.mesh_files.output_mesh import OutputMesh
+from illumcli.visibility.baked import Baked, write_npz
 
 FORMATS = ("half.exr", "mixed.exr", "8.png", "16.png", "npz", "ply", "glb", "csv", "json", "svg")
 
@@ -39,16 +42,16 @@ def write(path, rows=5, seed=0):
         return path
     corners, starts = np.array([0, 1, 2], np.int32), np.array([0, 3], np.int32)
     vertices = draw.random((3 * rows, 3))
-    shape = Shape("a", vertices, corners, starts, corners.reshape(1, 3), {})
+    shape = OutputMesh("a", vertices, corners, starts, corners.reshape(1, 3), {})
     w = draw.random(3 * rows).astype(np.float32)
     baked = Baked(w, w, about={"content": "abc"})
     match path.suffix:
         case ".npz":
             write_npz(path, baked)
         case ".ply":
-            write_ply(path, [shape], baked, None, None)
+            write_baked_ply(path, [shape], baked, None, None)
         case ".glb":
-            write_glb(path, [shape], baked, None)
+            write_baked_glb(path, [shape], baked, None)
     return path
 
 

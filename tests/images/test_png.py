@@ -10,7 +10,8 @@ import zlib
 import numpy as np
 import pytest
 
-from illumcli.images.oiio import read_image, read_metadata
+from illumcli.images.png import read_texts
+from illumcli.images.reader import read_image, read_metadata
 from illumcli.images.writer import ImageWriter
 
 
@@ -98,3 +99,17 @@ def test_a_picture_is_written_without_the_library_of_the_others(tmp_path):
     )
     subprocess.run([sys.executable, "-c", code, tmp_path / "a.png"], check=True)
     assert read_image(tmp_path / "a.png").width == 4
+
+
+def test_texts_are_read_without_the_library_and_only_of_sound_files(tmp_path):
+    path = tmp_path / "a.png"
+    with ImageWriter(path, 2, 2, {"Y": "uint8"}, {"illum:content": "one", "seed": 7}) as writer:
+        writer.write_band(0, np.zeros((2, 2, 1), np.uint8))
+    texts = read_texts(path)
+    assert {name: texts[name] for name in ("illum:content", "seed")} == {"illum:content": "one", "seed": "7"}
+    data = path.read_bytes()
+    cut = "end is missing"
+    for size, fact in ((0, "no PNG"), (7, "no PNG"), (8, cut), (len(data) - 9, cut)):
+        path.write_bytes(data[:size])
+        with pytest.raises(ValueError, match=fact):
+            read_texts(path)

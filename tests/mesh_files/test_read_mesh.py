@@ -88,7 +88,7 @@ def test_a_reader_is_imported_only_for_its_files(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; from illumcli.mesh_files import read_mesh;"
         "read_mesh(Path(sys.argv[1]));"
-        "loaded = {name.rpartition('.')[2] for name in sys.modules if '.geometry.readers.' in name};"
+        "loaded = {name.rpartition('.')[2] for name in sys.modules if 'illumcli.mesh_files.' in name};"
         "print(loaded & {'obj', 'ply', 'stl', 'gltf'})"
     )
     done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking import bake as ao_bake
-from illumcli.files.vertex_data import read_npz
 from illumcli.geometry.scene_geometry import transform_matrix
 from illumcli.mesh_files import read_mesh
 from illumcli.scene.load import load
+from illumcli.visibility.baked import read_npz
 from metamorphic import scenes, surfaces
 from metamorphic.pictures import Studio
 from metamorphic.premises import at_centres

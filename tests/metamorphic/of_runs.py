@@ -14,7 +14,7 @@ import numpy as np
 
 from illumcli.cache.store import Store
 from illumcli.commands import render, sweep
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 from illumcli.render_graph import cached as artifacts
 from illumcli.render_graph.cached import Memory
 from illumcli.render_graph.execute import RenderStats, at_pixels, run_once

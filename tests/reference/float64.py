@@ -203,7 +203,7 @@ class Difference:
 def compare(setup, folder):
     """A row per layer, over the pixels whose every ray answered alike, and the counts of those left out."""
     from illumcli.commands.render import run
-    from illumcli.images.oiio import read_image
+    from illumcli.images.reader import read_image
 
     image = folder / f"{setup.name}.exr"
     run(setup.write(folder), pattern=str(image), cache=False)

@@ -123,7 +123,7 @@ def test_nothing_random_is_exact_and_doubles_nothing(scene):
 
 
 def test_the_report_and_the_file_have_it(scene, tmp_path):
-    from illumcli.images.oiio import read_image
+    from illumcli.images.reader import read_image
 
     target = tmp_path / "out.exr"
     _, report = run(scene, pattern=str(target), only=("beauty", "error"), cache=False)

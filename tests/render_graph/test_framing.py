@@ -14,7 +14,7 @@ from illumcli.commands.render import run
 from illumcli.commands.sweep import Settings, variants_of
 from illumcli.commands.sweep import run as sweep
 from illumcli.errors import InputError
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 from illumcli.rays.camera import MARGIN
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.execute import RenderStats

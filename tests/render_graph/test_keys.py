@@ -21,7 +21,6 @@ PACKAGE = Path(illumcli.__file__).parent
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
 DECIDE_NOTHING = {
     "cache/": "finds and keeps what others compute",
-    "color.py": "textures and file colours, which are read anew in every run",
     "errors.py": "texts",
     "files/": "where files are and whether they are whole",
     "graph.py": "runs functions, and names nodes in their keys",

@@ -321,7 +321,7 @@ def test_images_are_read_only_for_what_is_made(scene, print_, only, material, re
 
 
 def test_an_image_that_several_parameters_name_is_read_once(scene, picture, print_, monkeypatch):
-    from illumcli.images import oiio as images
+    from illumcli.images import reader as images
 
     opened, real = [], images.read_texture
     monkeypatch.setattr(images, "read_texture", lambda *words: opened.append(words) or real(*words))

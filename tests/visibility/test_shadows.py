@@ -12,7 +12,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.scene_geometry import place, world_normals
 from illumcli.geometry.smooth_parts import SmoothParts
-from illumcli.images.oiio import read_image
+from illumcli.images.reader import read_image
 from illumcli.stress.rays import icosphere
 
 SUN = np.array([-0.4, 1.0, 0.2]) / np.linalg.norm([-0.4, 1.0, 0.2])

@@ -13,7 +13,9 @@ from illumcli.cache.fingerprint import digest
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes, write_text
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix, refuse_unwritable
-from illumcli.files.seal import BLANK, sealed_csv, sealed_png, sealed_text
+from illumcli.files.reports import report_contents, sealed_csv
+from illumcli.files.seal import BLANK, sealed_png, sealed_text
+from illumcli.images.contents import image_contents
 
 COLUMNS = (
     "scene", "camera", "layer", "width", "height", "vary", "sampler", "pixel_samples", "obscurance_rays",
@@ -154,9 +156,11 @@ class Outputs:
             A different file is there and is not to be replaced; a file cannot be written.
         """
         self._content = digest(contents)
-        if self._table is not None and is_kept(self._table, contents, self._force):
+        if self._table is not None and is_kept(self._table, contents, report_contents, self._force):
             self.kept.append(self._table)
-        if self._picture is not None and is_kept(self._picture, [self._content], self._force):
+        if self._picture is not None and is_kept(
+            self._picture, [self._content], figure_contents, self._force
+        ):
             self.kept.append(self._picture)
 
     def write(self, found: Convergence) -> None:
@@ -167,6 +171,11 @@ class Outputs:
             write_picture(self._picture, found, self._content)
         for path in self.kept:
             refresh(path)
+
+
+def figure_contents(path: Path) -> list[str]:
+    """The content that a picture of curves names."""
+    return image_contents(path) if path.suffix.lower() == ".png" else report_contents(path)
 
 
 def write_picture(path: Path, found: Convergence, content: str) -> None:

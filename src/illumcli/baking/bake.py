@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.arrays import F, column_major, cross, take_rows, unit
+from illumcli.baking.files import SUFFIXES, add_baked_to_glb, baked_contents, write_baked_glb, write_baked_ply
 from illumcli.baking.outputs import shapes_of
 from illumcli.baking.points import Surfaces, Vertices, vertex_points
 from illumcli.baking.sampling import MOST_SAMPLES, BakeSampler, Occluders
@@ -27,19 +28,10 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import is_full
 from illumcli.files.journal import Journal, place, tidy
 from illumcli.files.outputs import is_kept, refresh
-from illumcli.files.vertex_data import (
-    SUFFIXES,
-    Baked,
-    Shape,
-    add_to_glb,
-    mesh_hash,
-    write_glb,
-    write_npz,
-    write_ply,
-)
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.graph import topological_order
+from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record, Value
 from illumcli.render_graph import stages
@@ -49,6 +41,7 @@ from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs, repairs_data
 from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
 from illumcli.scene.spec import Obscurance, Scene
+from illumcli.visibility.baked import Baked, mesh_hash, write_npz
 from illumcli.visibility.obscurance import Method
 from illumcli.visibility.open_hemisphere import ClusterTree
 
@@ -189,7 +182,7 @@ def prepared(
     content = content_hash(loaded.scene, hashes, surfaces.normals, settings)
     if strict:
         refuse_repairs(str(path), repairs)
-    due = tuple(each for each in outputs if not is_kept(each, [content], force))
+    due = tuple(each for each in outputs if not is_kept(each, [content], baked_contents, force))
     return Work(path, tuple(outputs), due, loaded.scene, surfaces, hashes, content, repairs, clock)
 
 
@@ -448,9 +441,9 @@ def write(
 ) -> None:
     """All files of a bake."""
     alone = path.suffix.lower() if path.suffix.lower() in MESH_SUFFIXES else ""
-    made: dict[bool, tuple[list[Shape], Baked]] = {}
+    made: dict[bool, tuple[list[OutputMesh], Baked]] = {}
 
-    def shapes(divided: bool) -> tuple[list[Shape], Baked]:
+    def shapes(divided: bool) -> tuple[list[OutputMesh], Baked]:
         if divided not in made:
             made[divided] = shapes_of(scene.object_names(), world, baked, divided, report.left_out)
         return made[divided]
@@ -460,13 +453,13 @@ def write(
         if kind == ".npz":
             write_npz(each, baked)
         elif kind == ".ply" and alone == ".ply" and not settings.split:
-            write_ply(each, [], baked, path, settings.channel)
+            write_baked_ply(each, [], baked, path, settings.channel)
         elif kind == ".ply":
-            write_ply(each, *shapes(settings.split), None, settings.channel)
+            write_baked_ply(each, *shapes(settings.split), None, settings.channel)
         elif alone == ".glb" and settings.channel is None and (found := primitives(path)):
-            add_to_glb(each, *found, baked)
+            add_baked_to_glb(each, *found, baked)
         else:
-            write_glb(each, *shapes(True), settings.channel)
+            write_baked_glb(each, *shapes(True), settings.channel)
 
 
 def primitives(path: Path) -> tuple[tuple[dict[str, Any], bytes], list[tuple[int, int, int]]] | None:

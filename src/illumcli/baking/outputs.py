@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.files.vertex_data import STANDARD, Baked, Shape, free_name
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry, cofactors
+from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
 from illumcli.records import Record
+from illumcli.visibility.baked import Baked
 
 
 def shapes_of(
     names: Sequence[str], world: SceneGeometry, baked: Baked, divided: bool, left_out: list[str]
-) -> tuple[list[Shape], Baked]:
+) -> tuple[list[OutputMesh], Baked]:
     """The objects as they are written, and the values of their vertices; `divided` where vertices with
     several normals, uv or values are."""
     # what corners have; of vertices that are not divided only what all their corners agree on
@@ -70,7 +71,7 @@ def per_vertex(mesh: Mesh, values: NDArray[np.float64]) -> bool:
 
 def shape_of(
     name: str, world: SceneGeometry, number: int, tables: Mapping[str, NDArray[np.float64]], own: Copies
-) -> Shape:
+) -> OutputMesh:
     """An object in its place, with what its vertices have."""
     placed = world.placed[number]
     mesh = placed.mesh
@@ -89,7 +90,7 @@ def shape_of(
         corner[other_way] = corner[other_way, ::-1]
     vertices = mesh.vertices @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
     triangles = own.number[corner]
-    return Shape(name, vertices[own.source], own.number, mesh.starts, triangles, attributes)
+    return OutputMesh(name, vertices[own.source], own.number, mesh.starts, triangles, attributes)
 
 
 class Copies(Record):

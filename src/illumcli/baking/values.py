@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors
 from illumcli.baking.points import Vertices
-from illumcli.files.vertex_data import Baked
+from illumcli.visibility.baked import Baked
 
 
 def baked_values(

@@ -11,6 +11,7 @@ from illumcli.commands.render import report_text
 from illumcli.errors import IllumError, known
 from illumcli.files.atomic import write_text
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
+from illumcli.files.reports import report_contents
 
 Tell = Callable[[str], None]
 
@@ -75,7 +76,7 @@ class BatchReport:
         """See whether a report of the same content is there; refuse a different file without `force`."""
         if self._path is not None:
             refuse_suffix(self._path, "a report", ".json")
-            self._is_kept = is_kept(self._path, self._contents, force)
+            self._is_kept = is_kept(self._path, self._contents, report_contents, force)
 
     def add(self, number: int, entry: dict[str, Any]) -> None:
         """Take the entry of a piece that is done."""

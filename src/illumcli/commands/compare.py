@@ -16,8 +16,11 @@ from illumcli.errors import InputError, ThresholdError
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix
 from illumcli.film.heat import heat
 from illumcli.film.metrics import Difference, absolute_difference, difference
-from illumcli.images.oiio import Image, flip, layers, read_image
-from illumcli.images.writer import ChannelType, ImageWriter
+from illumcli.images.channels import ChannelType, Metadata, group_by_layer
+from illumcli.images.contents import image_contents
+from illumcli.images.flip import flip
+from illumcli.images.reader import Image, read_image
+from illumcli.images.writer import ImageWriter
 from illumcli.records import Value
 from illumcli.schema.families import suggestion
 
@@ -100,13 +103,13 @@ def run(
     if heat_file is not None:
         refuse_suffix(heat_file, "a heat picture", ".png")
     a, b = _read_both(reference, test)
-    shared = layers(name for name in a.channels if name in b.channels)
+    shared = group_by_layer(name for name in a.channels if name in b.channels)
     compared = _chosen(shared, names, f"{reference}, {test}")
     kept, content = False, ""
     if heat_file is not None:
         files = file_digest(reference), file_digest(test)
         content = digest((__version__, files, next(iter(compared))))
-        kept = is_kept(heat_file, [content], force)
+        kept = is_kept(heat_file, [content], image_contents, force)
     found = [_layer(a, b, name, channels, flips) for name, channels in compared.items()]
     if heat_file is not None and kept:
         refresh(heat_file)
@@ -289,7 +292,7 @@ def _heat_scale(layer: LayerDifference) -> float:
 
 def _write_heat(path: Path, a: Image, b: Image, layer: LayerDifference, content: str) -> None:
     scale = _heat_scale(layer)
-    metadata = {"illum:layer": layer.name, "illum:heat_scale": scale, "illum:content": content}
+    metadata: Metadata = {"illum:layer": layer.name, "illum:heat_scale": scale, "illum:content": content}
     types: dict[str, ChannelType] = dict.fromkeys("RGB", "uint8")
     worst = absolute_difference(_stacked(a, layer.channels), _stacked(b, layer.channels)).max(axis=-1)
     with ImageWriter(path, a.width, a.height, types, metadata) as writer:

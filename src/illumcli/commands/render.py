@@ -21,11 +21,12 @@ from illumcli.cache.store import Store, default_folder, default_limit
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.outputs import is_kept, refresh
-from illumcli.files.seal import sealed_json
+from illumcli.files.reports import sealed_json
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import ObjectBounds
+from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import View
@@ -136,7 +137,7 @@ class Work(Value):
         LimitError
             Memory or disk cannot hold what is due.
         """
-        due = [each for each in self.targets if not is_kept(each.path, [each.content], force)]
+        due = [each for each in self.targets if not is_kept(each.path, [each.content], image_contents, force)]
         refuse_too_large(self, due)
         return due
 
@@ -408,7 +409,7 @@ def _render_view(
 
 def channels(scene: Any, target: Target) -> dict[str, Any]:
     """Channel name -> type of a file; the beauty's R G B A come first."""
-    from illumcli.images.writer import channel_types
+    from illumcli.images.channels import channel_types
 
     if target.path.suffix.lower() == ".png":
         layer = target.layers[0]
@@ -434,7 +435,7 @@ def _channels(scene: Any, layer: Layer) -> tuple[str, ...]:
 
 def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any) -> NDArray[Any]:
     """(rows, columns, channels) of one file's tile, as its writer takes them."""
-    from illumcli.images.writer import bits_of
+    from illumcli.images.channels import bits_of
 
     parts = {layer.name: composed(scene, layer, layers) for layer in target.layers}
     if target.path.suffix.lower() == ".png":

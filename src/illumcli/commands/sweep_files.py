@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from illumcli.cache.fingerprint import digest, file_digest
 from illumcli.commands.render import channels
 from illumcli.errors import InputError, OutputError
-from illumcli.files.outputs import INCOMPLETE, is_kept, is_whole, refresh, refuse_suffix
-from illumcli.files.seal import sealed_csv, sealed_json
+from illumcli.files.outputs import INCOMPLETE, is_complete, is_kept, refresh, refuse_suffix
+from illumcli.files.reports import report_contents, sealed_csv, sealed_json
+from illumcli.images.contents import image_contents
 from illumcli.memory import refuse_beyond
 from illumcli.records import Record, Value
 
@@ -64,7 +65,7 @@ class ToWrite(Value):
             write_text(files.table, table(outcomes, self._contents(outcomes), self.reference))
         if files.sheet is not None and files.sheet not in self.kept:
             content = _of_all(self._contents(outcomes))
-            if content == INCOMPLETE and is_whole(files.sheet):
+            if content == INCOMPLETE and is_complete(files.sheet, image_contents):
                 spared.append(f"{files.sheet}: stays as it is; a new one would lack pictures")
             else:
                 sheet(outcomes, files.sheet, content)
@@ -118,19 +119,23 @@ def checked(files: Files, outcomes: Sequence[Outcome], force: bool) -> ToWrite:
         if outcome.work is not None
     }
     each = [contents.get(outcome.number, INCOMPLETE) for outcome in outcomes]
-    held = ((files.table, each), (files.sheet, [_of_all(each)]), (files.report, each))
-    kept = tuple(path for path, named in held if path is not None and is_kept(path, named, force))
+    held = (
+        (files.table, each, report_contents),
+        (files.sheet, [_of_all(each)], image_contents),
+        (files.report, each, report_contents),
+    )
+    kept = tuple(path for path, named, read in held if path is not None and is_kept(path, named, read, force))
     return ToWrite(files, reference, contents, kept)
 
 
 def refuse_large_sheet(path: Path, outcomes: Sequence[Outcome]) -> None:
     """Raise LimitError where the pictures of a contact sheet, all as high as the highest, are too much."""
-    from illumcli.images.oiio import SHEET_CELL
+    from illumcli.images.contact_sheet import CELL_WIDTH
 
     views = [outcome.work.targets[0].view for outcome in outcomes if outcome.work is not None]
-    tallest = max((SHEET_CELL * view.height // view.width for view in views), default=0)
-    size = SHEET_BYTES * len(views) * SHEET_CELL * (tallest + SHEET_CELL // 8)
-    what = f"{path}: a sheet of {len(views)} pictures, {SHEET_CELL} x {tallest} pixels each"
+    tallest = max((CELL_WIDTH * view.height // view.width for view in views), default=0)
+    size = SHEET_BYTES * len(views) * CELL_WIDTH * (tallest + CELL_WIDTH // 8)
+    what = f"{path}: a sheet of {len(views)} pictures, {CELL_WIDTH} x {tallest} pixels each"
     refuse_beyond(size, what, "leave --sheet out, or sweep in parts")
 
 
@@ -183,7 +188,7 @@ def _count(names: Sequence[str] | dict[str, Any]) -> int:
 
 def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
     """(H, W, 3) or (H, W, 1) an image's R G B, or its first channel where it has none; are they encoded?"""
-    from illumcli.images.oiio import read_image
+    from illumcli.images.reader import read_image
 
     image = read_image(path)
     found = image.channels
@@ -241,7 +246,7 @@ def table(outcomes: Sequence[Outcome], contents: Sequence[str], reference: Refer
 def sheet(outcomes: Sequence[Outcome], path: Path, content: str) -> None:
     """Write a contact sheet: the first picture of every variant that has one, with its values below."""
     from illumcli.film.encode import picture
-    from illumcli.images.oiio import write_sheet
+    from illumcli.images.contact_sheet import write_contact_sheet
 
     def shown(outcome: Outcome) -> NDArray[Any]:
         assert outcome.work is not None
@@ -252,7 +257,7 @@ def sheet(outcomes: Sequence[Outcome], path: Path, content: str) -> None:
 
     done = [outcome for outcome in outcomes if outcome.report is not None]
     labels = [outcome.variant.label or f"frame {outcome.variant.frame}" for outcome in done]
-    write_sheet(path, map(shown, done), labels, content)
+    write_contact_sheet(path, map(shown, done), labels, content)
 
 
 def report_data(outcomes: Sequence[Outcome], contents: Sequence[str]) -> list[dict[str, Any]]:

@@ -1,19 +1,18 @@
-"""Outputs before there is any work: may they be written, and do they hold already what would be written?
+"""Outputs before any work is done: may they be written, and do they already hold what would be written?
 
-Every file names the content that it was made from, or those that its rows and entries were made from. Equal
-contents give equal files, but for what differs from run to run: seconds, rays, what was reused. So a file is
-told to be the same without making it anew, and it holds its own hash, so that it is known to be whole.
+Every file names the content it was made from, or those that its rows and entries were made from. Equal
+contents give equal files, except for what differs from run to run: seconds, rays, what was reused. So an
+output is known to be up to date without making it again. It also holds its own hash, which shows damage.
 """
 
 from __future__ import annotations
 
 import errno
-import json
 import os
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TypeAlias
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import refusals, remove_left_over
@@ -22,7 +21,9 @@ from illumcli.files.seal import is_sealed
 INCOMPLETE = "incomplete"
 """The content of what failed: a file that holds it may be replaced."""
 _OR_CHANGED = ", or one that was changed or damaged since it was written"
-_SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
+ContentReader: TypeAlias = Callable[[Path], Sequence[str]]
+"""Reads the contents that a file names; `report_contents`, `image_contents`, `baked_contents`. It may
+raise InputError, KeyError, TypeError or ValueError for files of others."""
 
 
 def refuse_suffix(path: Path, what: str, *suffixes: str) -> None:
@@ -31,11 +32,20 @@ def refuse_suffix(path: Path, what: str, *suffixes: str) -> None:
         raise InputError(f"{path}: {what} is written as {' or '.join(suffixes)}; let the name end so")
 
 
-def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
+def is_kept(path: Path, contents: Sequence[str], read: ContentReader, force: bool = False) -> bool:
     """True where the file is there already with the same contents, so that it is as good as written.
 
-    Else it is going to be written: what stands against that is raised now. Nothing is made yet, no folder
-    either.
+    Otherwise it is going to be written, and whatever prevents that is raised now. Nothing is created, not
+    even a folder.
+
+    Parameters
+    ----------
+    contents
+        What the file will be made from.
+    read
+        Of the file's format.
+    force
+        Replace a file that is different.
 
     Raises
     ------
@@ -44,7 +54,7 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
     """
     with refusals(str(path)):
         if path.is_file() and not force:
-            stored = _readable_contents(path)
+            stored = _readable_contents(path, read)
             if stored == list(contents) and INCOMPLETE not in stored:
                 return True
             pairs = zip(stored, contents, strict=False)
@@ -57,10 +67,10 @@ def is_kept(path: Path, contents: Sequence[str], force: bool = False) -> bool:
     return False
 
 
-def _readable_contents(path: Path) -> list[str]:
+def _readable_contents(path: Path, read: ContentReader) -> list[str]:
     """The same as `stored_contents`; OutputError where the file there cannot be read."""
     try:
-        return stored_contents(path)
+        return list(stored_contents(path, read))
     except OSError as error:
         fact = f"a file is there that cannot be read: {error.strerror or error}"
         raise OutputError(f"{path}: {fact}; use --force to replace it, or another name") from error
@@ -72,9 +82,9 @@ def refuse_empty_link(path: Path) -> None:
         raise OutputError(f"{path}: is a link to nothing; use --force to write there, or another name")
 
 
-def is_whole(path: Path) -> bool:
-    """Is there a file that nothing failed of?"""
-    return path.is_file() and INCOMPLETE not in stored_contents(path)
+def is_complete(path: Path, read: ContentReader) -> bool:
+    """Is there a file in which nothing is missing?"""
+    return path.is_file() and INCOMPLETE not in stored_contents(path, read)
 
 
 def refresh(path: Path) -> None:
@@ -84,31 +94,10 @@ def refresh(path: Path) -> None:
         remove_left_over(Path(os.path.realpath(path)).parent)
 
 
-def stored_contents(path: Path) -> list[str]:
+def stored_contents(path: Path, read: ContentReader) -> Sequence[str]:
     """The contents that a file of ours names; empty where it is none, or is not what was written."""
     try:
-        if not is_sealed(path):
-            return []
-        match path.suffix.lower():
-            case ".csv":
-                import csv  # what a render without a table need not wait for
-
-                with path.open(newline="", encoding="utf-8") as file:
-                    return [row["content"] for row in csv.DictReader(file)]
-            case ".json":
-                found = json.loads(path.read_text(encoding="utf-8"))
-                return [entry["content"] for entry in (found if isinstance(found, list) else [found])]
-            case ".svg":
-                return _SVG.findall(path.read_text(encoding="utf-8"))
-            case ".png" | ".exr":
-                from illumcli.images.oiio import read_metadata
-
-                return [str(read_metadata(path)["illum:content"])]
-            case _:
-                from illumcli.files.vertex_data import read_content
-
-                content = read_content(path)
-                return [] if content is None else [content]
+        return read(path) if is_sealed(path) else []
     except (InputError, KeyError, TypeError, ValueError):
         return []
 

@@ -10,12 +10,9 @@ compute it anew.
 from __future__ import annotations
 
 import hashlib
-import io
-import json
 import re
 import struct
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -66,26 +63,6 @@ def sealed_text(text: str) -> str:
     """`text`, to be written as UTF-8, with its hash in the place of `BLANK`, which it holds."""
     digest = hashlib.blake2b(text.encode(), digest_size=_DIGITS // 2)
     return text.replace(BLANK, _MARK.decode() + digest.hexdigest(), 1)
-
-
-def sealed_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table as CSV, a row at least; its last column, `body`, holds the hash in the first row."""
-    import csv  # what a render without a table need not wait for
-
-    out = io.StringIO()
-    lines = csv.writer(out, lineterminator="\n")
-    lines.writerow([*columns, "body"])
-    for number, row in enumerate(rows):
-        missing = [""] * (len(columns) - len(row))
-        lines.writerow([*row, *missing, "" if number else BLANK])
-    return sealed_text(out.getvalue())
-
-
-def sealed_json(entries: Sequence[Mapping[str, object]], in_a_list: bool) -> str:
-    """Entries, one at least, as JSON; the first holds the hash as its `body`. A lone one may have no list."""
-    first, *others = entries
-    body = {**first, "body": BLANK}
-    return sealed_text(json.dumps([body, *others] if in_a_list else body, indent=1) + "\n")
 
 
 def sealed_png(data: bytes) -> bytes:

@@ -8,6 +8,7 @@ ISO/IEC 15948:2004. Portable Network Graphics (PNG): functional specification.
 from __future__ import annotations
 
 import hashlib
+import os
 import struct
 import zlib
 from collections.abc import Mapping
@@ -118,3 +119,27 @@ class PngFile:
     def _put(self, data: bytes) -> None:
         self._file.write(data)
         self._hash.update(data)
+
+
+def read_texts(path: Path) -> dict[str, str]:
+    """Name -> text of every `tEXt` chunk of a PNG.
+
+    Raises
+    ------
+    ValueError
+        No PNG, or one that is cut off.
+    """
+    texts = {}
+    with path.open("rb") as file:
+        if file.read(len(_SIGNATURE)) != _SIGNATURE:
+            raise ValueError(f"{path}: is no PNG")
+        while (head := file.read(8))[4:] != b"IEND":
+            if len(head) < 8:
+                raise ValueError(f"{path}: its end is missing")
+            length = int.from_bytes(head[:4])
+            if head[4:] == b"tEXt":
+                name, _, text = file.read(length).decode("latin-1").partition("\0")
+                texts[name] = text
+                length = 0
+            file.seek(length + 4, os.SEEK_CUR)  # the checksum ends a chunk
+    return texts

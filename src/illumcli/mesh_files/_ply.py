@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, note
-from illumcli.mesh_files import LONGEST_PLY_HEADER
 from illumcli.mesh_files._polygons import Ints, runs
 from illumcli.mesh_files._text import BYTE_ORDER_MARK, Block, Text, decoded
 from illumcli.records import Value
@@ -41,6 +40,7 @@ _TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+LONGEST_HEADER = 1 << 20  # [bytes]
 _START = re.compile(rb"(?:\xef\xbb\xbf)?ply[ \t]*(\r\n|\n|\r)")
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)")
 
@@ -86,7 +86,7 @@ class Header(Value):
 def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
     """The header; lines that say nothing of the rows are left out."""
     begin = _START.match(data)
-    end = _END.search(data, 0, LONGEST_PLY_HEADER)
+    end = _END.search(data, 0, LONGEST_HEADER)
     if begin is None or end is None:
         raise InputError(f"{path}: has no PLY header; give the file the suffix of its format")
     if data.startswith(BYTE_ORDER_MARK):

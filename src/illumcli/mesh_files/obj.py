@@ -22,15 +22,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.color import from_srgb
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, joined, note
-from illumcli.mesh_files import _mtl
-from illumcli.mesh_files._color import linear, unit_range
+from illumcli.mesh_files import mtl
+from illumcli.mesh_files._color import unit_range
+from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._polygons import Ints, polygons
 from illumcli.mesh_files._text import Block, Text, keyword
 from illumcli.records import Value
+
+_LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
 
 # statements that hold no polygons and change none
 _STATE = (
@@ -160,7 +164,7 @@ def _vertices(
     inside = np.clip(colors, 0, 1)
     beyond: NDArray[np.bool_] = np.any(colors != inside, axis=1)
     _note_lines(repairs, "vertex colours beyond their range, clipped", beyond, block)
-    attributes = {"color": linear(inside[:, :3])}
+    attributes = {"color": from_srgb(inside[:, :3]).astype(np.float32)}
     if (counts == 7).any():
         attributes["alpha"] = inside[:, 3].astype(np.float32)
     return np.ascontiguousarray(values[:, :3]), attributes
@@ -304,7 +308,25 @@ def _selected(
     return tuple(names), ids[np.searchsorted(lines, faces)]
 
 
-def _undefined(text: Text, statements: list[tuple[int, str]], library: _mtl.Library) -> dict[str, Repair]:
+def companions(path: Path) -> list[Path]:
+    """The material libraries that an OBJ may name, and the images that these may."""
+    libraries = files_named(path, _library_names)
+    images = [
+        image
+        for library in libraries
+        if library.is_file()
+        for image in files_named(library, mtl.IMAGE.findall, path.parent)
+    ]
+    return [*libraries, *images]
+
+
+def _library_names(data: bytes) -> list[bytes]:
+    if b"\\" in data:  # a line that goes on in the next
+        data = re.sub(rb"\\[ \t]*\r?\n", b" ", data)
+    return _LIBRARY.findall(data)
+
+
+def _undefined(text: Text, statements: list[tuple[int, str]], library: mtl.Library) -> dict[str, Repair]:
     """The materials that faces select and the libraries do not have, where the file has libraries."""
     missing = {name: line for line, name in reversed(statements) if name not in library.materials}
     if not library.materials or not missing:
@@ -326,9 +348,9 @@ def _is_off(group: str) -> bool:
     return group.lower() in ("off", "null") or group.strip("0") == ""
 
 
-def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> _mtl.Library:
+def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> mtl.Library:
     """Every material of the libraries, the first of a name, and what was left out of them."""
-    whole = _mtl.Library()
+    whole = mtl.Library()
     for names, line in {names: line for line, names in reversed(statements)}.items():
         place = f":{text.number(line)}"
         for file, matter in _library_files(path, names):
@@ -336,7 +358,7 @@ def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> _mt
                 note(whole.repairs, f"material libraries {matter} {TAKEN if file else 'left out'}", place)
             if file is None:
                 continue
-            found = _mtl.read(file, path.parent)
+            found = mtl.read(file, path.parent)
             whole.materials.update({**found.materials, **whole.materials})
             whole.substitutes.update({**found.substitutes, **whole.substitutes})
             whole.repairs.update(joined([whole.repairs, found.repairs]))

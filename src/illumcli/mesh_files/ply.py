@@ -1,7 +1,7 @@
 """Stanford PLY, in text and both byte orders: polygons, triangle strips, normals, uv, any vertex property.
 
-A reader of our own: what the rows mean; `_ply` reads them. Refused is only what no face could be known from;
-all else that is mended or left out is counted.
+`read` says what the rows mean; `_ply` reads them. It refuses only files whose faces cannot be known; all else
+that is mended or left out is counted. `write` uses plyfile.
 
 References
 ----------
@@ -10,6 +10,9 @@ Turk, G. (1994). The PLY polygon file format. Stanford University.
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -17,20 +20,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.color import from_srgb, to_srgb
 from illumcli.errors import InputError
+from illumcli.files.atomic import AtomicFile
+from illumcli.files.seal import seal
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files import _ply
-from illumcli.mesh_files._color import linear, unit_range
+from illumcli.mesh_files._color import unit_range
+from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._ply import Element, Lists, Table
 from illumcli.mesh_files._polygons import Ints, check_range, polygons, starts_of, strip
 from illumcli.mesh_files._text import Text
+from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
 from illumcli.records import Value
 
 _NORMAL = ("nx", "ny", "nz")
 _UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
-_COLOR = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+_TEXTURE = re.compile(rb"comment[ \t]+texturefile[ \t]([^\r\n]*)", re.IGNORECASE)
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
@@ -107,6 +116,11 @@ def read(path: Path) -> Mesh:
     return polygons(
         path, vertices, corners, counts, attributes=attributes, repairs=repairs, place=file.place, **more
     )
+
+
+def companions(path: Path) -> list[Path]:
+    """The images that a PLY may name."""
+    return files_named(path, _TEXTURE.findall, most=_ply.LONGEST_HEADER)
 
 
 def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> None:
@@ -224,7 +238,7 @@ def _attributes(file: _File) -> dict[str, NDArray[Any]]:
         taken |= set(_NORMAL)
     taken |= set(next((pair for pair in _UV if _has(vertex, pair)), ()))
     attributes = {}
-    for names in _COLOR:
+    for names in _COLORS:
         if "color" not in attributes and _has(vertex, names):
             attributes["color"] = _color(_stacked(vertex, names), types[names[0]])
             taken |= set(names)
@@ -254,6 +268,140 @@ def _color(values: NDArray[np.float64], kind: np.dtype[Any]) -> NDArray[np.float
     are linear, but sRGB where they are bytes."""
     if kind.kind == "f":
         code = unit_range(values)
-        return values.astype(np.float32) if code is values else linear(np.clip(code, 0, 1))
+        return (values if code is values else from_srgb(np.clip(code, 0, 1))).astype(np.float32)
     largest = 255 if values.max(initial=0) <= 255 else np.iinfo(kind).max
-    return linear(np.clip(values / largest, 0, 1))
+    return from_srgb(np.clip(values / largest, 0, 1)).astype(np.float32)
+
+
+# --- writing ------------------------------------------------------------------------------------------
+
+_ABOUT = "illum "  # begins the comment that holds `VertexData.about`
+_LABELS = {"normal": ["nx", "ny", "nz"], "uv": ["s", "t"], "color": ["red", "green", "blue"]}
+
+
+def write(path: Path, meshes: Sequence[OutputMesh], data: VertexData, source: Path | None = None) -> None:
+    """Write meshes with the columns of `data` as properties, (V,) float each; `about` is a comment.
+
+    A PLY `source` is written again with every element and property it has, in its own encoding. Other meshes
+    are binary; normals, uv and colours are kept where every vertex has one of its own.
+    """
+    from plyfile import PlyData, PlyElement
+
+    comment = _ABOUT + json.dumps(data.sealed_about())
+    if source is not None:
+        old = PlyData.read(source)
+        elements = [
+            _with_columns(each, data, data.columns) if each.name == "vertex" else each for each in old
+        ]
+        comments = [each for each in old.comments if not each.startswith(_ABOUT)]
+        file = PlyData(elements, old.text, old.byte_order, [*comments, comment], list(old.obj_info))
+    else:
+        columns = _joined(meshes) | dict(data.columns)
+        table = np.empty(
+            sum(len(mesh.vertices) for mesh in meshes), [(name, each.dtype) for name, each in columns.items()]
+        )
+        for name, each in columns.items():
+            table[name] = each
+        vertex = _with_columns(PlyElement.describe(table, "vertex"), data, {})
+        file = PlyData([vertex, _faces(meshes)], False, "<", [comment])
+    with AtomicFile(path) as part:
+        file.write(str(part.path))
+        seal(part.path)
+
+
+def read_about(path: Path) -> dict[str, Any]:
+    """`VertexData.about` of a PLY that was written here.
+
+    Raises
+    ------
+    StopIteration, ValueError
+        A file of others.
+    """
+    with path.open("rb") as file:
+        header = file.read(1 << 16).partition(b"end_header")[0].decode("latin-1")
+    start = f"comment {_ABOUT}"
+    line = next(line for line in header.splitlines() if line.startswith(start))
+    return dict(json.loads(line.removeprefix(start)))
+
+
+def _with_columns(element: Any, data: VertexData, added: Mapping[str, NDArray[Any]]) -> Any:
+    """The element with columns added, and the colour of `data`, new or in place of their namesakes."""
+    from plyfile import PlyElement, PlyProperty
+
+    columns = dict(added) | _colors(element.data.dtype.names, data)
+    if not columns:
+        return element
+    kept = [each for each in element.properties if each.name not in columns]
+    kinds = [(each.name, element.data.dtype[each.name]) for each in kept]
+    table = np.empty(len(element.data), [*kinds, *((name, each.dtype) for name, each in columns.items())])
+    for each in kept:
+        table[each.name] = element.data[each.name]
+    for name, values in columns.items():
+        table[name] = values
+    properties = [
+        PlyProperty(name, "uchar" if each.dtype == np.uint8 else "float") for name, each in columns.items()
+    ]
+    new = PlyElement("vertex", [*kept, *properties], len(table), list(element.comments))
+    new.data = table
+    return new
+
+
+def _colors(present: Sequence[str], data: VertexData) -> dict[str, NDArray[np.uint8]]:
+    """Columns of the colour of `data`; red, green and blue that are not present become white."""
+    if data.color is None:
+        return {}
+    columns = {}
+    for channel, name in enumerate(("red", "green", "blue", "alpha")):
+        if channel in data.channels:
+            columns[name] = data.color
+        elif name not in present and channel < 3:
+            columns[name] = np.full(len(data.color), 255, np.uint8)
+    return columns
+
+
+def _joined(meshes: Sequence[OutputMesh]) -> dict[str, NDArray[Any]]:
+    """The vertex columns of all meshes, one after the other: those that every mesh has."""
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    kind = np.float32 if fits_single(vertices) else np.float64
+    columns: dict[str, NDArray[Any]] = {name: vertices[:, k].astype(kind) for k, name in enumerate("xyz")}
+    common = set.intersection(*(set(mesh.attributes) for mesh in meshes))
+    for name in sorted(common, key=lambda name: (name not in STANDARD, name)):
+        parts = [np.asarray(mesh.attributes[name]) for mesh in meshes]
+        if len({part.shape[1:] for part in parts}) > 1:
+            continue
+        values = np.concatenate(parts)
+        if name == "color":
+            values = srgb_bytes(values)
+        if values.dtype.kind == "f":
+            values = values.astype(np.float32)
+        for label, column in zip(_labels(name, values), np.atleast_2d(values.T), strict=True):
+            columns[free_name(label, columns)] = column
+    return columns
+
+
+def _labels(name: str, values: NDArray[Any]) -> list[str]:
+    if name in _LABELS:
+        return _LABELS[name]
+    return [name] if values.ndim == 1 else [f"{name}_{k}" for k in range(values.shape[1])]
+
+
+def _faces(meshes: Sequence[OutputMesh]) -> Any:
+    """The element of the polygons of all meshes, one list each, however long they are."""
+    from plyfile import PlyElement
+
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    rows = np.empty(sum(len(mesh.starts) - 1 for mesh in meshes), [("vertex_indices", object)])
+    lists = []
+    for mesh, offset in zip(meshes, first, strict=False):
+        lists += np.split((mesh.corners + offset).astype(np.int32), mesh.starts[1:-1])
+    rows["vertex_indices"][:] = [*lists, None][:-1]  # numpy would make one array of lists of one length
+    longest = max(int(np.diff(mesh.starts).max(initial=0)) for mesh in meshes)
+    count_type = "u4" if longest > 255 else "u1"
+    return PlyElement.describe(
+        rows, "face", len_types={"vertex_indices": count_type}, val_types={"vertex_indices": "i4"}
+    )
+
+
+def srgb_bytes(linear: NDArray[Any]) -> NDArray[np.uint8]:
+    """Colours as PLY files have them."""
+    return np.rint(255 * to_srgb(np.clip(np.asarray(linear, np.float64), 0, 1))).astype(np.uint8)

@@ -23,7 +23,7 @@ from illumcli.graph import Node
 
 SOURCES = (
     "arrays.py",
-    "files/vertex_data.py",
+    "color.py",
     "film",
     "geometry",
     "lights",

@@ -60,7 +60,7 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
 
 def _texels(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
     """Numbers in an image, by its header; 0 where it cannot be read, which its reader will say."""
-    from illumcli.images.oiio import texel_count
+    from illumcli.images.reader import texel_count
 
     try:
         return texel_count(resolve(loaded, texture[0]))

@@ -234,7 +234,7 @@ def baked(files: tuple[tuple[str, FileFingerprint | None], ...], world: SceneGeo
     InputError
         A file that holds values for another number of vertices.
     """
-    from illumcli.files.vertex_data import mesh_hash, read_npz
+    from illumcli.visibility.baked import mesh_hash, read_npz
 
     values = np.full((sum(len(placed.mesh.corners) for placed in world.placed), 1), np.nan, F)
     repairs: dict[str, Repair] = {}
@@ -351,7 +351,7 @@ class Images(Value):
         return self.known[path, space]
 
     def _read(self, path: str, space: Any) -> NDArray[np.float32]:
-        from illumcli.images.oiio import read_embedded_texture, read_texture
+        from illumcli.images.reader import read_embedded_texture, read_texture
         from illumcli.mesh_files import embedded_image, image_within
         from illumcli.scene.load import resolve
 

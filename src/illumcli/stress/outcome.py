@@ -59,7 +59,7 @@ class Sandbox:
             What `illum render` would end with.
         """
         from illumcli.commands.render import run
-        from illumcli.images.oiio import read_image
+        from illumcli.images.reader import read_image
 
         self.pictures += 1
         outputs = {"layers": list(layers), "colour": "float"}
@@ -81,7 +81,7 @@ class Sandbox:
             What `illum ao-bake` would end with.
         """
         from illumcli.baking.bake import Settings, run
-        from illumcli.files.vertex_data import read_npz
+        from illumcli.visibility.baked import read_npz
 
         path, baked = self.folder / "bake.yaml", self.folder / "bake.npz"
         path.write_text(json.dumps({"version": 1, **scene}))

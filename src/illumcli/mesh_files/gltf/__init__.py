@@ -7,6 +7,8 @@ The Khronos Group (2021). glTF 2.0 specification, 2.0.1. ISO/IEC 12113:2022. Sec
 
 from __future__ import annotations
 
+import json
+import re
 from bisect import bisect_right
 from functools import partial
 from pathlib import Path
@@ -17,10 +19,13 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
+from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._polygons import Ints, polygons, starts_of
 from illumcli.mesh_files.gltf.document import Document, open_document, printable
 from illumcli.mesh_files.gltf.materials import Library
 from illumcli.mesh_files.gltf.primitives import Part, parts
+
+_URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
 FILLED = {"color": 1.0, "alpha": 1.0}
 """What vertices of a primitive have that lacks an attribute of others: white and opaque (3.7.2.1)."""
@@ -78,6 +83,23 @@ def read(path: Path) -> Mesh:
         repairs=document.repairs,
         place=partial(_place, found, firsts, starts_of(np.array(counts)).tolist()),
     )
+
+
+def companions(path: Path) -> list[Path]:
+    """The buffers and images that a file may name."""
+    return files_named(path, _uris)
+
+
+def _uris(data: bytes) -> list[bytes]:
+    return [_unescaped(uri) for uri in _URI.findall(data)]
+
+
+def _unescaped(uri: bytes) -> bytes:
+    """A text of JSON without its backslashes."""
+    try:
+        return str(json.loads(b'"' + uri + b'"', strict=False)).encode("utf-8", "replace")
+    except ValueError:
+        return uri
 
 
 def _place(found: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:

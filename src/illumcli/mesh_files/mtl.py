@@ -31,6 +31,7 @@ from illumcli.mesh_files._text import decoded, without_comment
 from illumcli.records import Value
 
 _COLORS = {"ka": "Ka", "kd": "Kd", "ks": "Ks", "ke": "Ke"}
+IMAGE = re.compile(rb"map_kd[ \t]([^\r\n]*)", re.IGNORECASE)
 _NUMBERS = {"ns": "Ns", "d": "d", "tr": "Tr", "illum": "illum"}
 _NOTHING = {
     "ni",

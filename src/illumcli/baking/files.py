@@ -1,0 +1,88 @@
+"""Files of baked obscurance: npz, PLY and GLB."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.mesh_files import ply
+from illumcli.mesh_files.gltf import write as gltf
+from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
+from illumcli.visibility import baked as npz
+from illumcli.visibility.baked import Baked
+
+SUFFIXES = (".npz", ".ply", ".glb")
+CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
+"""Where obscurance may be written as a colour -> channels of red, green, blue, alpha."""
+
+
+def write_baked_ply(
+    path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, channel: str | None
+) -> None:
+    """The mesh with float properties `obscurance`, `quality` (the same, as MeshLab reads it) and
+    `standard_error`, and `nx_bent ny_bent nz_bent` where the bent normal was asked for.
+
+    Parameters
+    ----------
+    source
+        A PLY that is written again with all it has; without, `meshes` are written.
+    channel : {"r", "g", "b", "a", "rgb"}, optional
+        Where to write obscurance as 8-bit colour; other channels stay, or are white.
+    """
+    columns = {"obscurance": baked.obscurance, "quality": baked.obscurance}
+    columns["standard_error"] = baked.standard_error
+    if baked.bent_normal is not None:
+        for axis, name in enumerate("xyz"):
+            columns[f"n{name}_bent"] = baked.bent_normal[:, axis]
+    ply.write(path, meshes, _vertex_data(columns, baked, channel), source)
+
+
+def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, channel: str | None) -> None:
+    """A node per mesh with `_OBSCURANCE`, `_STANDARD_ERROR` and, where asked for, `_BENT_NORMAL`; `COLOR_0`
+    only where a `channel` is given."""
+    gltf.write_glb(path, meshes, _vertex_data(baked.columns(), baked, channel))
+
+
+def add_baked_to_glb(
+    path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], baked: Baked
+) -> None:
+    """A GLB with the same attributes added to each primitive, all else as it is.
+
+    Parameters
+    ----------
+    source : (dict, bytes)
+        The JSON of the input, which is changed, and its binary chunk.
+    counts : sequence of (mesh, primitive, vertices)
+        The primitives in the order of the baked vertices, each once.
+    """
+    gltf.add_to_glb(path, source, counts, _vertex_data(baked.columns(), baked, None))
+
+
+def baked_contents(path: Path) -> list[str]:
+    """The hash of what a file written here was made from.
+
+    Raises
+    ------
+    InputError
+        A file of others.
+    """
+    readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
+    try:
+        content = readers[path.suffix.lower()](path)["content"]
+    except Exception as why:  # zipfile, numpy and json each have their own
+        raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
+    if not isinstance(content, str):
+        raise InputError(f"{path}: names no content; bake it with illum ao-bake")
+    return [content]
+
+
+def _vertex_data(columns: Mapping[str, NDArray[np.float32]], baked: Baked, channel: str | None) -> VertexData:
+    if channel is None:
+        return VertexData(columns, baked.about)
+    eight_bit = np.rint(baked.obscurance * 255).astype(np.uint8)
+    return VertexData(columns, baked.about, eight_bit, CHANNELS[channel])

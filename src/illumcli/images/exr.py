@@ -1,0 +1,154 @@
+"""EXR files, written through OpenImageIO and read back.
+
+OpenImageIO says True for files that a full disk cut short, so an image counts as written only when every
+pixel, read back from the temporary file, hashes to what was handed over. The JPEG and TIFF libraries may end
+the process on a full disk: neither is written. A process must not fork once this module has written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.files.seal import BLANK, seal
+from illumcli.images.channels import Metadata
+from illumcli.images.format import WriteError
+from illumcli.images.openimageio import oiio
+from illumcli.images.reader import ImageSource
+
+HEADER = 1 << 24  # bytes in which the channels of a file written here are named
+
+_HINTS: Metadata = {
+    # measured on a render of 12 layers: zip at level 1 is as small as at 4 and as fast as none
+    "compression": "zip:1",
+    # the colour space by the attribute the header keeps: oiio:ColorSpace costs 30 ms to look its name up
+    "colorInteropID": "lin_rec709_scene",
+    "DateTime": "",  # no time of day: equal renders are equal files
+}
+# the last: deflate fails for nothing else
+_LITTLE_MEMORY = ("OUT_OF_MEMORY", "bad_alloc", "Unable to run compression routine")
+
+
+class ExrFile:
+    """Rows to an EXR file of one part.
+
+    Parameters
+    ----------
+    channels : mapping of name to `half`, `float` or `uint`
+    metadata : mapping of name to number, text or tuple of them
+        Integers of 32 bits, floats in single precision, texts and tuples of one kind stay what they are;
+        larger integers become text.
+
+    Raises
+    ------
+    WriteError
+        Here and in `write` and `close`: why the file cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, width: int, height: int, channels: Mapping[str, str], metadata: Metadata
+    ) -> None:
+        self._path = path
+        self._names = tuple(channels)
+        self._hash = hashlib.blake2b(digest_size=32)
+        self._dtype: Any = np.float32
+        output = oiio.ImageOutput.create("openexr")
+        if output is None:
+            reason = oiio.geterror()
+            if not reason:  # a format that is built in
+                raise MemoryError
+            raise WriteError(f"{reason}; install one that writes .exr")
+        self._output = output
+
+        # whole numbers go through the library as floats of the same bits: it would convert them by way of
+        # floats of 24 digits; the header is told their type when all is written
+        self._numbers = [name for name, kind in channels.items() if kind == "uint"]
+        kinds = [oiio.TypeDesc("float" if kind == "uint" else kind) for kind in channels.values()]
+
+        widest = max(kinds, key=lambda kind: kind.size())
+        spec = oiio.ImageSpec(width, height, len(kinds), widest)
+        spec.channelnames = self._names
+        if len(set(map(str, kinds))) > 1:
+            spec.channelformats = tuple(kinds)
+        for name, value in {**_HINTS, **metadata, "illum:body": BLANK}.items():
+            _set_attribute(spec, name, value)
+        self._rows = 0
+        self._check(self._output.open(os.fspath(path), spec))
+
+    def write(self, band: NDArray[Any]) -> None:
+        """Append rows, (h, W, C) with the values the file will hold, those of `uint` as bits."""
+        band = np.ascontiguousarray(band)
+        self._dtype = band.dtype.type
+        self._hash.update(band.data)
+        self._check(self._output.write_scanlines(self._rows, self._rows + len(band), 0, band))
+        self._rows += len(band)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._check(self._output.close())
+        if self._numbers:
+            _retype_as_integers(self._path, self._numbers)
+        seal(self._path)
+
+    def is_as_written(self) -> bool:
+        """Does the closed file hold the pixels it was given? It is read back in bands."""
+        digest = hashlib.blake2b(digest_size=32)
+        try:
+            with ImageSource(self._path) as source:
+                order = source.order(self._names)
+                for band in source.bands(self._dtype):
+                    digest.update(np.ascontiguousarray(band if order is None else band[..., order]).data)
+        except InputError as error:
+            raise WriteError(f"what was written cannot be read back ({error})") from error
+        return digest.digest() == self._hash.digest()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        self._output.close()
+
+    def _check(self, success: bool) -> None:
+        """Raise where the library failed: neither its answer nor its message alone can be trusted."""
+        message = self._output.geterror()
+        if not success or message:
+            if any(fact in message for fact in _LITTLE_MEMORY):
+                raise MemoryError
+            raise WriteError(message or "no reason given")
+
+
+def _retype_as_integers(path: Path, names: Sequence[str]) -> None:
+    """Change the type of channels in the header of an EXR from float to whole numbers of 32 bits.
+
+    The file holds the same bytes for both. A header is a list of name, type, size and value; the value of
+    `channels` is one of name, type, four bytes, and the steps of sampling (OpenEXR file layout, openexr.com).
+    """
+    with path.open("r+b") as file:
+        header = bytearray(file.read(HEADER))
+        at = header.index(b"channels\0chlist\0") + len(b"channels\0chlist\0") + 4
+        while header[at]:
+            name = bytes(header[at : header.index(0, at)]).decode()
+            at += len(name.encode()) + 1
+            if name in names:
+                file.seek(at)
+                file.write(struct.pack("<i", 0))
+            at += 16
+
+
+def _set_attribute(spec: oiio.ImageSpec, name: str, value: Any) -> None:
+    """Give `spec` an attribute in a type that EXR keeps."""
+    if isinstance(value, str):
+        spec.attribute(name, value)
+    elif isinstance(value, tuple):
+        kind = "string" if isinstance(value[0], str) else "int" if isinstance(value[0], int) else "float"
+        spec.attribute(name, oiio.TypeDesc(f"{kind}[{len(value)}]"), value)
+    elif isinstance(value, int):
+        spec.attribute(name, int(value) if -(2**31) <= value < 2**31 else str(value))
+    else:
+        spec.attribute(name, float(value))

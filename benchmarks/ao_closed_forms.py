@@ -30,7 +30,9 @@ from illumcli.verification.obscurance import CAST, exponential
 from illumcli.verification.surroundings import surroundings
 from illumcli.verification.vectors import PACKAGED, read_cases
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import Errors, Estimates, Hemispheres, Method, estimates
+from illumcli.visibility.hemisphere import Hemispheres
+from illumcli.visibility.obscurance import Method, estimates
+from illumcli.visibility.obscurance_error import Errors, Estimates
 
 SCRAMBLES = 400
 PAIRS, OWN = 16, 256

@@ -25,7 +25,8 @@ from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import Hemispheres, Method, estimates
+from illumcli.visibility.hemisphere import Hemispheres
+from illumcli.visibility.obscurance import Method, estimates
 
 EDGES = 20 if SMALL else 1000
 RAYS = 64 if SMALL else 2048

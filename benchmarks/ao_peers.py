@@ -35,7 +35,8 @@ from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
 from illumcli.baking.points import vertex_points
 from illumcli.baking.sampling import BakeSampler
 from illumcli.rays.sampling import GOLDEN
-from illumcli.visibility.obscurance import Method, turned_frame
+from illumcli.visibility.hemisphere import turned_frame
+from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64) if SMALL else (16, 64, 256, 1024)
 EQUAL = 64 if SMALL else 256

@@ -24,7 +24,7 @@ from ao_error import caster
 from illumcli.arrays import F, take_rows
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.visibility import obscurance
-from illumcli.visibility.obscurance import about, directions, mirror_below
+from illumcli.visibility.hemisphere import directions, mirror_below, sample_frames
 
 REPEATS = 5
 SAMPLES = 256
@@ -46,9 +46,11 @@ def main() -> None:
             part = order[first : first + at_once]
             draws = np.stack([unit_interval(hashed(key, bake.points.number[part])) for key in keys])
             over = bake.points.hemispheres(part, draws[2])
-            d = directions(about(over.n, draws, bake.method), draws, bake.method)
-            mirror_below(d, over, bake.method)
-            origins = take_rows(over.origins, over.of_rays(SAMPLES))
+            d = directions(
+                sample_frames(over.n, draws, bake.method.sampler), draws, SAMPLES, bake.method.sampler
+            )
+            mirror_below(d, over, SAMPLES, bake.method.sampler)
+            origins = take_rows(over.origins, over.origin_of_rays(SAMPLES))
             calls.append((np.ascontiguousarray(origins), np.ascontiguousarray(d)))
         return calls
 

@@ -101,7 +101,7 @@ def render(setup):
     from illumcli.rays.sampling import dither, spiral_table, stream
     from illumcli.scene.spec import Scene
     from illumcli.shading.terms import evaluate
-    from illumcli.visibility.obscurance import turned_frame
+    from illumcli.visibility.hemisphere import turned_frame
 
     eye, target = (np.asarray(setup.camera[k], float) for k in ("position", "target"))
     forward = unit(target - eye)

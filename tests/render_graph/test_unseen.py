@@ -22,7 +22,16 @@ from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
 from illumcli.scene.spec import LAYERS
-from illumcli.visibility.culling import GROUPS, LARGE, apart, fewer, frustum, outside, within
+from illumcli.visibility.culling import (
+    GROUPED_BOXES,
+    LARGE_BOXES,
+    Boxes,
+    clip_boxes,
+    frustum,
+    merge_boxes,
+    outside_frustum,
+    separated,
+)
 
 SCENE = """
 version: 1
@@ -306,7 +315,7 @@ def test_boxes_told_apart_are_farther_than_the_gap(seed):
     low = random.normal(size=(20, 3)) * 2
     high = low + random.uniform(0, 1, (20, 3))
     gap = random.uniform(0, 1)
-    told = apart(points, low, high, gap)
+    told = separated(points, Boxes(low, high), gap)
     weights = random.dirichlet(np.full(7, 0.3), 400)
     inside = weights @ points
     way = np.maximum(np.maximum(low[:, None] - inside, inside - high[:, None]), 0)
@@ -315,13 +324,13 @@ def test_boxes_told_apart_are_farther_than_the_gap(seed):
     assert told[distance > gap + 1.5].all()
 
 
-@pytest.mark.parametrize("count", [1, LARGE + GROUPS, LARGE + GROUPS + 1, 700])
+@pytest.mark.parametrize("count", [1, LARGE_BOXES + GROUPED_BOXES, LARGE_BOXES + GROUPED_BOXES + 1, 700])
 def test_fewer_boxes_hold_all_of_many(count):
     random = np.random.default_rng(count)
     low = random.normal(size=(count, 3))
     high = low + random.exponential(0.1, (count, 3))
-    lower, higher = fewer(low, high)
-    assert len(lower) <= LARGE + GROUPS
+    lower, higher = merge_boxes(Boxes(low, high))
+    assert len(lower) <= LARGE_BOXES + GROUPED_BOXES
     inside = (lower[None] <= low[:, None]).all(axis=2) & (high[:, None] <= higher[None]).all(axis=2)
     assert inside.any(axis=1).all()
 
@@ -332,12 +341,12 @@ def test_what_a_box_and_a_frustum_share_holds_all_points_in_both(scene):
     frame = stand([mesh], [np.eye(4)]).frame
     planes = frustum(loaded.scene.camera, frame, 40, 30, None)
     low, high = np.array([[-0.3, -0.4, -0.6]]), np.array([[0.6, 0.5, 0.2]])
-    corners = within(planes, low, high)
+    corners = clip_boxes(planes, Boxes(low, high))
     random = np.random.default_rng(0)
     points = random.uniform(low[0], high[0], (4000, 3))
     both = points[(points @ planes[0].T <= planes[1]).all(axis=1)]
     assert 0 < len(both) < 4000
     for direction in random.normal(size=(50, 3)):
         assert (both @ direction).max() <= (corners @ direction).max() + 1e-9
-    assert not outside(planes, low, high).any()
-    assert outside(planes, low + 100, high + 100).all()
+    assert not outside_frustum(planes, Boxes(low, high)).any()
+    assert outside_frustum(planes, Boxes(low + 100, high + 100)).all()

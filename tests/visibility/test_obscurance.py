@@ -10,7 +10,8 @@ from illumcli.rays.offsets import offset_ray_origins
 from illumcli.schema.families import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import Hemispheres, Method, obscurance, turned_frame
+from illumcli.visibility.hemisphere import Hemispheres, turned_frame
+from illumcli.visibility.obscurance import Method
 from illumcli.visibility.obscurance import estimates as estimated
 
 F = np.float32
@@ -37,12 +38,16 @@ def sphere(rings=96, sectors=192):
     return v, np.concatenate([np.stack([a, b, a + 1], 1), np.stack([b, b + 1, a + 1], 1)]).astype(np.int32)
 
 
+def obscurance(tracer, origins, ng, draws, method):
+    return estimated(tracer, Hemispheres(ng, origins), draws, method, errors=False).w
+
+
 def estimates(tracer, point, normal, falloff, samples=64, scrambles=400, radius=1.0):
     rng = np.random.default_rng(11)
     p = np.tile(np.asarray(point, float), (scrambles, 1))
     n = np.tile(np.asarray(normal, F), (scrambles, 1))
     origins = offset_ray_origins(p, n, np.full(scrambles, F(3)))
-    return obscurance(tracer, origins, n, rng.random((2, scrambles)), samples, falloff, radius)
+    return obscurance(tracer, origins, n, rng.random((2, scrambles)), Method(samples, falloff, radius))
 
 
 def agrees(w, exact):
@@ -100,8 +105,8 @@ def test_points_do_not_depend_on_their_company():
     p = np.column_stack([rng.uniform(-0.5, 0.5, (1000, 2)), np.zeros(1000)])
     n, draws = np.tile(UP.astype(F), (1000, 1)), rng.random((2, 1000))
     origins = offset_ray_origins(p, n, np.full(1000, F(3)))
-    whole = obscurance(tracer, origins, n, draws, 48, Step(), 1.0)
-    part = obscurance(tracer, origins[300:317], n[300:317], draws[:, 300:317], 48, Step(), 1.0)
+    whole = obscurance(tracer, origins, n, draws, Method(48, Step(), 1.0))
+    part = obscurance(tracer, origins[300:317], n[300:317], draws[:, 300:317], Method(48, Step(), 1.0))
     assert np.array_equal(whole[300:317], part)
 
 
@@ -172,8 +177,8 @@ def test_tilted_points_do_not_depend_on_their_company():
     t = np.radians(tilts)
     n = np.asfortranarray(np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1).astype(F))
     ng = np.asfortranarray(np.tile(UP.astype(F), (400, 1)))
-    over = Hemispheres(n, offset_ray_origins(np.zeros((400, 3)), ng, np.full(400, F(3))), ng).take(
-        slice(120, 133)
+    over = Hemispheres(n, offset_ray_origins(np.zeros((400, 3)), ng, np.full(400, F(3))), ng).between(
+        120, 133
     )
     assert np.array_equal(
         whole[120:133], estimated(tracer, over, draws[:, 120:133], Method(64, Step(), 1.0)).w

@@ -36,7 +36,7 @@ def by_all(vertices, origins, n):
 def test_every_point_of_a_ball_is_clear(count):
     p, t = ball(count)
     p = p[: t.size]
-    assert ClusterTree(p, t).clears(raised(p, p), p).all()
+    assert ClusterTree(p, t).is_open(raised(p, p), p).all()
 
 
 def test_agrees_with_a_look_at_every_vertex():
@@ -45,22 +45,22 @@ def test_agrees_with_a_look_at_every_vertex():
     n = p / np.linalg.norm(p, axis=1, keepdims=True)
     order = compact(p)
     o, n = raised(p, n)[order], n[order]
-    cleared, truth = ClusterTree(p, t).clears(o, n), by_all(p, o, n)
+    opened, truth = ClusterTree(p, t).is_open(o, n), by_all(p, o, n)
     assert 0.02 < truth.mean() < 0.98
-    assert np.array_equal(cleared, truth)
+    assert np.array_equal(opened, truth)
 
 
 def test_a_vertex_just_above_is_found_and_one_that_no_triangle_uses_is_not():
     p, t = ball(3000)
     p[-1] = p[0] * F(1.0001)
     n = p[:1] / np.linalg.norm(p[:1])
-    assert not ClusterTree(p, t).clears(raised(p[:1], n), n)[0]
-    assert ClusterTree(p, t[:-1]).clears(raised(p[:1], n), n)[0]
+    assert not ClusterTree(p, t).is_open(raised(p[:1], n), n)[0]
+    assert ClusterTree(p, t[:-1]).is_open(raised(p[:1], n), n)[0]
 
 
 def test_nothing_at_all_hides_nothing():
     empty = ClusterTree(np.zeros((0, 3), F), np.zeros((0, 3), np.int32))
-    assert empty.clears(np.zeros((2, 3), F), np.eye(3, dtype=F)[:2]).all()
+    assert empty.is_open(np.zeros((2, 3), F), np.eye(3, dtype=F)[:2]).all()
 
 
 def test_an_order_holds_every_point_once_and_rows_are_near():
@@ -81,7 +81,7 @@ def test_points_of_a_hollow_settle_each_other_without_the_tree(monkeypatch):
     order = compact(p)
     monkeypatch.setattr(ClusterTree, "_tree", lambda self: pytest.fail("the tree was asked"))
     monkeypatch.setattr("illumcli.visibility.open_hemisphere.extremes", lambda points: points[:1])
-    assert not ClusterTree(p, t).clears(raised(p, n)[order], n[order]).any()
+    assert not ClusterTree(p, t).is_open(raised(p, n)[order], n[order]).any()
 
 
 @pytest.mark.parametrize(("down", "built"), [(50, True), (2000, False)])
@@ -89,9 +89,9 @@ def test_the_tree_is_built_for_many_points_only(down, built):
     p, t = ball(3000)
     inward = -p[:down] / np.linalg.norm(p[:down], axis=1, keepdims=True)  # all of the ball is above these
     o, n = np.concatenate([raised(p[:1], p[:1]), raised(p[:down], inward)]), np.concatenate([p[:1], inward])
-    horizon = ClusterTree(p, t)
-    assert horizon.clears(np.asfortranarray(o), n).tolist() == [built] + [False] * down
-    assert (horizon._levels is not None) == built
+    tree = ClusterTree(p, t)
+    assert tree.is_open(np.asfortranarray(o), n).tolist() == [built] + [False] * down
+    assert (tree._levels is not None) == built
 
 
 def world_of(*meshes):
@@ -102,7 +102,7 @@ def test_every_facet_of_a_convex_mesh_is_open_in_front_and_none_behind():
     world = world_of(Sphere(shape="sphere").mesh())
     triangle = np.repeat(np.arange(len(world.triangles), dtype=np.int32), 2)
     front = np.tile([False, True], len(world.triangles))
-    opened = OpenTriangles(world).open(triangle, front, 1)
+    opened = OpenTriangles(world).is_open(triangle, front, 1)
     assert opened[~front].all()
     assert not opened[front].any()
 
@@ -110,7 +110,7 @@ def test_every_facet_of_a_convex_mesh_is_open_in_front_and_none_behind():
 def test_facets_that_few_samples_lie_on_are_not_looked_at():
     world = world_of(Sphere(shape="sphere").mesh())
     triangle = np.arange(len(world.triangles), dtype=np.int32)[:70]
-    opened = OpenTriangles(world).open(triangle, np.zeros(70, bool), 10)
+    opened = OpenTriangles(world).is_open(triangle, np.zeros(70, bool), 10)
     assert opened.tolist() == [True] * 64 + [False] * 6
 
 
@@ -119,26 +119,26 @@ def test_a_world_without_open_facets_is_not_looked_through(monkeypatch):
     corner = (np.arange(39)[:, None] * 40 + np.arange(39)).reshape(-1, 1)
     halves = [corner + np.array(half) for half in ((0, 1, 41), (0, 41, 40))]
     saddle = Mesh.of_triangles(np.stack([x, y, x * y], axis=1), np.concatenate(halves))
-    monkeypatch.setattr(OpenTriangles, "_settle", lambda self, rows: pytest.fail("a row was looked at"))
+    monkeypatch.setattr(OpenTriangles, "_test", lambda self, groups: pytest.fail("a group was tested"))
     triangle = np.arange(2 * len(corner), dtype=np.int32)
     for behind in (False, True):
-        assert not OpenTriangles(world_of(saddle)).open(triangle, np.full(len(triangle), behind), 1).any()
+        assert not OpenTriangles(world_of(saddle)).is_open(triangle, np.full(len(triangle), behind), 1).any()
 
 
 def test_an_open_facet_does_not_depend_on_who_asks_first():
     world = world_of(Torus(shape="torus").mesh(), Sphere(shape="sphere").mesh())
     triangle = np.arange(len(world.triangles), dtype=np.int32)
     behind = np.zeros(len(triangle), bool)
-    whole = OpenTriangles(world).open(triangle, behind, 1)
+    whole = OpenTriangles(world).is_open(triangle, behind, 1)
     parts = OpenTriangles(world)
     for part in np.array_split(np.random.default_rng(1).permutation(len(triangle)), 50):
-        assert np.array_equal(parts.open(triangle[part], behind[part], 1), whole[part])
+        assert np.array_equal(parts.is_open(triangle[part], behind[part], 1), whole[part])
 
 
 def test_open_facets_are_open_to_every_vertex():
     world = world_of(Torus(shape="torus").mesh())
     triangle = np.arange(len(world.triangles), dtype=np.int32)
-    opened = OpenTriangles(world).open(triangle, np.zeros(len(triangle), bool), 1)
+    opened = OpenTriangles(world).is_open(triangle, np.zeros(len(triangle), bool), 1)
     corner = world.vertices[world.triangles[:, 0]].astype(float)
     sides = [world.vertices[world.triangles[:, k]].astype(float) - corner for k in (1, 2)]
     n = np.cross(*sides)

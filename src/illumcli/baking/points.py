@@ -18,7 +18,7 @@ from illumcli.rays.interaction import facets, with_facet
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
 from illumcli.records import Record
-from illumcli.visibility.obscurance import Hemispheres
+from illumcli.visibility.hemisphere import Hemispheres
 
 STARTS = 16
 """Places around a vertex from which its rays start."""

@@ -21,8 +21,9 @@ from illumcli.geometry.spatial_order import compact
 from illumcli.rays.embree import Tracer
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.records import Record, Value
-from illumcli.visibility.obscurance import Errors, Estimates, Method, estimates
-from illumcli.visibility.open_hemisphere import ClusterTree, facet_planes
+from illumcli.visibility.obscurance import Method, estimates
+from illumcli.visibility.obscurance_error import Errors, Estimates
+from illumcli.visibility.open_hemisphere import ClusterTree, triangle_planes
 
 RAYS = 1 << 18
 """Rays of a piece of work: an interrupt loses no more, and there are enough pieces to share."""
@@ -99,8 +100,8 @@ class BakeSampler:
 
         def ask(piece: WorkUnit, stop: threading.Event) -> NDArray[np.bool_]:
             triangle = piece.lanes.astype(np.int32)
-            planes = facet_planes(world, triangle, np.zeros(len(triangle), bool))
-            return self.occluders[piece.thing].horizon.clears(*planes)
+            planes = triangle_planes(world, triangle, np.zeros(len(triangle), bool))
+            return self.occluders[piece.thing].horizon.is_open(*planes)
 
         for number, found in self._run("horizon", pieces, ask):
             clear[pieces[number].lanes] = found

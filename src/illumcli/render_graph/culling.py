@@ -17,7 +17,7 @@ from illumcli.render_graph.cached import Artifacts, Book
 from illumcli.render_graph.execute import RenderStats, run_once
 from illumcli.render_graph.schedule import GIVEN, Plan, plan
 from illumcli.scene.spec import Obscurance
-from illumcli.visibility.culling import frustum, unseen
+from illumcli.visibility.culling import Boxes, SecondaryRays, culled_objects, frustum
 
 WHY = "no view sees it, and it shadows and obscures nothing that one sees"
 
@@ -57,7 +57,7 @@ def unseen_objects(
     if standing is None:
         return ()
     frame, film = standing.frame, scene.film
-    low, high = ((corner - frame.centre) / frame.radius for corner in (standing.low, standing.high))
+    boxes = Boxes(*((corner - frame.centre) / frame.radius for corner in (standing.low, standing.high)))
     views = [
         frustum(view.camera, frame, view.width, view.height, film.filter if view.samples > 1 else None)
         for view in made.views
@@ -66,13 +66,13 @@ def unseen_objects(
     lights = [
         light for name, light in active_lights(scene).items() if light.shadows and f"shadow:{name}" in steps
     ]
-    reach = _reach(made, frame.radius) / frame.radius
-    found = unseen(low, high, np.zeros(len(low)), views, lights, reach, frame)
+    rays = SecondaryRays(lights, _reach(made, frame.radius) / frame.radius)
+    found = culled_objects(boxes, np.zeros(len(boxes.low)), views, rays, frame)
     if found.any() and lights and scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH):
         widths = asked(made, "implied_widths", artifacts, tally, threads, at_hand)
         if widths is None:
             return ()
-        found = unseen(low, high, widths / frame.radius, views, lights, reach, frame)
+        found = culled_objects(boxes, widths / frame.radius, views, rays, frame)
     if found.any():
         tally.add({}, {}, {"polygons": int(standing.polygons[found].sum())})
     return tuple(int(number) for number in np.flatnonzero(found))

@@ -16,7 +16,7 @@ from illumcli.geometry.scene_geometry import ObjectBounds
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Value
 from illumcli.render_graph.build import View
-from illumcli.visibility.culling import frustum, outside
+from illumcli.visibility.culling import Boxes, frustum, outside_frustum
 
 VISIBLE = 0.005
 """Share of an object's radius that an offset is seen from: about two pixels where it fills a picture."""
@@ -76,5 +76,5 @@ def _looked_at(standing: ObjectBounds, views: Sequence[View]) -> NDArray[np.bool
                 half = distance * np.tan(np.radians(view.camera.fov) / 2)
             else:
                 half = np.full(len(low), view.camera.extent / 2 / frame.radius)
-            seen |= ~outside(planes, low, high) & (radius >= SMALLEST * half)
+            seen |= ~outside_frustum(planes, Boxes(low, high)) & (radius >= SMALLEST * half)
     return seen

@@ -54,9 +54,10 @@ from illumcli.shading.rates import Points
 from illumcli.shading.textures import Parameters, Varying, surface_colors, varying
 from illumcli.shading.textures import parameters as parameters_at
 from illumcli.visibility import shadows
+from illumcli.visibility.hemisphere import Hemispheres
 from illumcli.visibility.incident import LitPoints, reaching
 from illumcli.visibility.incident import lit as lit_lanes
-from illumcli.visibility.obscurance import Hemispheres, Method, estimates
+from illumcli.visibility.obscurance import Method, estimates
 from illumcli.visibility.open_hemisphere import OpenTriangles
 
 LARGEST_HORIZON = 1 << 17
@@ -738,17 +739,16 @@ def obscurance(
     )
     known = None
     if open_facets is not None:
-        known = open_facets.open(hits.triangle, facets.behind, WORTH_RAYS // settings.samples)
+        known = open_facets.is_open(hits.triangle, facets.behind, WORTH_RAYS // settings.samples)
     if obscurance_normals is None:
-        over = Hemispheres(facets.ng, ray_origins)
+        over = Hemispheres(facets.ng, ray_origins, known_open=known)
     else:
-        over = Hemispheres(obscurance_normals, ray_origins, facets.ng)
+        over = Hemispheres(obscurance_normals, ray_origins, facets.ng, known)
     if baked is None or corner_weights is None:
-        return estimates(tracer, over, obscurance_draws, method, known, errors=False).w
+        return estimates(tracer, over, obscurance_draws, method, errors=False).w
     w = baked_obscurance(world, baked, corner_weights)
     left = np.flatnonzero(np.isnan(w))
-    known = None if known is None else known.take(left)
-    w[left] = estimates(tracer, over.take(left), obscurance_draws[:, left], method, known, errors=False).w
+    w[left] = estimates(tracer, over.take(left), obscurance_draws[:, left], method, errors=False).w
     return w
 
 

@@ -22,7 +22,8 @@ from illumcli.verification.surroundings import Surroundings, surroundings
 from illumcli.visibility.falloffs._base import Falloff
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
-from illumcli.visibility.obscurance import obscurance
+from illumcli.visibility.hemisphere import Hemispheres
+from illumcli.visibility.obscurance import Method, estimates
 
 PATTERNS = 128
 RAYS = 256  # per pattern
@@ -70,7 +71,8 @@ def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
     )
     core = tracer(world.vertices, world.triangles)
-    w = obscurance(core, origins, ng, draws, RAYS, falloff, world.frame.radius).astype(np.float64)
+    method = Method(RAYS, falloff, world.frame.radius)
+    w = estimates(core, Hemispheres(ng, origins), draws, method, errors=False).w.astype(np.float64)
     spread = float(w.std(ddof=1)) / np.sqrt(PATTERNS)
     return Estimate(float(w.mean()), float(np.hypot(spread, RESOLUTION)))
 

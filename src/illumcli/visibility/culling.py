@@ -1,21 +1,21 @@
-"""Which objects no picture can tell the presence of, by their boxes alone.
+"""Culling: objects whose bounding boxes prove that they cannot change any image.
 
-An object is left out only where planes prove it: one between it and every view, and one between it and all
-that a view sees together with the ways from there to each light, and out of reach of obscurance rays. Boxes
-and hulls are larger than what they hold and the search for planes gives up early, so the answer errs by
-keeping objects.
+An object is culled only where planes prove it: one between it and every view, and one between it and the hull
+of all visible geometry, of that geometry's shadow rays to each light, and of its obscurance rays. Boxes and
+hulls are larger than what they hold and the search for planes gives up early, so errors keep objects and
+never cull one that matters.
 
 References
 ----------
 Gilbert, E. G. (1966). An iterative procedure for computing the minimum of a quadratic form on a convex set.
-SIAM J. Control 4(1): the walk towards the nearest point, each step of which offers a separating plane.
+SIAM J. Control 4(1): the iteration towards the nearest point, each step of which offers a separating plane.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,165 +27,211 @@ from illumcli.rays.camera import axes, offsets
 from illumcli.render_space import RenderSpace
 from illumcli.visibility.shadows import NEARBY, TERMINATOR_SHARE
 
-ROOM = 1e-4
-"""Radii by which everything is taken to be larger: rays in single precision, the second shot of rays that
-miss and the starts of secondary rays together stray by a tenth of it."""
-BEYOND = 20.0
-"""Radii that a way to a light is followed for: out of the scene from any point near it."""
-STEPS = 40
+BOX_MARGIN = 1e-4
+"""By which boxes and hulls are enlarged [radii]: rounding of rays, the second shot of rays that miss and the
+offsets of secondary rays together move a ray by a tenth of it."""
+SHADOW_REACH = 20.0
+"""Length at which a shadow ray counts as having left the scene, from any point near it [radii]."""
+MAX_STEPS = 40
 PARALLEL = 1e-9
-AT_ONCE = 1 << 20
-LARGE, GROUPS = 8, 16
-"""Of many boxes so many of the largest stand alone; so many boxes hold the others, those that lie close
+"""Determinant of three unit normals below which their planes meet in no point."""
+PAIRS_AT_ONCE = 1 << 20
+"""Pairs of a hull's point and a box that are compared at once."""
+LARGE_BOXES, GROUPED_BOXES = 8, 16
+"""Of many boxes, how many of the largest stay as they are, and how many boxes hold the others, neighbours
 together."""
 
-Points = NDArray[np.float64]
-Planes = tuple[NDArray[np.float64], NDArray[np.float64]]  # (K, 3) unit n and (K,) d: n.x <= d is inside
+Positions: TypeAlias = NDArray[np.float64]
+"""(N, 3) in radii."""
+
+
+class Boxes(NamedTuple):
+    """K axis-aligned boxes."""
+
+    low: Positions  # (K, 3) lowest corners [radii]
+    high: Positions  # (K, 3) highest corners
+
+    def take(self, index: NDArray[Any] | slice) -> Boxes:
+        """The boxes of these indices, or where this mask is True."""
+        return Boxes(self.low[index], self.high[index])
+
+    def enlarged(self, margin: NDArray[np.float64]) -> Boxes:
+        """The boxes, each larger by its margin, (K,), on every side."""
+        return Boxes(self.low - margin[:, None], self.high + margin[:, None])
+
+
+class Planes(NamedTuple):
+    """K planes that bound a convex region: n.x <= d is inside."""
+
+    n: NDArray[np.float64]  # (K, 3) unit
+    d: NDArray[np.float64]  # (K,)
+
+
+class SecondaryRays(NamedTuple):
+    """The rays that visible geometry casts."""
+
+    lights: Sequence[Light]  # those that cast shadows
+    obscurance_reach: float  # of obscurance rays [radii]; 0 where none are cast
 
 
 def frustum(camera: Any, frame: RenderSpace, width: int, height: int, film_filter: Any | None) -> Planes:
-    """Five planes around all that a view's rays pass: four sides, and the eye's own; in radii.
+    """Five planes around all rays of a view: four sides, and the eye's own; in radii.
 
     Parameters
     ----------
     film_filter
         The pixel filter, None where each pixel looks through its centre.
     """
+    # Half of the image plane, as wide as samples reach under the filter.
     right, up, forward = axes(camera)
     eye = frame.from_world(camera.position)
     ends = np.array([0.0, 0.5, 1 - 2.0**-32])
     u, v = (each.ravel() for each in np.meshgrid(ends, np.arange(65) / 64))
     spread = max(float(np.abs(part).max()) for part in offsets(u, v, film_filter))
     x, y = (width - 1 + 2 * spread) / height, (height - 1 + 2 * spread) / height
+
     if camera.projection == "perspective":
         slope = np.tan(np.radians(camera.fov) / 2)
         x, y = slope * x, slope * y
         n = np.stack([*(side * right - x * forward for side in (1, -1)),
                       *(side * up - y * forward for side in (1, -1)), -forward])  # fmt: skip
         n /= np.linalg.norm(n, axis=1, keepdims=True)
-        return n, n @ eye
+        return Planes(n, n @ eye)
     half = camera.extent / 2 / frame.radius
     n = np.stack([right, -right, up, -up, -forward])
-    return n, n @ eye + half * np.array([x, x, y, y, 0])
+    return Planes(n, n @ eye + half * np.array([x, x, y, y, 0]))
 
 
-def outside(planes: Planes, low: Points, high: Points) -> NDArray[np.bool_]:
-    """(K,) True for boxes that lie beyond one of the planes as a whole."""
+def outside_frustum(planes: Planes, boxes: Boxes) -> NDArray[np.bool_]:
+    """(K,) True for boxes that lie wholly beyond one of the planes."""
     n, d = planes
-    nearest = np.where(n[:, None] > 0, low, high)
-    beyond = np.einsum("pki,pi->pk", nearest, n) > d[:, None] + ROOM
-    told: NDArray[np.bool_] = beyond.any(axis=0)
-    return told
+    nearest = np.where(n[:, None] > 0, boxes.low, boxes.high)
+    beyond = np.einsum("pki,pi->pk", nearest, n) > d[:, None] + BOX_MARGIN
+    return np.asarray(beyond.any(axis=0))
 
 
-def within(planes: Planes, low: Points, high: Points) -> Points:
-    """(V, 3) the corners of what each of (K, 3) boxes has in common with the inside of the planes."""
-    n = np.concatenate([planes[0], np.eye(3), -np.eye(3)])
-    d = np.concatenate([np.broadcast_to(planes[1] + ROOM, (len(low), len(planes[1]))), high, -low], axis=1)
-    three = np.array(list(itertools.combinations(range(len(n)), 3)))
-    three = three[np.abs(np.linalg.det(n[three])) > PARALLEL]
-    corners = np.einsum("tij,ktj->kti", np.linalg.inv(n[three]), d[:, three])
-    inside = (corners @ n.T <= d[:, None] + ROOM).all(axis=2)
+def clip_boxes(planes: Planes, boxes: Boxes) -> Positions:
+    """(V, 3) corners of the intersection of each of K boxes with the region inside the planes.
+
+    Every three of the planes and the box's own six meet in a point; corners are those inside all others.
+    """
+    n = np.concatenate([planes.n, np.eye(3), -np.eye(3)])
+    clipping = np.broadcast_to(planes.d + BOX_MARGIN, (len(boxes.low), len(planes.d)))
+    d = np.concatenate([clipping, boxes.high, -boxes.low], axis=1)
+    triples = np.array(list(itertools.combinations(range(len(n)), 3)))
+    triples = triples[np.abs(np.linalg.det(n[triples])) > PARALLEL]
+    corners = np.einsum("tij,ktj->kti", np.linalg.inv(n[triples]), d[:, triples])
+    inside = (corners @ n.T <= d[:, None] + BOX_MARGIN).all(axis=2)
     return corners[inside]
 
 
-def ways(points: Points, light: Light, frame: RenderSpace) -> Points:
-    """The points and where the ways from them to a light end: their hull holds the ways from all its points.
+def shadow_hull(points: Positions, light: Light, frame: RenderSpace) -> Positions:
+    """The points and the ends of their shadow rays, whose hull holds all shadow rays from the points' hull.
 
-    A light is one point or infinitely far away; a long way ends where nothing can stand any more, for all
-    points at the same share of it.
+    A light is a point or infinitely far away. Long rays are cut beyond the scene, all at the same
+    share of their length.
     """
     arriving = light.arriving(column_major(points), frame)
     nearest = float(arriving.distance.min())
     if np.isinf(nearest):
-        ends = points + BEYOND * arriving.l
+        ends = points + SHADOW_REACH * arriving.l
     else:
-        share = min(1.0, BEYOND / max(nearest, BEYOND / 2))
+        share = min(1.0, SHADOW_REACH / max(nearest, SHADOW_REACH / 2))
         ends = points + share * arriving.distance[:, None] * arriving.l
     return np.concatenate([points, ends])
 
 
-def apart(points: Points, low: Points, high: Points, gap: float) -> NDArray[np.bool_]:
-    """(K,) True for boxes that a plane shows to be farther than `gap` from the hull of the points."""
-    if len(low) > (some := max(1, AT_ONCE // len(points))):
-        parts = [slice(first, first + some) for first in range(0, len(low), some)]
-        return np.concatenate([apart(points, low[part], high[part], gap) for part in parts])
-    found = np.zeros(len(low), np.bool_)
-    way = points.mean(axis=0) - (low + high) / 2
-    left = np.arange(len(low))
-    for _ in range(STEPS):
-        # the corner of (hull - box) that lies farthest back along the way
-        back = points[np.argmin(points @ way.T, axis=0)] - np.where(way > 0, high[left], low[left])
-        size = np.linalg.norm(way, axis=1)
-        told = np.einsum("ki,ki->k", back, way) > gap * size
-        found[left[told]] = True
-        # the way leads from a point of the box to one of the hull: a short one proves the opposite
-        on = np.flatnonzero(~told & (size > gap))
-        left, way = left[on], way[on]
-        if not len(left):
+def separated(points: Positions, boxes: Boxes, gap: float) -> NDArray[np.bool_]:
+    """(K,) True for boxes that a plane proves to be farther than `gap` from the hull of the points."""
+    count = len(boxes.low)
+    if count > (at_once := max(1, PAIRS_AT_ONCE // len(points))):
+        parts = [slice(first, first + at_once) for first in range(0, count, at_once)]
+        return np.concatenate([separated(points, boxes.take(part), gap) for part in parts])
+
+    # Gilbert's iteration on the differences hull - box, from the difference of the centres.
+    out = np.zeros(count, np.bool_)
+    nearest = points.mean(axis=0) - (boxes.low + boxes.high) / 2
+    undecided = np.arange(count)
+    for _ in range(MAX_STEPS):
+        # The corner of hull - box that lies farthest back along `nearest`: a plane through it separates them
+        # if it is still more than the gap ahead.
+        corner = np.where(nearest > 0, boxes.high[undecided], boxes.low[undecided])
+        back = points[np.argmin(points @ nearest.T, axis=0)] - corner
+        size = np.linalg.norm(nearest, axis=1)
+        is_separated = np.einsum("ki,ki->k", back, nearest) > gap * size
+        out[undecided[is_separated]] = True
+
+        # `nearest` leads from a point of the box to one of the hull: a short one proves the opposite.
+        rest = np.flatnonzero(~is_separated & (size > gap))
+        undecided, nearest = undecided[rest], nearest[rest]
+        if not len(undecided):
             break
-        step = back[on] - way
-        length = np.einsum("ki,ki->k", step, step)
-        share = -np.einsum("ki,ki->k", way, step) / np.maximum(length, np.finfo(np.float64).tiny)
-        way = way + np.clip(share, 0, 1)[:, None] * step
-    return found
+
+        # The point nearest to the origin on the segment towards that corner.
+        step = back[rest] - nearest
+        length2 = np.einsum("ki,ki->k", step, step)
+        share = -np.einsum("ki,ki->k", nearest, step) / np.maximum(length2, np.finfo(np.float64).tiny)
+        nearest = nearest + np.clip(share, 0, 1)[:, None] * step
+    return out
 
 
-def fewer(low: Points, high: Points) -> tuple[Points, Points]:
-    """Boxes that hold all of (K, 3) boxes: these, or where they are many fewer and larger ones."""
-    if len(low) <= LARGE + GROUPS:
-        return low, high
+def merge_boxes(boxes: Boxes) -> Boxes:
+    """Boxes that together hold all of K boxes: these if they are few, otherwise fewer and larger ones."""
+    low, high = boxes
+    if len(low) <= LARGE_BOXES + GROUPED_BOXES:
+        return boxes
     by_size = np.argsort(-np.linalg.norm(high - low, axis=1), kind="stable")
-    large, others = by_size[:LARGE], by_size[LARGE:]
+    large, others = by_size[:LARGE_BOXES], by_size[LARGE_BOXES:]
     others = others[compact((low[others] + high[others]) / 2)]
-    groups = [*large[:, None], *np.array_split(others, GROUPS)]
-    return np.array([low[g].min(axis=0) for g in groups]), np.array([high[g].max(axis=0) for g in groups])
+    groups = [*large[:, None], *np.array_split(others, GROUPED_BOXES)]
+    return Boxes(
+        np.array([low[group].min(axis=0) for group in groups]),
+        np.array([high[group].max(axis=0) for group in groups]),
+    )
 
 
-def unseen(
-    low: Points,
-    high: Points,
+def culled_objects(
+    boxes: Boxes,
     widths: NDArray[np.float64],
     views: Sequence[Planes],
-    lights: Iterable[Light],
-    reach: float,
+    rays: SecondaryRays,
     frame: RenderSpace,
 ) -> NDArray[np.bool_]:
-    """(O,) True for objects that change no picture.
+    """(O,) True for objects that cannot change any image.
 
     Parameters
     ----------
-    low, high : (O, 3)
-        Corners of the objects' boxes, in radii; inf and -inf for one without polygons, which is never told.
+    boxes : Boxes
+        Bounds of the objects [radii]; inf and -inf for one without polygons, which is never culled.
     widths : (O,)
-        The widest polygon of each object whose shadow rays may start on the surface that its normals imply,
-        in radii: they start within a share of it and look for other things nearby (`shadows`).
-    views : sequence of (n, d)
-        What bounds each, at least one, as `frustum` gives it.
-    lights : iterable of Light
-        Those that cast shadows.
-    reach : float
-        Of obscurance rays, in radii; 0 where none are cast.
+        The widest polygon of each object whose shadow rays may start on the surface that its normals imply
+        [radii]: they start within a share of it and look for other things nearby (`shadows`).
+    views : sequence of Planes
+        What bounds each view, at least one (`frustum`).
     """
-    real = np.isfinite(low).all(axis=1)
-    beyond = np.array([real & outside(planes, low, high) for planes in views])
-    found = np.asarray(beyond.all(axis=0))
-    if not found.any():
-        return found
-    more = (ROOM + TERMINATOR_SHARE * widths)[:, None]
-    seen = np.concatenate(
+    # Only objects outside every frustum can be culled.
+    real = np.isfinite(boxes.low).all(axis=1)
+    outside = np.array([real & outside_frustum(planes, boxes) for planes in views])
+    out = np.asarray(outside.all(axis=0))
+    if not out.any():
+        return out
+
+    # The visible part of the others, with the offsets of their rays.
+    enlarged = boxes.enlarged(BOX_MARGIN + TERMINATOR_SHARE * widths)
+    visible = np.concatenate(
         [
-            within(planes, *fewer((low - more)[mine], (high + more)[mine]))
-            for planes, mine in zip(views, real & ~beyond, strict=True)
+            clip_boxes(planes, merge_boxes(enlarged.take(in_view)))
+            for planes, in_view in zip(views, real & ~outside, strict=True)
         ]
     )
-    if not len(seen):
-        return found
-    near = NEARBY * widths[real & ~beyond.all(axis=0)].max(initial=0)
-    for points, gap in [
-        (seen, ROOM + max(reach, near)),
-        *((ways(seen, light, frame), ROOM) for light in lights),
-    ]:
-        which = np.flatnonzero(found)
-        found[which] = apart(points, low[which], high[which], gap)
-    return found
+    if not len(visible):
+        return out
+
+    # Keep those that its obscurance rays, its search for nearby objects, or its shadow rays can reach.
+    nearby = NEARBY * widths[real & ~outside.all(axis=0)].max(initial=0)
+    hulls = [(visible, BOX_MARGIN + max(rays.obscurance_reach, nearby))]
+    hulls += [(shadow_hull(visible, light, frame), BOX_MARGIN) for light in rays.lights]
+    for points, gap in hulls:
+        candidates = np.flatnonzero(out)
+        out[candidates] = separated(points, boxes.take(candidates), gap)
+    return out

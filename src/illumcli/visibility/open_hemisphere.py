@@ -1,8 +1,9 @@
-"""Which points have nothing above their tangent plane: they are open, and no ray need tell.
+"""Points with no geometry above their tangent plane: obscurance is 1 there, so no rays are cast.
 
-The vertices of all occluders stand in a tree of clusters, eight to one. A cluster is bounded by a round slab
-that lies along its surface, whose height falls with the square of its width; points that lie together are
-asked about together. So on a convex surface of any fineness a group looks at some hundreds of clusters.
+A point is open when every vertex of the occluders lies below its tangent plane. The vertices are kept in a
+tree of clusters, `FANOUT` to one. Each cluster is bounded by a round slab along the plane that fits it best:
+on a smooth surface its height falls with the square of its radius. Points are tested in groups of neighbours,
+so on a convex surface of any fineness a group visits some hundreds of clusters.
 """
 
 from __future__ import annotations
@@ -19,266 +20,304 @@ from illumcli.rays.interaction import facets, facing
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Record
 
-FAN = 8
-GROUP = 64  # points asked about together
+FANOUT = 8
+"""Points to a cluster of the finest level, and clusters to one of the next."""
+GROUP = 64
+"""Neighbouring points that are tested together."""
 GROUPS_AT_ONCE = 64
-TRY_FIRST = 16
-"""One group in so many is asked first; where none of its points is clear, its neighbours cast rays."""
-MOST_CLUSTERS = 1 << 13
-"""Groups that look at more clusters than this cast rays instead."""
-FEWEST = 64
-"""Where the cheap tests leave fewer than one point in so many, the tree is not asked: to build it takes as
-long as a few rays from every vertex."""
-PROBES = 64
-TRIED = 64
-"""Rows of triangles, of either side, by which a world is judged."""
-CLEARLY = 1e-5
+TRIAL_STEP = 16
+"""One group in so many is tested first; where none of its points is open, the groups beside it cast rays."""
+MAX_CLUSTERS = 1 << 13
+"""Groups that would visit more clusters than this cast rays instead."""
+MIN_CANDIDATES = 1 / 64
+"""Share of the points that must be left by the cheap tests for the tree to be used: building it takes as long
+as a few rays from every vertex."""
+DIRECTIONS = 64
+"""Of which the farthest vertices are compared with every plane first."""
+TRIAL_GROUPS = 64
+"""Groups of triangles, of both sides together, that decide whether a scene is worth testing."""
+CLEARANCE = 1e-5
+"""Heights above a plane up to which the cheap tests, in single precision, decide nothing [radii]."""
+BOUND_ROUNDING = 1e-12
+"""By which slabs are larger than their points, so that bounds hold in spite of rounding [radii]."""
 
 
 class Slabs(Record):
-    """A level of the tree: K round slabs."""
+    """One level of the tree: K round slabs, each around a cluster of vertices."""
 
     centre: NDArray[np.float64]  # (K, 3)
-    axis: NDArray[np.float64]  # (K, 3) unit
-    low: NDArray[np.float64]  # (K,) along the axis
-    high: NDArray[np.float64]  # (K,)
-    width: NDArray[np.float64]  # (K,) radius across the axis
+    axis: NDArray[np.float64]  # (K, 3) unit normal of the slab
+    low: NDArray[np.float64]  # (K,) lowest point along the axis, from the centre
+    high: NDArray[np.float64]  # (K,) highest point along the axis
+    radius: NDArray[np.float64]  # (K,) across the axis
 
 
-class Groups(Record):
-    """Planes that are nearly the same: those of group g hold every plane of its points.
+class PlaneGroups(Record):
+    """One bound for each group of `GROUP` similar planes.
 
-    For a point o with normal n, and any x: n.(x - o) <= axis.(x - centre) + spread |x - centre| + room.
+    For any plane of the group, through o with normal n, and for any x:
+    n.(x - o) <= axis.(x - centre) + spread |x - centre| + margin.
     """
 
     centre: NDArray[np.float64]  # (G, 3)
     axis: NDArray[np.float64]  # (G, 3)
     spread: NDArray[np.float64]  # (G,)
-    room: NDArray[np.float64]  # (G,)
+    margin: NDArray[np.float64]  # (G,)
 
 
 class ClusterTree:
-    """The vertices of occluders, asked what is above a plane; safe to ask from threads.
+    """The vertices of occluders, searched for any above a plane; safe to use from several threads.
 
-    The tree is built when a point is asked about that the vertices farthest out do not settle.
+    The tree is built when the first plane is tested that the cheap tests cannot decide.
     """
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
         used = np.zeros(len(vertices), bool)
         used[triangles.ravel()] = True
         self._points = np.asarray(vertices[used], np.float64, order="C")
-        self._probes = extremes(self._points)
+        self._extremes = extremes(self._points)
         self._levels: list[Slabs] | None = None
         self._building = threading.Lock()
 
     def _tree(self) -> list[Slabs]:
-        """Levels of clusters, from the finest; the points are put in their order."""
+        """Levels of clusters, the finest first; building them puts the points into spatial order."""
         with self._building:
             if self._levels is None:
                 self._points = self._points[compact(self._points)]
-                levels, size = [], FAN
+                levels, size = [], FANOUT
                 while len(self._points) > size:
                     levels.append(slabs(self._points, size))
-                    size *= FAN
+                    size *= FANOUT
                 self._levels = levels
         return self._levels
 
-    def clears(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
-        """(M,) True where no occluder reaches above the plane through an origin with normal `n`.
+    def is_open(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
+        """(M,) True where no occluder reaches above the plane through an origin with unit normal `n`.
 
-        Origins are those of rays, off the surface by more than the rounding of this test; points in a row
-        should lie close together. False may also mean that it was too much work to tell: that a group of
-        points would look at more than `MOST_CLUSTERS`.
+        False may also mean undecided: the group of the point would visit more than `MAX_CLUSTERS`.
+
+        Parameters
+        ----------
+        origins : (M, 3)
+            Origins of rays, off the surface by more than the rounding of this test [radii]. Consecutive
+            points should be close together.
         """
         if not len(self._points):
             return np.ones(len(origins), bool)
+
+        # Test a sample of the groups first.
         group = np.arange(len(origins)) // GROUP
-        tried = group % TRY_FIRST == 0
+        is_trial = group % TRIAL_STEP == 0
         out = np.zeros(len(origins), bool)
-        self._clear(out, np.flatnonzero(tried), origins, n)
-        cleared = np.bincount(group // TRY_FIRST, out) > 0
-        self._clear(out, np.flatnonzero(~tried & cleared[group // TRY_FIRST]), origins, n)
+        self._test(out, np.flatnonzero(is_trial), origins, n)
+
+        # Test the groups beside those that had an open point.
+        promising = np.bincount(group // TRIAL_STEP, out) > 0
+        self._test(out, np.flatnonzero(~is_trial & promising[group // TRIAL_STEP]), origins, n)
         return out
 
-    def _clear(self, out: NDArray[np.bool_], lanes: NDArray[np.int64], origins: Vectors, n: Vectors) -> None:
-        """Answer for some lanes."""
-        for first in range(0, len(lanes), GROUP * GROUPS_AT_ONCE):
-            lane = lanes[first : first + GROUP * GROUPS_AT_ONCE]
-            o, up = np.asarray(origins[lane], np.float64), np.asarray(n[lane], np.float64)
-            out[lane] = self._cleared(o, up)
+    def _test(self, out: NDArray[np.bool_], points: NDArray[np.int64], origins: Vectors, n: Vectors) -> None:
+        """Write the answers for these points into `out`, a batch at a time."""
+        for first in range(0, len(points), GROUP * GROUPS_AT_ONCE):
+            batch = points[first : first + GROUP * GROUPS_AT_ONCE]
+            o, up = np.asarray(origins[batch], np.float64), np.asarray(n[batch], np.float64)
+            out[batch] = self._tested(o, up)
 
-    def _cleared(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) True where no occluder is above the plane, as far as probes, the points near by and then
-        clusters tell."""
-        out = self._probed(o, n)
-        left = np.flatnonzero(out)
-        if len(left) * FEWEST < len(o):
+    def _tested(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) True where no occluder is above the plane: by the cheap tests, then by the tree if enough
+        points are left."""
+        out = self._passes_cheap_tests(o, n)
+        candidates = np.flatnonzero(out)
+        if len(candidates) < MIN_CANDIDATES * len(o):
             return np.zeros(len(o), bool)
-        if left.size:
-            out[left] = self._below(o[left], n[left])
+        if candidates.size:
+            out[candidates] = self._all_below(o[candidates], n[candidates])
         return out
 
-    def clear_planes(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) as `clears`, for M a multiple of 64: what is told of every 64 in a row depends on these alone.
+    def open_planes(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) as `is_open`, but each `GROUP` planes in a row, of which M is a multiple, are decided by
+        themselves alone.
 
-        Planes through points of occluders, lifted a little.
+        The planes pass through points of occluders, offset as ray origins are.
         """
-        out = self._worth(o, n)
-        some = np.repeat(out.reshape(-1, GROUP).any(axis=1), GROUP)
-        if some.any():
-            out[some] &= self._below(o[some], n[some])
+        out = self._candidates(o, n)
+        tested = np.repeat(out.reshape(-1, GROUP).any(axis=1), GROUP)
+        if tested.any():
+            out[tested] &= self._all_below(o[tested], n[tested])
         return out
 
-    def may_clear(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> bool:
-        """Do the cheap tests leave enough of these planes for `clear_planes` to be worth it?"""
-        return bool(self._worth(o, n).sum() * FEWEST >= len(o))
+    def is_promising(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> bool:
+        """Do the cheap tests leave enough of these planes for `open_planes` to be worth its time?"""
+        return bool(self._candidates(o, n).sum() >= MIN_CANDIDATES * len(o))
 
-    def _worth(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) the planes that the tree is asked about."""
-        out = self._probed(o, n)
+    def _candidates(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) planes that pass the cheap tests, of the groups in which at least half do.
+
+        The tree decides little about groups whose planes mostly have something above them.
+        """
+        out = self._passes_cheap_tests(o, n)
         groups = out.reshape(-1, GROUP)
-        groups[groups.sum(axis=1) * 2 < GROUP] = False  # the tree tells little of what is mostly under others
+        groups[groups.sum(axis=1) * 2 < GROUP] = False
         return out
 
-    def _probed(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) False where the vertices farthest out or the points near by are clearly above the plane."""
+    def _passes_cheap_tests(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) False where an extreme vertex, or a point of the same group, is clearly above the plane."""
         height = np.einsum("ij,ij->i", o, n)
-        out = (n.astype(F) @ self._probes.T).max(axis=1) <= height + CLEARLY
+        out = (n.astype(F) @ self._extremes.T).max(axis=1) <= height + CLEARANCE
         for first in range(0, len(o), GROUP) if out.any() else ():
-            own = slice(first, first + GROUP)
-            if out[own].any():
-                out[own] &= clear_of_each_other(o[own], n[own])
+            group = slice(first, first + GROUP)
+            if out[group].any():
+                out[group] &= is_above_group(o[group], n[group])
         return out
 
-    def _below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) True where all points are below, for points that no probe is above."""
-        planes = groups(o, n)
-        group, cluster, told = self._near(planes)
+    def _all_below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(M,) True where all vertices are below the plane; False where that is undecided."""
+        planes = plane_groups(o, n)
+        group, cluster, resolved = self._clusters_above(planes)
         out = np.zeros(len(o), bool)
         bounds = np.searchsorted(group, np.arange(len(planes.centre) + 1))
-        for g in np.flatnonzero(told):
-            lane = slice(g * GROUP, (g + 1) * GROUP)
-            first = cluster[bounds[g] : bounds[g + 1]] * FAN
-            rows = (first[:, None] + np.arange(FAN)).ravel()
-            near = self._points[rows[rows < len(self._points)]]
-            height = np.einsum("ij,ij->i", o[lane], n[lane])
-            out[lane] = (n[lane] @ near.T).max(axis=1, initial=-np.inf) <= height
+        for g in np.flatnonzero(resolved):
+            # Compare each plane of the group with every vertex of its clusters.
+            members = slice(g * GROUP, (g + 1) * GROUP)
+            first = cluster[bounds[g] : bounds[g + 1]] * FANOUT
+            vertex = (first[:, None] + np.arange(FANOUT)).ravel()
+            near = self._points[vertex[vertex < len(self._points)]]
+            height = np.einsum("ij,ij->i", o[members], n[members])
+            out[members] = (n[members] @ near.T).max(axis=1, initial=-np.inf) <= height
         return out
 
-    def _near(self, planes: Groups) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Pairs (group, cluster of `FAN` points), by group, that may have a point above a plane, and for each
-        group whether they are all there: groups with more than `MOST_CLUSTERS` are left out."""
+    def _clusters_above(
+        self, planes: PlaneGroups
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Clusters of `FANOUT` vertices that may reach above a plane of a group.
+
+        Returns
+        -------
+        group, cluster : (K,) int64
+            Pairs, ordered by group.
+        resolved : (G,) bool
+            True for groups all of whose pairs are there, False for those with more than `MAX_CLUSTERS`.
+        """
         count = len(planes.centre)
-        told = np.ones(count, bool)
-        group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all
+        resolved = np.ones(count, bool)
+        group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all vertices
         for level in reversed(self._tree()):
-            few = np.bincount(group, minlength=count) <= MOST_CLUSTERS // FAN
-            told &= few
-            group, cluster = group[few[group]], cluster[few[group]]
-            group = np.repeat(group, FAN)
-            cluster = (cluster[:, None] * FAN + np.arange(FAN)).ravel()
-            inside = cluster < len(level.centre)
-            group, cluster = group[inside], cluster[inside]
+            # Give up on groups with too many clusters, and go down to the children of all others.
+            is_small = np.bincount(group, minlength=count) <= MAX_CLUSTERS // FANOUT
+            resolved &= is_small
+            group, cluster = group[is_small[group]], cluster[is_small[group]]
+            group = np.repeat(group, FANOUT)
+            cluster = (cluster[:, None] * FANOUT + np.arange(FANOUT)).ravel()
+            exists = cluster < len(level.centre)
+            group, cluster = group[exists], cluster[exists]
+
+            # Bound the slab's height above the group's axis, and its distance from the group's centre.
             axis = planes.axis[group]
             away = level.centre[cluster] - planes.centre[group]
-            upright = np.einsum("ij,ij->i", axis, level.axis[cluster])
-            low, high, width = level.low[cluster], level.high[cluster], level.width[cluster]
-            reach = np.einsum("ij,ij->i", axis, away) + np.maximum(upright * high, upright * low)
-            reach += np.sqrt(np.maximum(1 - upright * upright, 0)) * width
-            far = np.sqrt(np.einsum("ij,ij->i", away, away)) + width + np.maximum(high, -low)
-            kept = reach + planes.spread[group] * far + planes.room[group] > 0
-            group, cluster = group[kept], cluster[kept]
-        return group, cluster, told
+            cosine = np.einsum("ij,ij->i", axis, level.axis[cluster])
+            low, high, radius = level.low[cluster], level.high[cluster], level.radius[cluster]
+            height = np.einsum("ij,ij->i", axis, away) + np.maximum(cosine * high, cosine * low)
+            height += np.sqrt(np.maximum(1 - cosine * cosine, 0)) * radius
+            distance = np.sqrt(np.einsum("ij,ij->i", away, away)) + radius + np.maximum(high, -low)
+
+            # Keep the clusters that may reach above some plane.
+            is_above = height + planes.spread[group] * distance + planes.margin[group] > 0
+            group, cluster = group[is_above], cluster[is_above]
+        return group, cluster, resolved
 
 
 class OpenTriangles:
-    """Which triangles have nothing above their plane, on either side; safe to ask from threads.
+    """Triangles with nothing above their plane, on either side; safe to use from several threads.
 
-    All samples of a triangle look up from one plane, so each is settled once, with 63 others in a row: an
-    answer depends on these alone, whoever asks first. Where next to none of some rows spread over the world
-    is open, as on a scanned mesh, no other is looked at.
+    All samples of a triangle share one plane, so each triangle is tested once, with the 63 others of its
+    group: the answer depends on these alone, whichever sample asks first. Where almost no triangle of some
+    groups spread over the scene is open, as on a scanned mesh, no other group is tested.
     """
 
     def __init__(self, world: SceneGeometry) -> None:
         self._world = world
-        self._horizon = ClusterTree(world.vertices, world.triangles)
-        self._blocks = -(-len(world.triangles) // GROUP)  # of either side
-        self._asked = np.zeros(2 * self._blocks, bool)
-        self._clear = np.zeros(2 * self._blocks * GROUP, bool)
-        tried = np.arange(0, 2 * self._blocks, max(1, self._blocks // TRIED))
-        self._any = len(tried) > 0 and self._horizon.may_clear(*self._planes(tried))
+        self._tree = ClusterTree(world.vertices, world.triangles)
+        self._groups = -(-len(world.triangles) // GROUP)  # of each side
+        self._tested = np.zeros(2 * self._groups, bool)
+        self._open = np.zeros(2 * self._groups * GROUP, bool)
+        trial = np.arange(0, 2 * self._groups, max(1, self._groups // TRIAL_GROUPS))
+        self._promising = len(trial) > 0 and self._tree.is_promising(*self._planes(trial))
 
-    def open(self, triangle: Ids, behind: NDArray[np.bool_], worth: int) -> NDArray[np.bool_]:
-        """(M,) True where nothing is above the triangle that a sample lies on, on the side that is seen.
+    def is_open(self, triangle: Ids, back_facing: NDArray[np.bool_], min_samples: int) -> NDArray[np.bool_]:
+        """(M,) True where nothing is above the triangle of a sample, on the side that the eye sees.
 
-        Rows of triangles that fewer than `worth` of the samples lie on are not looked at.
+        Groups of triangles with fewer than `min_samples` of the samples are not tested.
         """
-        if not self._any:
+        if not self._promising:
             return np.zeros(len(triangle), bool)
-        number = triangle + behind * np.int64(self._blocks * GROUP)
-        block = number // GROUP
-        seen = np.bincount(block, minlength=2 * self._blocks) >= worth
-        new = np.flatnonzero(seen & ~self._asked)
+        plane = triangle + back_facing * np.int64(self._groups * GROUP)
+        group = plane // GROUP
+        is_wanted = np.bincount(group, minlength=2 * self._groups) >= min_samples
+        new = np.flatnonzero(is_wanted & ~self._tested)
         for first in range(0, len(new), GROUPS_AT_ONCE):
-            self._settle(new[first : first + GROUPS_AT_ONCE])
-        return self._clear.take(number) & seen.take(block)
+            self._test(new[first : first + GROUPS_AT_ONCE])
+        return self._open.take(plane) & is_wanted.take(group)
 
-    def _settle(self, blocks: NDArray[np.int64]) -> None:
-        self._clear[_numbers(blocks)] = self._horizon.clear_planes(*self._planes(blocks))
-        self._asked[blocks] = True
+    def _test(self, groups: NDArray[np.int64]) -> None:
+        self._open[_members(groups)] = self._tree.open_planes(*self._planes(groups))
+        self._tested[groups] = True
 
-    def _planes(self, blocks: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Origins and unit normals of the planes of these rows, (64 K, 3) each, lifted as rays are."""
-        side, triangle = np.divmod(_numbers(blocks), self._blocks * GROUP)
+    def _planes(self, groups: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origins and unit normals of the planes of these groups, (64 K, 3) each."""
+        side, triangle = np.divmod(_members(groups), self._groups * GROUP)
         triangle = np.minimum(triangle, len(self._world.triangles) - 1).astype(np.int32)
-        return facet_planes(self._world, triangle, side > 0)
+        return triangle_planes(self._world, triangle, side > 0)
 
 
-def facet_planes(
-    world: SceneGeometry, triangle: Ids, behind: NDArray[np.bool_]
+def triangle_planes(
+    world: SceneGeometry, triangle: Ids, back_facing: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origins and unit normals of the planes of N triangles, (N, 3) each, on the side that is seen, lifted as
-    rays are."""
+    """Origins and unit normals of the planes of N triangles on the side that is seen, (N, 3) float64 each.
+
+    A plane is offset from its triangle no farther than any ray origin on that triangle.
+    """
     zero = np.zeros(len(triangle), F)
     facet = facets(world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
-    n = facing(facet.ng, behind).astype(np.float64)
+    n = facing(facet.ng, back_facing).astype(np.float64)
     v0 = facet.position
     others = (take_rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
-    # no ray starts lower: |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the
-    # centre
+    # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre: no ray starts
+    # lower than this
     step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
     o = v0 + step[:, None] * n
     return np.ascontiguousarray(o), np.ascontiguousarray(n)
 
 
-def _numbers(blocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(64 K,) what the rows of these numbers hold."""
-    return (blocks[:, None] * GROUP + np.arange(GROUP)).ravel()
+def _members(groups: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(64 K,) numbers of the planes in each of K groups."""
+    return (groups[:, None] * GROUP + np.arange(GROUP)).ravel()
 
 
-def clear_of_each_other(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+def is_above_group(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(M,) False where one of the points is clearly above the plane of another.
 
-    The points lie on occluders, off them by a hundredth of what counts as clearly: in a hollow this tells at
-    once.
+    The points lie on occluders, offset by a hundredth of `CLEARANCE`: in a hollow this decides at once.
     """
     near, up = (o - o[0]).astype(F), n.astype(F)
-    return (up @ near.T).max(axis=1) <= np.einsum("ij,ij->i", up, near) + CLEARLY
+    return (up @ near.T).max(axis=1) <= np.einsum("ij,ij->i", up, near) + CLEARANCE
 
 
-def groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> Groups:
-    """Every `GROUP` planes in a row, through `o` with unit normals `n`, as one."""
+def plane_groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> PlaneGroups:
+    """The bounds of every `GROUP` planes in a row, through `o` with unit normals `n`, (M, 3) each."""
+    # Fill the last group up with copies of the last plane.
     count = -(-len(o) // GROUP)
-    more = count * GROUP - len(o)
-    o = np.concatenate([o, np.repeat(o[-1:], more, axis=0)]).reshape(count, GROUP, 3)
-    n = np.concatenate([n, np.repeat(n[-1:], more, axis=0)]).reshape(count, GROUP, 3)
+    missing = count * GROUP - len(o)
+    o = np.concatenate([o, np.repeat(o[-1:], missing, axis=0)]).reshape(count, GROUP, 3)
+    n = np.concatenate([n, np.repeat(n[-1:], missing, axis=0)]).reshape(count, GROUP, 3)
+
+    # The axis is the mean normal; where normals cancel, the first one.
     centre, axis = o.mean(axis=1), n.mean(axis=1)
     size = np.linalg.norm(axis, axis=1, keepdims=True)
     axis = np.where(size > 0.1, axis / np.maximum(size, 0.1), n[:, 0])
     spread = np.linalg.norm(n - axis[:, None], axis=2).max(axis=1)
-    room = -np.einsum("gpi,gpi->gp", n, o - centre[:, None]).min(axis=1)
-    return Groups(centre, axis / np.linalg.norm(axis, axis=1, keepdims=True), spread, room)
+    margin = -np.einsum("gpi,gpi->gp", n, o - centre[:, None]).min(axis=1)
+    return PlaneGroups(centre, axis / np.linalg.norm(axis, axis=1, keepdims=True), spread, margin)
 
 
 def slabs(points: NDArray[np.float64], size: int) -> Slabs:
@@ -286,26 +325,29 @@ def slabs(points: NDArray[np.float64], size: int) -> Slabs:
     count = -(-len(points) // size)
     padded = np.concatenate([points, np.repeat(points[-1:], count * size - len(points), axis=0)])
     group = padded.reshape(count, size, 3)
+
+    # The axis is the direction of least variance.
     centre = group.mean(axis=1)
     centred = group - centre[:, None]
     _, vectors = np.linalg.eigh(np.matmul(centred.transpose(0, 2, 1), centred))
     axis = np.ascontiguousarray(vectors[:, :, 0])
+
+    # Extents along the axis, and across it by Pythagoras.
     along = np.matmul(centred, axis[:, :, None])[:, :, 0]
-    across = np.matmul(np.square(centred), np.ones(3)) - np.square(along)  # squared, and no less than along's
-    width = np.sqrt(across.max(axis=1).clip(0))
-    # a rounding wider than they are: bounds must hold
-    room = 1e-12
-    return Slabs(centre, axis, along.min(axis=1) - room, along.max(axis=1) + room, width + room)
+    across2 = np.matmul(np.square(centred), np.ones(3)) - np.square(along)
+    radius = np.sqrt(across2.max(axis=1).clip(0))
+    rounding = BOUND_ROUNDING
+    return Slabs(centre, axis, along.min(axis=1) - rounding, along.max(axis=1) + rounding, radius + rounding)
 
 
 def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(K, 3) the points farthest out along directions spread over the sphere; most others lie behind them."""
-    k = np.arange(PROBES)
-    z = 1 - (2 * k + 1) / PROBES
+    """(K, 3) the points farthest out in directions spread over the sphere; most others are below these."""
+    k = np.arange(DIRECTIONS)
+    z = 1 - (2 * k + 1) / DIRECTIONS
     angle = np.pi * (3 - 5**0.5) * k
     r = np.sqrt(1 - z * z)
-    spread = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+    directions = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
     if not len(points):
         return points
-    near, spread = column_major(points, F), spread.astype(F)
-    return points[np.unique([int(np.argmax(near @ d)) for d in spread])].astype(F)
+    single, directions = column_major(points, F), directions.astype(F)
+    return points[np.unique([int(np.argmax(single @ d)) for d in directions])].astype(F)

@@ -1,0 +1,190 @@
+"""Directions over the hemisphere: cosine-weighted sample patterns, their frames, and the rays' origins."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats, Vectors, dot, repeat_rows, take_rows
+from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
+from illumcli.records import Record
+
+Sampler: TypeAlias = Literal["spiral", "owen", "random"]
+
+ORIGIN_STRIDE = 13
+"""From the origin of one ray to that of the next: neither neighbours on a spiral nor rays of one ring share
+theirs, for 16 origins."""
+GRAZING = 2.0**-20
+"""Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
+
+
+class Hemispheres(Record):
+    """The hemispheres that M points are sampled over, and where their rays start.
+
+    Ray i of a point starts at origin i ORIGIN_STRIDE, modulo the E origins that each point has.
+    """
+
+    n: Vectors  # (M, 3) float32 unit shading normals, the axes
+    origins: Vectors  # (M * E, 3) float32 off the surface [radii]; those of a point follow each other
+    ng: Vectors | None = None
+    """(M * E, 3) float32 unit normals of the triangles that the rays leave; None where they are `n`."""
+    known_open: NDArray[np.bool_] | None = None
+    """(M,) points that are known to be open, which cast no rays; None: no point is."""
+
+    @property
+    def origins_per_point(self) -> int:
+        """E."""
+        return len(self.origins) // max(len(self.n), 1)
+
+    def take(self, points: NDArray[np.int64]) -> Hemispheres:
+        """The hemispheres of these points, in this order."""
+        each = self.origins_per_point
+        origin = points if each == 1 else (points[:, None] * each + np.arange(each)).ravel()
+        return Hemispheres(
+            take_rows(self.n, points),
+            take_rows(self.origins, origin),
+            None if self.ng is None else take_rows(self.ng, origin),
+            None if self.known_open is None else self.known_open.take(points),
+        )
+
+    def between(self, first: int, end: int) -> Hemispheres:
+        """The hemispheres of points `first` to `end`, as views of these arrays."""
+        each = self.origins_per_point
+        points, origins = slice(first, end), slice(first * each, end * each)
+        return Hemispheres(
+            self.n[points],
+            self.origins[origins],
+            None if self.ng is None else self.ng[origins],
+            None if self.known_open is None else self.known_open[points],
+        )
+
+    def origin_of_rays(self, samples: int) -> NDArray[np.int64]:
+        """(M * samples,) the origin of every ray, one point after the other."""
+        each = self.origins_per_point
+        of_point = np.arange(samples) * ORIGIN_STRIDE % each
+        return (np.arange(len(self.n))[:, None] * each + of_point).ravel()
+
+
+def hemisphere_samples(draws: NDArray[np.float64], samples: int, sampler: Sampler) -> NDArray[np.float32]:
+    """(M, 3, samples) float32 cosine-weighted unit directions about the third axis.
+
+    Parameters
+    ----------
+    draws : (2, M) float64
+        In [0, 1): what each point's pattern is phased or scrambled by.
+    """
+    if sampler == "spiral":
+        table = spiral_table(samples)
+        return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
+
+    # Points of the unit square, by a scrambled Sobol sequence or by hashing.
+    seeds = (draws * 2.0**32).astype(np.uint32)
+    if sampler == "owen":
+        u, v = (owen(base[None, :], seed[:, None]) for base, seed in zip(sobol(samples), seeds, strict=True))
+    else:
+        ray = np.arange(samples, dtype=np.uint32)[None, :]
+        u, v = (unit_interval(hashed(k, hashed(k + 7, seeds[k])[:, None] + ray)) for k in (0, 1))
+
+    # Malley's method: uniform on the disc, projected up to the hemisphere.
+    r, angle = np.sqrt(u), 2 * np.pi * v
+    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=1).astype(F)
+
+
+def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: Sampler) -> NDArray[np.float32]:
+    """(M, 3, 3) float32 the axes of each point's pattern, as rows; spirals are turned at random."""
+    angle = 2 * np.pi * draws[0] if sampler == "spiral" else np.zeros(len(n))
+    return turned_frame(n, angle.astype(F))
+
+
+def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(M, 3, 3) rows tangent, bitangent, normal; the tangent turned about `n` by `angle` [rad].
+
+    References
+    ----------
+    Duff, T. et al. (2017). Building an orthonormal basis, revisited. JCGT 6(1).
+    """
+    # Tangent t and bitangent u of the unturned frame.
+    x, y, z = n[:, 0], n[:, 1], n[:, 2]
+    sign = np.copysign(F(1), z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    t = (1 + sign * x * x * a, sign * b, -sign * x)
+    u = (b, sign + y * y * a, -y)
+
+    # Turn both.
+    c, s = np.cos(angle), np.sin(angle)
+    frame = np.empty((len(n), 3, 3), F)
+    for k in range(3):
+        frame[:, 0, k] = c * t[k] + s * u[k]
+        frame[:, 1, k] = c * u[k] - s * t[k]
+        frame[:, 2, k] = n[:, k]
+    return frame
+
+
+def directions(
+    frames: NDArray[np.float32], draws: NDArray[np.float64], samples: int, sampler: Sampler
+) -> Vectors:
+    """(M * samples, 3) float32 directions of the rays, one point after the other.
+
+    Parameters
+    ----------
+    frames : (M, 3, 3) float32
+        From `sample_frames`.
+    """
+    out = np.empty((3, len(frames), samples), F)
+    # a long row per component: three times as fast as one of three numbers per ray
+    np.matmul(
+        frames.transpose(0, 2, 1), hemisphere_samples(draws, samples, sampler), out=out.transpose(1, 0, 2)
+    )
+    return out.reshape(3, -1).T
+
+
+def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: Sampler) -> None:
+    """Mirror those of the rays `d` that point below the plane of the triangle they leave, in place.
+
+    Parameters
+    ----------
+    d : (M * samples, 3) float32
+        The rays of each point, one point after the other.
+    over : Hemispheres
+        With the triangles' normals.
+    """
+    # Candidates are the last rays of each pattern, so many that no ray before them can point below.
+    assert over.ng is not None
+    each = over.origins_per_point
+    axes = over.n if each == 1 else repeat_rows(over.n, each)
+    cosine = dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1)
+    number = max_rays_below(cosine, samples, sampler)
+    point = np.repeat(np.arange(len(over.n)), number)
+    from_last = np.arange(len(point)) - np.repeat(np.cumsum(number) - number, number)
+    ray = point * samples + samples - 1 - from_last
+    origin = point if each == 1 else point * each + (samples - 1 - from_last) * ORIGIN_STRIDE % each
+
+    # Reflect the candidates that do point below.
+    normal = take_rows(over.ng, origin)
+    height = dot(take_rows(d, ray), normal)
+    below = np.flatnonzero(height < GRAZING)
+    height, ray = height[below], ray[below]
+    up = np.maximum(-height, F(GRAZING)) - height
+    for component, along in zip(d.T, take_rows(normal, below).T, strict=True):
+        component[ray] += up * along
+
+
+def max_rays_below(cosine: Floats, samples: int, sampler: Sampler) -> NDArray[np.int64]:
+    """(M,) upper bound on how many rays, the last of each pattern, point below a plane.
+
+    Ray i of a spiral leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose
+    normal is at an angle t to the axis unless sin^2 > cos^2 t. Other samplers are in no order.
+
+    Parameters
+    ----------
+    cosine : (M,) float32
+        Of the angle between the pattern's axis and the plane's normal.
+    """
+    if sampler != "spiral":
+        return np.full(len(cosine), samples)
+    least = 1 / (4 * len(spiral_table(samples)))  # half of what the last phase leaves of the rim
+    sine2 = 1 - np.square(np.clip(cosine, 0, 1).astype(np.float64)) + GRAZING
+    return np.clip(np.ceil(sine2 * samples - least), 0, samples).astype(np.int64)

@@ -23,7 +23,8 @@ import numpy as np
 
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, cross, dot, length, take_rows, unit
-from illumcli.baking.bake import Settings, run
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.settings import BakeSettings
 from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, facets
 from illumcli.render_graph.build import recipes
@@ -109,7 +110,7 @@ def agreement(path: Path, folder: Path) -> list[float]:
     mesh = folder / path.name
     shutil.copy(path, mesh)
     baked = mesh.with_suffix(".npz")
-    run(mesh, [baked], Settings(samples=RAYS))
+    bake_mesh(mesh, [baked], BakeSettings(samples=RAYS))
     scene = mesh.with_suffix(".yaml")
     about = "version: 1\nobscurance: {samples: %d}\nobjects: [{name: mesh, mesh: {file: %s%s}}]\n"
     scene.write_text(about % (RAYS, mesh.name, ""))

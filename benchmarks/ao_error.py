@@ -18,9 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
-from illumcli.baking.points import vertex_points
-from illumcli.baking.sampling import BakeSampler
+from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.occluders import occluders_of
+from illumcli.baking.sampling import BakeSampler, RayCounts
+from illumcli.baking.settings import BakeSettings
+from illumcli.baking.vertex_points import vertex_points
+from illumcli.progress import no_progress
 from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64, 256, 1024)
@@ -32,17 +35,18 @@ def caster(
     path: Path, sampler: str = "spiral", seed: int = 0, ground: str | None = None
 ) -> tuple[BakeSampler, np.ndarray]:
     """The bake of a mesh alone, and the points that cast rays."""
-    loaded = bare(path, ())
+    loaded = mesh_alone(path)
     scene = loaded.scene
     surfaces, _ = surfaces_of(scene, loaded)
-    world = surfaces.world
-    settings = Settings(sampler=sampler, ground=ground)
+    geometry = surfaces.geometry
+    settings = BakeSettings(sampler=sampler, ground=ground)
     vertices = vertex_points(surfaces)
-    method = Method(256, settings.obscurance().falloff, world.frame.radius, sampler)
+    method = Method(256, settings.obscurance().falloff, geometry.frame.radius, sampler)
     threads = len(os.sched_getaffinity(0))
-    quiet = lambda what, done, of: None  # noqa: E731
-    made = BakeSampler(vertices.points, occluders_of(scene, world, settings), method, seed, threads, quiet)
-    return made, np.flatnonzero(~made.open())
+    made = BakeSampler(
+        vertices.points, occluders_of(scene, geometry, settings), method, seed, threads, no_progress
+    )
+    return made, np.flatnonzero(~made.open_points())
 
 
 def main() -> None:
@@ -55,7 +59,8 @@ def main() -> None:
     for path in chosen.meshes:
         own, lanes = caster(path, ground=chosen.ground)
         few = np.sort(np.random.default_rng(0).permutation(lanes)[:VERTICES])
-        truth = own.cast("reference", few, np.full(len(few), REFERENCE), 1 << 30).w.astype(float)
+        counts = RayCounts(few, np.full(len(few), REFERENCE))
+        truth = own.estimate("reference", counts, 1 << 30).values.w.astype(float)
         print(f"{path.name}: {len(few)} of {len(lanes)} vertices that cast rays, mean w {truth.mean():.3f}")
         print("  rays     spiral     random  ratio   owen ratio   said  coverage of 95 %")
         errors: dict[str, list[float]] = {"spiral": [], "random": [], "owen": []}
@@ -63,11 +68,11 @@ def main() -> None:
             rays = np.full(len(few), count)
             for sampler in errors:
                 bake, _ = caster(path, sampler, count, chosen.ground)
-                found = bake.cast("values", few, rays, 0)
+                found = bake.estimate("values", RayCounts(few, rays), 0).values
                 off = found.w - truth
                 errors[sampler].append(float(np.sqrt(np.mean(off**2))))
                 if sampler == "spiral":
-                    law = bake.errors(lanes, np.full(len(lanes), count), 7)
+                    law = bake.errors(RayCounts(lanes, np.full(len(lanes), count)), 7).law
                     said = law.at(found.neighbor_variation, count)
                     covered = np.mean(np.abs(off) <= 1.96 * said)
             s, r, o = (errors[name][-1] for name in ("spiral", "random", "owen"))
@@ -77,13 +82,14 @@ def main() -> None:
         print(f"  slope of the spiral {slope:.3f}")
         curves[path.stem] = errors
         bake, _ = caster(path, seed=5, ground=chosen.ground)
-        samples = bake.samples_for(lanes, 1.0, 0.005)
+        chosen_samples = bake.samples_for(lanes, 1.0, 0.005)
+        samples = chosen_samples.samples
         place = np.searchsorted(lanes, few)
-        found = bake.cast("values", few, samples[place], 0)
+        found = bake.estimate("values", RayCounts(few, samples[place]), 0).values
         off = found.w - truth
         rmse, standard = np.sqrt(np.mean(off**2)), off.std() / len(off) ** 0.5
         uniform = np.exp(np.interp(np.log(1 / rmse), np.log(1 / np.array(errors["spiral"])), np.log(COUNTS)))
-        thrown = sum(bake.rays[purpose] for purpose in ("pilot", "errors"))
+        thrown = chosen_samples.pilot_rays + chosen_samples.error_rays
         print(
             f"  target 0.005: reached {rmse:.5f}, mean error {off.mean():+.1e} +- {standard:.1e}; "
             f"{samples.mean():.0f} rays a vertex kept, {thrown / len(lanes):.0f} to decide; "

@@ -19,7 +19,7 @@ import numpy as np
 
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, dot, length, take_rows, unit
-from illumcli.baking.bake import bare
+from illumcli.baking.inputs import mesh_alone
 from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
 from illumcli.render_graph.build import recipes
@@ -61,7 +61,7 @@ def beside(world: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
 
 def jumps(path: Path) -> tuple[int, float, float, float]:
     """Edges, and the mean jump of w about geometric and about shading normals, and of nothing but noise."""
-    loaded = bare(path, ())
+    loaded = mesh_alone(path)
     made: dict[str, Any] = {}
     for step in topological_order(
         recipes(loaded.scene, loaded), ["world", "tracer", "corner_normals", "planar_polygons"]

@@ -31,9 +31,12 @@ import numpy as np
 from _bench import SMALL, Took, header, took
 from ao_error import caster
 from illumcli.arrays import F
-from illumcli.baking.bake import Settings, bare, occluders_of, surfaces_of
-from illumcli.baking.points import vertex_points
-from illumcli.baking.sampling import BakeSampler
+from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.occluders import occluders_of
+from illumcli.baking.sampling import BakeSampler, RayCounts
+from illumcli.baking.settings import BakeSettings
+from illumcli.baking.vertex_points import vertex_points
+from illumcli.progress import no_progress
 from illumcli.rays.sampling import GOLDEN
 from illumcli.visibility.hemisphere import turned_frame
 from illumcli.visibility.obscurance import Method
@@ -63,7 +66,8 @@ def main() -> None:
     path = Path(next(word for word in sys.argv[1:] if not word.startswith("-")))
     own, lanes = caster(path)
     few = np.sort(np.random.default_rng(0).permutation(lanes)[:VERTICES])
-    truth = own.cast("reference", few, np.full(len(few), REFERENCE), 1 << 30).w.astype(float)
+    counts = RayCounts(few, np.full(len(few), REFERENCE))
+    truth = own.estimate("reference", counts, 1 << 30).values.w.astype(float)
     header("Which baker is nearest to the truth after so many seconds?", mesh=path.name, rounds=ROUNDS)
     bakers = [illum(path, truth), *peers(path, own, few, truth)]
     for number in range(ROUNDS):
@@ -111,22 +115,22 @@ def at_error(each: Baker, aim: float, what: str) -> float:
 
 def illum(path: Path, truth: np.ndarray) -> Baker:
     """This program: all that `illum ao-bake` does between reading and writing."""
-    loaded = bare(path, ())
+    loaded = mesh_alone(path)
     surfaces, _ = surfaces_of(loaded.scene, loaded)
-    world = surfaces.world
-    settings = Settings()
+    geometry = surfaces.geometry
+    settings = BakeSettings()
 
     def bake(rays: int) -> np.ndarray:
         points = vertex_points(surfaces).points
-        method = Method(rays, settings.obscurance().falloff, world.frame.radius)
-        quiet = lambda what, done, of: None  # noqa: E731
-        made = BakeSampler(points, occluders_of(loaded.scene, world, settings), method, 0, THREADS, quiet)
-        lanes = np.flatnonzero(~made.open())
-        samples = np.full(len(lanes), rays)
-        w = np.ones(len(points.number))
-        found = made.cast("values", lanes, samples, 0)
+        method = Method(rays, settings.obscurance().falloff, geometry.frame.radius)
+        occluders = occluders_of(loaded.scene, geometry, settings)
+        made = BakeSampler(points, occluders, method, 0, THREADS, no_progress)
+        lanes = np.flatnonzero(~made.open_points())
+        counts = RayCounts(lanes, np.full(len(lanes), rays))
+        w = np.ones(len(points.key))
+        found = made.estimate("values", counts, 0).values
         w[lanes] = found.w
-        made.errors(lanes, samples, 1 << 20).at(found.neighbor_variation, rays)
+        made.errors(counts, 1 << 20).law.at(found.neighbor_variation, rays)
         return w
 
     return Baker("illum", bake, truth)
@@ -134,14 +138,14 @@ def illum(path: Path, truth: np.ndarray) -> Baker:
 
 def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
     """Those that are installed."""
-    loaded = bare(path, ())
-    world = surfaces_of(loaded.scene, loaded)[0].world
+    loaded = mesh_alone(path)
+    world = surfaces_of(loaded.scene, loaded)[0].geometry
     vertices, faces = np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles)
     origins, n = np.ascontiguousarray(starts(own)), np.ascontiguousarray(own.points.n)
     found = []
     for name, make in {
         "Open3D": lambda: Baker("Open3D", open3d_script(vertices, faces, origins, n), truth),
-        "PyMeshLab": lambda: pymeshlab_filter(vertices, faces, own.points.number, few),
+        "PyMeshLab": lambda: pymeshlab_filter(vertices, faces, own.points.key, few),
         "libigl": lambda: Baker("libigl", libigl(vertices, faces, origins, n), even(own, few)),
     }.items():
         try:
@@ -154,7 +158,7 @@ def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> l
 
 def starts(own: BakeSampler) -> np.ndarray:
     """(M, 3) one of the places around each point from which rays start."""
-    every = np.arange(len(own.points.number))
+    every = np.arange(len(own.points.key))
     over = own.points.hemispheres(every, np.zeros(len(every)))
     return over.origins[:: over.starts]
 

@@ -44,7 +44,7 @@ def main() -> None:
         calls = []
         for first in range(0, len(order), at_once):
             part = order[first : first + at_once]
-            draws = np.stack([unit_interval(hashed(key, bake.points.number[part])) for key in keys])
+            draws = np.stack([unit_interval(hashed(key, bake.points.key[part])) for key in keys])
             over = bake.points.hemispheres(part, draws[2])
             d = directions(
                 sample_frames(over.n, draws, bake.method.sampler), draws, SAMPLES, bake.method.sampler

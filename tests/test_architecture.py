@@ -28,7 +28,7 @@ FOLDERS = (
 NOT_YET = {
     ("schema/faults.py", "scene"),
     ("accuracy/convergence.py", "commands"),
-    ("baking/bake.py", "commands"),
+    ("baking/report.py", "commands"),
 }
 """Imports that still go up."""
 LEVEL = {folder: level for level, line in enumerate(FOLDERS) for folder in line.split()}

@@ -13,8 +13,10 @@ from contextlib import suppress
 
 import pytest
 
-from illumcli.baking.bake import Settings, prepared, run
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.inputs import prepare_bake
 from illumcli.baking.sampling import BakeSampler
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.files.journal import place
 
 RAYS = 1 << 10
@@ -24,7 +26,7 @@ RAYS = 1 << 10
 @pytest.fixture
 def mesh(tmp_path, monkeypatch):
     """A bumpy sheet, whose bake takes some fifty pieces."""
-    monkeypatch.setattr("illumcli.baking.sampling.RAYS", RAYS)
+    monkeypatch.setattr("illumcli.baking.sampling.UNIT_RAYS", RAYS)
     return sheet(tmp_path / "mesh.obj", 16)
 
 
@@ -40,7 +42,7 @@ def sheet(path, side):
 
 
 def bake(mesh, out, seed=0, **more):
-    return run(mesh, [out], Settings(samples=64, seed=seed), threads=2, **more)[1]
+    return bake_mesh(mesh, [out], BakeSettings(samples=64, seed=seed), BakeOptions(threads=2, **more))[1]
 
 
 def interrupted(monkeypatch, after, at=lambda piece: None):
@@ -180,7 +182,7 @@ def test_no_planted_file_is_written_through_or_waited_for(mesh, tmp_path, kind):
         pytest.skip("only root can plant a file of another user")
     out, victim = tmp_path / "out.npz", tmp_path / "victim"
     victim.write_text("precious")
-    where = place(out, prepared(mesh, [out], Settings(samples=64)).content)
+    where = place(out, prepare_bake(mesh, [out], BakeSettings(samples=64)).content)
     match kind:
         case "symbolic link":
             where.symlink_to(victim)

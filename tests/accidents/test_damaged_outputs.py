@@ -7,7 +7,8 @@ import random
 import pytest
 
 from illumcli.accuracy import convergence, convergence_report
-from illumcli.baking import bake as ao_bake
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render, render_all, sweep
 from illumcli.errors import OutputError
 
@@ -25,8 +26,8 @@ def picture(folder, name):
 
 def bake(folder, name):
     def make(force=False):
-        settings = ao_bake.Settings(samples=8)
-        return ao_bake.run(folder / "thing.obj", [folder / name], settings, force=force)[1].kept
+        settings = BakeSettings(samples=8)
+        return bake_mesh(folder / "thing.obj", [folder / name], settings, BakeOptions(force=force))[1].kept
 
     return make
 

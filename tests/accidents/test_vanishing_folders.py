@@ -6,7 +6,8 @@ import shutil
 
 import pytest
 
-from illumcli.baking import bake as ao_bake
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render
 from illumcli.commands.render_all import Settings
 from illumcli.commands.sweep import Files, variants_of
@@ -33,8 +34,8 @@ def test_of_a_bake_it_is_made_again(folder, name):
     def gone(what, done, of):
         shutil.rmtree(folder / "new", ignore_errors=True)
 
-    settings = ao_bake.Settings(samples=8)
-    ao_bake.run(folder / "thing.obj", [folder / "new" / name], settings, threads=1, progress=gone)
+    settings, options = BakeSettings(samples=8), BakeOptions(threads=1)
+    bake_mesh(folder / "thing.obj", [folder / "new" / name], settings, options, gone)
     assert [path.name for path in (folder / "new").iterdir()] == [name]
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.baking import bake as ao_bake
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.geometry.scene_geometry import transform_matrix
 from illumcli.mesh_files import read_mesh
 from illumcli.scene.load import load
@@ -50,7 +51,7 @@ def pixels_at_vertices_are_bakes(case: Case, random: Random, studio: Studio) -> 
         "meshes": {},
     }
     path = case.write(studio.folder())
-    asked = ao_bake.Settings(
+    asked = BakeSettings(
         samples=BAKED_RAYS, falloff=settings["falloff"], sampler="random", faces=settings["faces"]
     )
     w, error = baked(case, studio, asked)
@@ -116,7 +117,7 @@ def copies_of_a_vertex_bake_alike(case: Case, random: Random, studio: Studio) ->
         "objects": [{"mesh": "globe.ply", "name": "globe", "transform": {"translate": [0, 1.2, 0]}}, other]
     }
     case.scene |= {"materials": {}, "meshes": {}}
-    w = baked(case, studio, ao_bake.Settings(samples=512, sampler="random"))[0]
+    w = baked(case, studio, BakeSettings(samples=512, sampler="random"))[0]
     w = w[: len(surface.vertices)].astype(np.float64)
     for place in np.unique(surface.vertices, axis=0):
         own = w[(surface.vertices == place).all(axis=1)]
@@ -137,10 +138,10 @@ def two_objects(case: Case, random: Random, file: str) -> Case:
     return case
 
 
-def baked(case: Case, studio: Studio, settings: ao_bake.Settings, threads: int = 1) -> NDArray[np.float32]:
+def baked(case: Case, studio: Studio, settings: BakeSettings, threads: int = 1) -> NDArray[np.float32]:
     """(2, V) w and its stated error at all vertices of a case."""
     path = case.write(studio.folder())
-    ao_bake.run(path, [path.with_suffix(".npz")], settings, threads=threads)
+    bake_mesh(path, [path.with_suffix(".npz")], settings, BakeOptions(threads=threads))
     made = read_npz(path.with_suffix(".npz"))
     return np.stack([made.obscurance, made.standard_error])
 
@@ -157,8 +158,8 @@ def a_bake_knows_neither_units_nor_threads(case: Case, random: Random, studio: S
         thing["transform"]["matrix"] = (grow @ np.array(thing["transform"].get("matrix", np.eye(4)))).tolist()
     falloff = random.choice([{"falloff": "step"}, {"falloff": "linear", "max_distance": 1.5}])
     grown = {key: value * scale if key == "max_distance" else value for key, value in falloff.items()}
-    a = baked(case, studio, ao_bake.Settings(samples=32, falloff=falloff))
-    b = baked(larger, studio, ao_bake.Settings(samples=32, falloff=grown), threads=random.randint(1, 3))
+    a = baked(case, studio, BakeSettings(samples=32, falloff=falloff))
+    b = baked(larger, studio, BakeSettings(samples=32, falloff=grown), threads=random.randint(1, 3))
     differ = (a != b).any(axis=0)
     assert not differ.any(), (
         f"{int(differ.sum())} of {differ.size} vertices differ: {a[:, differ]} {b[:, differ]}"
@@ -175,7 +176,7 @@ def every_format_bakes_the_same(case: Case, random: Random, studio: Studio) -> N
         own = base.copy()
         own.meshes[f"same.{kind}"] = surface
         own.scene["objects"][0]["mesh"] = f"same.{kind}"
-        made.append(baked(own, studio, ao_bake.Settings(samples=32)))
+        made.append(baked(own, studio, BakeSettings(samples=32)))
     for kind, values in zip(kinds, made, strict=True):
         assert values.shape == made[0].shape, f"{kind}: {values.shape} against {made[0].shape}"
         differ = (values != made[0]).any(axis=0)

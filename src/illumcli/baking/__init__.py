@@ -1,1 +1,1 @@
-"""Obscurance at the vertices of meshes: where it is asked for, sampled, fitted and written."""
+"""Ambient obscurance at the vertices of meshes: sampled, fitted and written."""

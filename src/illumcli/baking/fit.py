@@ -1,8 +1,9 @@
-"""Vertex values that fit obscurance all over the surface: right where they are interpolated.
+"""The method `fit`: vertex values that fit obscurance all over the surface, so that it is right where it is
+interpolated.
 
-The value at a vertex alone tells nothing of the middle of its triangles. Here points are spread over the
-area, each casts a few rays, and vertex values are chosen so that what renderers interpolate from them comes
-nearest to what the points saw, in the mean square over the area.
+The value at a vertex says nothing about the middle of its triangles. Here points are spread over the area,
+each casts a few rays, and vertex values are chosen so that what renderers interpolate from them has the least
+mean square difference from the points over the area.
 
 References
 ----------
@@ -11,87 +12,84 @@ Kavan, L., Bargteil, A. W. and Sloan, P.-P. (2011). Least squares vertex baking.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F
-from illumcli.baking.points import AreaPoints, Surfaces, Vertices, area_points, vertex_points
-from illumcli.baking.sampling import BakeSampler, Occluders
+from illumcli.baking.area_points import AreaPoints, area_points
+from illumcli.baking.context import BakeContext, PointValues, SampleStatistics
+from illumcli.baking.sampling import BakeSampler, RayCounts
+from illumcli.baking.vertex_points import Vertices, vertex_points
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.records import Record
-from illumcli.visibility.obscurance import Method
 
 RAYS_PER_POINT = 16
 PARTS = 8
-"""The points are dealt to so many parts, and what the fit leaves over in each says how far it errs."""
+"""The points are dealt to so many parts; the residuals in each of them estimate the error."""
 SMOOTHING = 0.02
-"""Weight of the squared difference along edges, as a share of the area around: it only decides where points
+"""Weight of the squared difference along edges, as a share of the area around: it matters only where points
 are few."""
-STEPS, ENOUGH = 500, 1e-6
+MAX_STEPS, TOLERANCE = 500, 1e-6
 
 
-class Fit(Record):
-    """Values of the points at vertices by least squares, and what it took."""
+def fitted_to_surface(context: BakeContext) -> PointValues:
+    """Vertex values by least squares, with `samples` rays per vertex spread over the area.
 
-    w: NDArray[np.float32]  # (M,)
-    error: NDArray[np.float32]  # (M,)
-    points: int
-    open: int
-    vertices: Vertices
-
-
-def fitted(
-    surfaces: Surfaces,
-    occluders: Sequence[Occluders],
-    method: Method,
-    seed: int,
-    threads: int,
-    progress: Callable[[str, int, int], None],
-    rays: dict[str, int],
-) -> Fit:
-    """As many rays as `method.samples` per vertex, spread over the area.
-
-    The error of a value is how far what is left over in eight parts of the points would move it: it holds
-    the error of the rays and that of where the points lie.
+    The standard error of a value is how far the residuals in eight parts of the points would move it: it
+    holds the error of the rays and that of where the points lie.
     """
-    vertices = vertex_points(surfaces)
-    per_point = min(RAYS_PER_POINT, method.samples)
-    count = len(vertices.points.number) * method.samples // per_point
-    area = area_points(surfaces, max(count, PARTS), seed)
-    own = Method(per_point, method.falloff, method.radius, method.sampler, method.faces)
-    caster = BakeSampler(area, occluders, own, seed, threads, progress)
-    is_open = caster.open()
-    lanes = np.flatnonzero(~is_open)
-    found = caster.cast("values", lanes, np.full(len(lanes), per_point), 0)
+    # estimates at points all over the surface
+    settings = context.settings
+    vertices = vertex_points(context.surfaces)
+    per_point = min(RAYS_PER_POINT, settings.samples)
+    count = len(vertices.points.key) * settings.samples // per_point
+    area = area_points(context.surfaces, max(count, PARTS), settings.seed)
+    method = replace(context.method, samples=per_point, facets=None)
+    sampler = BakeSampler(area, context.occluders, method, settings.seed, context.threads, context.progress)
+    is_open = sampler.open_points()
+    closed = np.flatnonzero(~is_open)
+    estimates = sampler.estimate("values", RayCounts(closed, np.full(len(closed), per_point)), 0)
     w = np.ones(len(is_open))
-    w[lanes] = found.w
-    rays.update(caster.rays)
-    system = System.of(surfaces.world, area, vertices)
-    mean = system.solve(system.side(area, w)[:, None])[:, 0]
-    rest = w - system.at(area, mean)
+    w[closed] = estimates.values.w
+
+    # vertex values nearest to them
+    equations = NormalEquations.of(context.surfaces.geometry, area, vertices)
+    mean = equations.solve(equations.right_side(area, w)[:, None])[:, 0]
+
+    # and their error from the residuals
+    residual = w - equations.interpolated(area, mean)
     part = np.arange(len(w)) % PARTS
-    sides = np.stack([system.side(area, np.where(part == k, rest, 0.0)) for k in range(PARTS)], axis=1)
-    spread = np.sqrt(np.square(system.solve(sides)).sum(axis=1) * PARTS / (PARTS - 1))
+    sides = [equations.right_side(area, np.where(part == k, residual, 0.0)) for k in range(PARTS)]
+    moved = equations.solve(np.stack(sides, axis=1))
+    spread = np.sqrt(np.square(moved).sum(axis=1) * PARTS / (PARTS - 1))
     value, error = np.clip(mean, 0, 1).astype(F), spread.astype(F)
     if is_open.all():
         value, error = np.ones_like(value), np.zeros_like(error)
-    return Fit(value, error, len(lanes), int(is_open.sum()), vertices)
+    context.clock.lap("cast")
+    statistics = SampleStatistics(
+        int(is_open.sum()),
+        len(closed),
+        float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))) if len(error) else 0.0,
+        {"values": estimates.rays} if estimates.rays else {},
+        samples={settings.samples: len(closed)},
+    )
+    return PointValues(vertices, value, error, None, statistics)
 
 
-class System(Record):
-    """The normal equations of the fit: symmetric, a 3 by 3 block per triangle, never stored as a matrix."""
+class NormalEquations(Record):
+    """The normal equations of the fit: symmetric, a 3 by 3 block per triangle, never assembled."""
 
     corner: NDArray[np.int64]  # (T, 3) unknown at each corner
     block: NDArray[np.float64]  # (T, 3, 3)
-    count: int
+    count: int  # of unknowns
 
     @classmethod
-    def of(cls, world: SceneGeometry, area: AreaPoints, vertices: Vertices) -> System:
+    def of(cls, geometry: SceneGeometry, area: AreaPoints, vertices: Vertices) -> NormalEquations:
         """The blocks: area times products of barycentric weights, and a little smoothing along edges."""
-        corner = np.maximum(vertices.row[world.corners], 0)
-        weights = barycentric(area)
+        corner = np.maximum(vertices.point_of_corner[geometry.corners], 0)
+        weights = area.barycentric()
         block = np.empty((len(corner), 3, 3))
         for i in range(3):
             for j in range(3):
@@ -100,55 +98,54 @@ class System(Record):
         total = np.bincount(area.triangle, area.area, len(corner))
         smooth = np.full((3, 3), -1.0) + 3 * np.eye(3)
         block += SMOOTHING / 3 * total[:, None, None] * smooth
-        return cls(corner, block, len(vertices.points.number))
+        return cls(corner, block, len(vertices.points.key))
 
-    def side(self, area: AreaPoints, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def right_side(self, area: AreaPoints, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(M,) right side for values at the points."""
         out = np.zeros(self.count)
-        for k, weight in enumerate(barycentric(area)):
+        for k, weight in enumerate(area.barycentric()):
             out += np.bincount(self.corner[area.triangle, k], area.area * weight * values, self.count)
         return out
 
-    def at(self, area: AreaPoints, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(M,) what vertex values give at the points."""
+    def interpolated(self, area: AreaPoints, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertex values (M,) interpolated at the points."""
         corner = self.corner[area.triangle]
-        a, b, c = (weight * x[corner[:, k]] for k, weight in enumerate(barycentric(area)))
+        a, b, c = (weight * x[corner[:, k]] for k, weight in enumerate(area.barycentric()))
         return a + b + c
 
     def times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(M, k) the matrix times k vectors."""
-        made = np.einsum("tij,tjk->tik", self.block, x[self.corner])
+        products = np.einsum("tij,tjk->tik", self.block, x[self.corner])
         out = np.empty_like(x)
         index = self.corner.ravel()
         for k in range(x.shape[1]):
-            out[:, k] = np.bincount(index, made[:, :, k].ravel(), self.count)
+            out[:, k] = np.bincount(index, products[:, :, k].ravel(), self.count)
         return out
 
     def solve(self, sides: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(M, k) by conjugate gradients, each column its own, preconditioned by the diagonal."""
-        diagonal = np.bincount(self.corner.ravel(), np.einsum("tii->ti", self.block).ravel(), self.count)[
-            :, None
-        ]
-        scale = np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
-        x = scale * sides
-        rest = sides - self.times(x)
-        way = scale * rest
-        square = (rest * way).sum(axis=0)
-        enough = ENOUGH**2 * (sides * scale * sides).sum(axis=0)
-        for _ in range(STEPS):
+        """(M, k) by conjugate gradients, each column for itself, preconditioned by the diagonal."""
+        # start from the solution of the diagonal
+        diagonal = np.bincount(self.corner.ravel(), np.einsum("tii->ti", self.block).ravel(), self.count)
+        diagonal = diagonal[:, None]
+        inverse = np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
+        x = inverse * sides
+        residual = sides - self.times(x)
+        direction = inverse * residual
+        square = (residual * direction).sum(axis=0)
+        enough = TOLERANCE**2 * (sides * inverse * sides).sum(axis=0)
+        for _ in range(MAX_STEPS):
             if (square <= enough).all():
                 break
-            image = self.times(way)
-            bend = (way * image).sum(axis=0)
-            step = np.divide(square, bend, out=np.zeros_like(square), where=bend > 0)
-            x += step * way
-            rest -= step * image
-            scaled = scale * rest
-            before, square = square, (rest * scaled).sum(axis=0)
-            way = scaled + np.divide(square, before, out=np.zeros_like(square), where=before > 0) * way
+            # to the minimum along the direction
+            image = self.times(direction)
+            curvature = (direction * image).sum(axis=0)
+            step = np.divide(square, curvature, out=np.zeros_like(square), where=curvature > 0)
+            x += step * direction
+            residual -= step * image
+            # the next direction, conjugate to the last
+            scaled = inverse * residual
+            before, square = square, (residual * scaled).sum(axis=0)
+            direction = (
+                scaled + np.divide(square, before, out=np.zeros_like(square), where=before > 0) * direction
+            )
         return x
-
-
-def barycentric(area: AreaPoints) -> tuple[NDArray[np.float64], ...]:
-    """Three (M,) weights of the points on their triangles."""
-    return 1 - area.u - area.v, area.u, area.v

@@ -19,7 +19,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.baking.bake import Report
+    from illumcli.baking.report import BakeReport
 
 _EPILOG = """\b
 Examples:
@@ -151,9 +151,9 @@ def ao_bake(
     vertex with several normals has their mean, and one value for each where the file can hold it. An
     interrupted bake goes on where it stopped when the same command is given again.
     """
-    from illumcli.baking.bake import Settings
+    from illumcli.baking.settings import BakeOptions, BakeSettings
     from illumcli.cli._progress import reporter
-    from illumcli.commands import bake as job
+    from illumcli.commands.bake import BakeRequest, bake_inputs
     from illumcli.render_graph.repairs import repair_lines
 
     if samples is not None and target_error is not None:
@@ -167,7 +167,7 @@ def ao_bake(
     if target_error is not None and more["method"] == "fit":
         raise click.UsageError("--target-error works with --method vertex; give --samples")
     said = {"max_distance": max_distance, "tau": tau, "exponent": exponent}
-    settings = Settings(
+    settings = BakeSettings(
         samples=samples or 256,
         target_error=target_error,
         falloff={"falloff": falloff, **{name: value for name, value in said.items() if value is not None}},
@@ -176,7 +176,7 @@ def ao_bake(
         **more,
     )
 
-    def written(source: Path, paths: list[Path], done: Report) -> None:
+    def written(source: Path, paths: list[Path], done: BakeReport) -> None:
         for path in paths:
             click.echo(path)
         if not quiet:
@@ -194,7 +194,8 @@ def ao_bake(
             for name, seconds in done.seconds.items():
                 click.echo(f"{seconds:8.3f} s  {name}", err=True)
 
-    asked = job.Asked(settings, patterns, overrides, threads, force, strict, keep_going)
-    is_kept = job.run(inputs, asked, report, reporter(quiet), written, tell)
+    options = BakeOptions(overrides, threads, force, strict)
+    request = BakeRequest(settings, patterns, options, keep_going)
+    is_kept = bake_inputs(inputs, request, report, reporter(quiet), written, tell)
     if is_kept and not quiet:
         click.echo(f"{report}: kept, its content is the same", err=True)

@@ -1,75 +1,76 @@
-"""Bake several inputs: what is wrong with any of them is told before the first ray, the others are done."""
+"""Bake several inputs: faults of any of them are known before the first ray, and the others are baked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from illumcli.baking.bake import Report, Settings, Work, baked, prepared
+from illumcli.baking.bake import bake_prepared
+from illumcli.baking.inputs import BakeWork, prepare_bake
+from illumcli.baking.report import BakeReport
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
-from illumcli.commands.render import Progress
 from illumcli.files.names import check_unique, expand
+from illumcli.progress import Progress
 from illumcli.records import Value
 
 
-class Asked(Value):
-    """What all inputs are baked with, and how."""
+class BakeRequest(Value):
+    """What all inputs are baked with."""
 
-    settings: Settings
+    settings: BakeSettings
     patterns: tuple[str, ...]
     """Of the outputs' names; `{scene}` is the input's name without its suffix."""
-    overrides: tuple[str, ...] = ()
-    threads: int | None = None
-    force: bool = False
-    strict: bool = False
+    options: BakeOptions = BakeOptions()
     keep_going: bool = True
 
     def outputs(self, path: Path) -> list[Path]:
         """The files of one input."""
         return [Path(expand(pattern, {"scene": path.stem})) for pattern in self.patterns]
 
-    def prepared(self, path: Path) -> Work:
-        """An input whose meshes are read."""
-        return prepared(path, self.outputs(path), self.settings, self.overrides, self.force, self.strict)
+    def prepare(self, path: Path) -> BakeWork:
+        """An input whose meshes were read."""
+        return prepare_bake(path, self.outputs(path), self.settings, self.options)
 
 
-def run(
+def bake_inputs(
     inputs: Sequence[Path],
-    asked: Asked,
+    request: BakeRequest,
     report: Path | None,
     progress: Progress,
-    written: Callable[[Path, list[Path], Report], None],
+    written: Callable[[Path, list[Path], BakeReport], None],
     tell: Tell,
 ) -> bool:
-    """Bake every input; is the report kept, since it holds the same as it would?
+    """Bake every input; is the report file kept, since it would hold the same?
 
-    `written` gets each input that is done, its files and report, `tell` the fault of each that is not.
+    `written` gets each input that is done, its files and report, `tell` the fault of each that failed.
 
     Raises
     ------
     IllumError
-        At last, where any input failed; at once, where files have one name or the report cannot be written.
+        At the end, where any input failed; at once, where files have equal names or the report cannot be
+        written.
     """
-    batch = Batch("inputs", len(inputs), asked.keep_going, tell)
-    whole = BatchReport(report, [{"input": str(path)} for path in inputs])
-    check_unique([str(each) for path in dict.fromkeys(inputs) for each in asked.outputs(path)])
+    batch = Batch("inputs", len(inputs), request.keep_going, tell)
+    entries = BatchReport(report, [{"input": str(path)} for path in inputs])
+    check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
 
-    # all that can be known before the first ray; the meshes of one input alone are held meanwhile
-    lone: Work | None = None
-    for number in batch.due():
-        with batch.piece(number):
-            work = asked.prepared(inputs[number])
-            whole.plan(number, digest((work.content, [str(each) for each in work.outputs])))
+    # faults that can be known before the first ray; only a lone input's meshes are held meanwhile
+    lone: BakeWork | None = None
+    for index in batch.due():
+        with batch.piece(index):
+            work = request.prepare(inputs[index])
+            entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
             lone = work if len(inputs) == 1 else None
             del work
-    whole.look(asked.force)
+    entries.look(request.options.force)
 
-    for number in batch.due():
-        with batch.piece(number):
-            paths, done = baked(
-                lone or asked.prepared(inputs[number]), asked.settings, asked.threads, progress
-            )
-            whole.add(number, done.as_data())
-            written(inputs[number], paths, done)
-    return whole.finish(batch)
+    # the bakes
+    for index in batch.due():
+        with batch.piece(index):
+            work = lone or request.prepare(inputs[index])
+            paths, done = bake_prepared(work, request.options.threads, progress)
+            entries.add(index, done.as_data())
+            written(inputs[index], paths, done)
+    return entries.finish(batch)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, column_major
+from illumcli.arrays import F, Vectors, column_major, take_rows
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import reversed_polygons
 from illumcli.geometry.triangulate import triangulate
@@ -54,6 +54,14 @@ class SceneGeometry(Record):
     def __post_init__(self) -> None:
         for array in (self.vertices, self.triangles, self.corners, self.polygons, self.objects):
             array.setflags(write=False)
+
+
+def triangle_corners(
+    vertices: NDArray[np.float32], triangles: NDArray[np.int32]
+) -> tuple[Vectors, Vectors, Vectors]:
+    """(T, 3) float64 each: the three corners of every triangle, components contiguous."""
+    a, b, c = (column_major(take_rows(vertices, triangles[:, k]), np.float64) for k in range(3))
+    return a, b, c
 
 
 def transform_matrix(transform: Any, mesh: Mesh) -> NDArray[np.float64]:

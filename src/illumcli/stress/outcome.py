@@ -80,12 +80,13 @@ class Sandbox:
         IllumError
             What `illum ao-bake` would end with.
         """
-        from illumcli.baking.bake import Settings, run
+        from illumcli.baking.bake import bake_mesh
+        from illumcli.baking.settings import BakeOptions, BakeSettings
         from illumcli.visibility.baked import read_npz
 
         path, baked = self.folder / "bake.yaml", self.folder / "bake.npz"
         path.write_text(json.dumps({"version": 1, **scene}))
-        run(path, [baked], Settings(samples=rays), threads=1, force=True)
+        bake_mesh(path, [baked], BakeSettings(samples=rays), BakeOptions(threads=1, force=True))
         w = read_npz(baked).obscurance
         self.values += w.size
         self.not_finite += int(np.count_nonzero(~np.isfinite(w)))

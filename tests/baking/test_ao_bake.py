@@ -10,8 +10,9 @@ import pytest
 from click.testing import CliRunner
 from plyfile import PlyData, PlyElement
 
-from illumcli.baking.bake import Settings, run
+from illumcli.baking.bake import bake_mesh
 from illumcli.baking.sampling import BakeSampler
+from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
 from illumcli.geometry.normals import corner_normals
@@ -34,7 +35,7 @@ f 4 3 2 1\nf 4 6 5 3
 
 def bake(path, *outs, **settings):
     force = settings.pop("force", False)
-    return run(path, list(outs), Settings(**settings), threads=2, force=force)
+    return bake_mesh(path, list(outs), BakeSettings(**settings), BakeOptions(threads=2, force=force))
 
 
 def wavy(tmp_path, side=24):
@@ -330,9 +331,9 @@ def test_smooth_falloffs_see_distance(text_mesh, tmp_path):
 
 def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
     path, out = wavy(tmp_path), tmp_path / "out.npz"
-    monkeypatch.setattr("illumcli.baking.sampling.RAYS", 1 << 12)
-    run(path, [tmp_path / "one.npz"], Settings(), threads=1)
-    cast, rays = BakeSampler._run, []
+    monkeypatch.setattr("illumcli.baking.sampling.UNIT_RAYS", 1 << 12)
+    bake_mesh(path, [tmp_path / "one.npz"], BakeSettings(), BakeOptions(threads=1))
+    cast, rays, two = BakeSampler._run, [], BakeOptions(threads=2)
 
     def breaks(self, what, pieces, ask):
         for number, found in cast(self, what, pieces, ask):
@@ -343,12 +344,12 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
 
     monkeypatch.setattr(BakeSampler, "_run", breaks)
     with pytest.raises(KeyboardInterrupt):
-        run(path, [out], Settings(), threads=2)
+        bake_mesh(path, [out], BakeSettings(), two)
     assert not out.exists()
     assert len(list(tmp_path.glob(".*.unfinished"))) == len(list(tmp_path.glob(".*"))) == 1
     monkeypatch.setattr(BakeSampler, "_run", cast)
-    _, report = run(path, [out], Settings(), threads=2)
-    _, whole = run(path, [tmp_path / "two.npz"], Settings(), threads=2)
+    _, report = bake_mesh(path, [out], BakeSettings(), two)
+    _, whole = bake_mesh(path, [tmp_path / "two.npz"], BakeSettings(), two)
     assert (report.resumed, whole.resumed) == (11 * (1 << 12), 0)
     assert report.rays == whole.rays
     assert out.read_bytes() == (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()

@@ -1,0 +1,68 @@
+"""What a method of baking takes, and what it returns."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Vectors
+from illumcli.baking.occluders import Occluders
+from illumcli.baking.points import Surfaces
+from illumcli.baking.settings import BakeSettings
+from illumcli.baking.vertex_points import Vertices
+from illumcli.files.journal import Journal
+from illumcli.progress import Progress
+from illumcli.records import Record
+from illumcli.visibility.obscurance import Method
+
+
+class StageClock:
+    """Seconds of one stage after the other."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """Say that a stage is over."""
+        now = time.perf_counter()
+        self.seconds[stage] = now - self._last
+        self._last = now
+
+
+class BakeContext(Record):
+    """The surfaces of a bake, what occludes them, and how to sample."""
+
+    surfaces: Surfaces
+    occluders: Sequence[Occluders]  # per object
+    method: Method
+    settings: BakeSettings
+    threads: int
+    progress: Progress
+    clock: StageClock
+    journal: Journal
+
+
+class SampleStatistics(Record):
+    """What the values of a bake took."""
+
+    open: int = 0  # points with no geometry above their tangent plane: no rays
+    cast: int = 0  # points that cast rays
+    rmse: float = 0.0  # root mean square error over all points
+    rays: Mapping[str, int] = field(default_factory=dict)  # purpose -> rays
+    resumed: int = 0  # of these, rays that an earlier run cast
+    samples: Mapping[int, int] = field(default_factory=dict)  # rays per point -> points
+
+
+class PointValues(Record):
+    """Obscurance of the M points at vertices."""
+
+    vertices: Vertices
+    w: NDArray[np.float32]  # (M,) in [0, 1]: 1 where open
+    error: NDArray[np.float32]  # (M,) standard error
+    bent: Vectors | None  # (M, 3) float32 unit mean unoccluded direction
+    statistics: SampleStatistics

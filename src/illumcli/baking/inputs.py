@@ -1,0 +1,134 @@
+"""The input of a bake: a mesh file alone or a scene, placed and hashed before any ray is cast."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from illumcli import __version__
+from illumcli.baking.context import StageClock
+from illumcli.baking.files import SUFFIXES, baked_contents
+from illumcli.baking.points import Surfaces
+from illumcli.baking.settings import AS_USUAL, BakeOptions, BakeSettings
+from illumcli.errors import InputError
+from illumcli.files.outputs import is_kept
+from illumcli.geometry.repairs import Repairs
+from illumcli.geometry.scene_geometry import CornerVectors
+from illumcli.graph import topological_order
+from illumcli.records import Record
+from illumcli.render_graph import stages
+from illumcli.render_graph.build import recipes
+from illumcli.render_graph.limits import expected_memory, refuse_memory
+from illumcli.render_graph.repairs import refuse_repairs
+from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
+from illumcli.scene.spec import Scene
+from illumcli.visibility.baked import mesh_hash
+
+
+class BakeWork(Record):
+    """A bake whose meshes were read: its surfaces, and the files to write."""
+
+    path: Path
+    outputs: tuple[Path, ...]
+    due: tuple[Path, ...]
+    """Outputs that are not there yet with the same content."""
+    settings: BakeSettings
+    scene: Scene
+    surfaces: Surfaces
+    hashes: tuple[str, ...]
+    """Of the meshes."""
+    content: str
+    """Hash of all that the values and files depend on."""
+    repairs: Repairs
+    clock: StageClock
+
+
+def prepare_bake(
+    path: Path, outputs: Sequence[Path], settings: BakeSettings, options: BakeOptions = AS_USUAL
+) -> BakeWork:
+    """Read the meshes of a bake and refuse whatever can be known to fail; no ray is cast.
+
+    Raises
+    ------
+    InputError
+        A fault of the input, the settings or the outputs' names.
+    OutputError
+        A different file stands in the place of an output; an output cannot be written.
+    LimitError
+        The meshes do not fit into memory.
+    """
+    # names of the outputs
+    refuse_outputs(outputs)
+    if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
+        raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
+
+    # the scene, and whether its meshes fit into memory
+    clock = StageClock()
+    is_mesh = path.suffix.lower() in MESH_SUFFIXES
+    loaded = mesh_alone(path, options.overrides) if is_mesh else load(path, options.overrides)
+    expected = expected_memory(loaded, loaded.scene)
+    expected.pop("textures", None)  # no bake reads them
+    refuse_memory(0, 0, 0, expected, str(path))
+
+    # its meshes
+    surfaces, repairs = surfaces_of(loaded.scene, loaded)
+    meshes = [placed.mesh for placed in surfaces.geometry.placed]
+    hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
+    content = content_hash(loaded.scene, hashes, surfaces.normals, settings)
+    if options.strict:
+        refuse_repairs(str(path), repairs)
+    due = tuple(each for each in outputs if not is_kept(each, [content], baked_contents, options.force))
+    return BakeWork(
+        path, tuple(outputs), due, settings, loaded.scene, surfaces, hashes, content, repairs, clock
+    )
+
+
+def refuse_outputs(outputs: Sequence[Path]) -> None:
+    """Raise InputError for suffixes that nobody writes and files named twice."""
+    problems = [
+        f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(SUFFIXES)}"
+        for each in outputs
+        if each.suffix.lower() not in SUFFIXES
+    ]
+    if len({os.path.abspath(each) for each in outputs}) < len(outputs):
+        problems.append("an output is named twice; give each file once")
+    if problems:
+        raise InputError(problems)
+
+
+def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
+    """A scene of one mesh file and nothing else, not placed on a floor."""
+    scene_file = load(path, overrides)
+    description = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
+    return replace(scene_file, scene=Scene.validated(description))
+
+
+def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
+    """The scene's placed meshes, the same as a render's, with the normals that obscurance is about; what was
+    repaired."""
+    buffers: dict[str, Any] = {}
+    for node in topological_order(recipes(scene, loaded), ["world", "corner_normals", "repairs"]):
+        buffers[node.output] = node.run(buffers)
+    geometry, normals = buffers["world"], buffers["corner_normals"]
+    if scene.obscurance is not None and scene.obscurance.about == "geometric":
+        normals = stages.corner_normals(("flat",) * len(geometry.placed), buffers["meshes"], geometry)
+    return Surfaces(geometry, normals), buffers["repairs"].repairs
+
+
+def content_hash(scene: Scene, hashes: Sequence[str], normals: CornerVectors, settings: BakeSettings) -> str:
+    """Hash of all that the values and files of a bake depend on."""
+    transforms = [dict(each.transform) for each in scene.objects]
+    text = json.dumps(
+        [__version__, settings.as_data(), list(hashes), transforms, scene.object_names()], default=str
+    )
+    digest = hashlib.blake2b(text.encode(), digest_size=16)
+    for array in (normals.values, normals.index):
+        digest.update(np.ascontiguousarray(array.T).data)
+    return digest.hexdigest()

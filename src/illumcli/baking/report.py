@@ -1,0 +1,52 @@
+"""The report of a bake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from illumcli import __version__
+from illumcli.commands.render import peak_memory
+from illumcli.geometry.repairs import Repairs
+from illumcli.records import Record
+from illumcli.render_graph.repairs import repairs_data
+
+
+class BakeReport(Record):
+    """What a bake did, in the order in which JSON has it."""
+
+    input: str
+    content: str
+    seed: int
+    threads: int
+    vertices: int
+    triangles: int
+    unreferenced: int  # vertices that no polygon uses
+    without_normal: int  # vertices whose polygons all have area 0
+    copies: int  # vertices and normals that share the value of another at the same place
+    open: int  # points with no geometry above their tangent plane: no rays
+    cast: int  # points that cast rays
+    rmse: float  # root mean square error over all vertices
+    target_error: float | None
+    rays: Mapping[str, int]  # purpose -> rays
+    resumed: int  # of these, rays that an earlier run cast
+    samples: Mapping[int, int]  # rays per point -> points
+    repairs: Repairs
+    left_out: list[str]
+    warnings: list[str]
+    seconds: Mapping[str, float]  # by stage
+    written: list[str]
+    kept: list[str]
+
+    def as_data(self) -> dict[str, Any]:
+        """The report as JSON holds it."""
+        data = vars(self) | repairs_data(self.repairs)
+        return {"illum": __version__, **data, "peak_memory_bytes": peak_memory()}
+
+    def summary(self) -> str:
+        """One line: the error of the values, and what they took."""
+        rays = sum(self.rays.values())
+        return (
+            f"{self.vertices} vertices: error {self.rmse:.2g} (root mean square), {rays} rays, "
+            f"{self.open} points open without a ray"
+        )

@@ -1,0 +1,58 @@
+"""What a bake is asked for, and how it is run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any
+
+from illumcli.records import Value
+from illumcli.scene.spec import Obscurance
+
+
+class BakeSettings(Value):
+    """Everything that baked values and files depend on besides the meshes and their places."""
+
+    samples: int = 256  # rays per vertex
+    target_error: float | None = None  # root mean square over all vertices, instead of `samples`
+    falloff: Mapping[str, Any] = field(default_factory=lambda: {"falloff": "step"})  # as scenes have it
+    sampler: str = "spiral"
+    faces: str = "count"  # back faces: occlude (`count`), are transparent (`ignore`), end rays (`one_sided`)
+    method: str = "vertex"  # or `fit`: least squares over the surface
+    occluders: tuple[str, ...] = ("scene",)  # or `own`, or names of objects
+    ground: str | None = None  # axis that points up from an added ground plane
+    bent_normal: bool = False
+    channel: str | None = None  # of 8-bit vertex colours
+    split: bool = False  # vertices of a PLY
+    seed: int = 0
+
+    def obscurance(self) -> Obscurance:
+        """The same as a scene describes it."""
+        return Obscurance.validated(
+            {
+                "samples": self.samples,
+                "falloff": dict(self.falloff),
+                "sampler": self.sampler,
+                "faces": self.faces,
+            }
+        )
+
+    def as_data(self) -> dict[str, Any]:
+        """The settings as JSON holds them."""
+        return {**vars(self), "falloff": dict(self.falloff), "occluders": list(self.occluders)}
+
+
+class BakeOptions(Value):
+    """How inputs are read, computed and written."""
+
+    overrides: tuple[str, ...] = ()
+    """Of scenes, as `-D` gives them."""
+    threads: int | None = None
+    """By default one per core."""
+    force: bool = False
+    """Replace files that differ."""
+    strict: bool = False
+    """Refuse meshes that need repairs."""
+
+
+AS_USUAL = BakeOptions()

@@ -1,0 +1,166 @@
+"""The objects of a bake as they are written: with their own vertices, or with vertices split by what their
+corners have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry, cofactors
+from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
+from illumcli.records import Record
+from illumcli.visibility.baked import Baked
+
+
+class OutputMeshes(Record):
+    """Objects as they are written, and the values of their vertices."""
+
+    meshes: list[OutputMesh]
+    baked: Baked
+    left_out: tuple[str, ...]
+    """A line for everything of the meshes that is not written."""
+
+
+class SplitVertices(Record):
+    """The N vertices of a mesh, and after them a copy for all that a vertex has beyond its first."""
+
+    source: NDArray[np.int64]  # (N,) vertex that each is, or is a copy of
+    corner: NDArray[np.int64]  # (N,) a corner that it stands for, -1 for vertices of no polygon
+    of_corner: NDArray[np.int32]  # (C,) which of them each corner has
+
+
+def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, split: bool) -> OutputMeshes:
+    """The objects as they are written; with `split`, vertices with several normals, uv or values are."""
+    # what corners have; without splitting, only what all corners of each vertex agree on
+    tables: list[dict[str, NDArray[np.float64]]] = []
+    left_out: list[str] = []
+    for name, placed in zip(names, geometry.placed, strict=True):
+        kept: dict[str, NDArray[np.float64]] = {}
+        for kind, values in corner_tables(placed).items():
+            if values is None:
+                left_out.append(f"{name}: {kind}s, which some corners lack")
+            elif not split and not is_per_vertex(placed.mesh, values):
+                left_out.append(f"{name}: {kind}s that differ between the polygons of a vertex")
+            else:
+                kept[kind] = values
+        tables.append(kept)
+
+    # what vertices become
+    parts = []
+    for placed, table in zip(geometry.placed, tables, strict=True):
+        count = len(placed.mesh.corners)
+        corners = slice(placed.first_corner, placed.first_corner + count)
+        baked_here = [column[corners].reshape(count, -1) for column in baked.corner_columns().values()]
+        parts.append(split_vertices(placed.mesh, [*table.values(), *baked_here] if split else []))
+
+    # the objects
+    outputs = [
+        output_mesh(name, geometry, index, tables[index], parts[index]) for index, name in enumerate(names)
+    ]
+    meshes = [placed.mesh for placed in geometry.placed]
+    return OutputMeshes(outputs, split_values(baked, meshes, parts) if split else baked, tuple(left_out))
+
+
+def corner_tables(placed: PlacedMesh) -> dict[str, NDArray[np.float64] | None]:
+    """What the corners of an object's file have, by name, (C, k) each, normals in scene directions; None
+    where some corner lacks it."""
+    mesh, linear = placed.mesh, placed.matrix[:3, :3]
+    tables: dict[str, NDArray[np.float64] | None] = {}
+    if mesh.normals is not None and mesh.corner_normals is not None:
+        normals = mesh.normals @ cofactors(linear).T * (-1 if placed.mirrored else 1)
+        tables["normal"] = normals[mesh.corner_normals] if (mesh.corner_normals >= 0).all() else None
+    if mesh.uvs is not None and mesh.corner_uvs is not None:
+        tables["uv"] = mesh.uvs[mesh.corner_uvs] if (mesh.corner_uvs >= 0).all() else None
+    return tables
+
+
+def is_per_vertex(mesh: Mesh, values: NDArray[np.float64]) -> bool:
+    """Do all corners of every vertex have the same of these values, (C, k)?"""
+    out = np.zeros((len(mesh.vertices), values.shape[1]))
+    out[mesh.corners] = values
+    return np.array_equal(out[mesh.corners], values)
+
+
+def output_mesh(
+    name: str,
+    geometry: SceneGeometry,
+    index: int,
+    tables: Mapping[str, NDArray[np.float64]],
+    part: SplitVertices,
+) -> OutputMesh:
+    """An object in its place, with what its vertices have."""
+    # attributes of the file, and what corners have
+    placed = geometry.placed[index]
+    mesh = placed.mesh
+    attributes: dict[str, NDArray[Any]] = {}
+    for attribute, values in mesh.attributes.items():
+        is_color = attribute == "color" and values.ndim == 2
+        taken = () if is_color else (*STANDARD, *attributes)
+        attributes[free_name(attribute, taken)] = values[part.source]
+    for kind, values in tables.items():
+        at = values[np.maximum(part.corner, 0)]
+        attributes[kind] = np.where((part.corner >= 0)[:, None], at, 0.0)
+
+    # triangles; files keep the order of their corners
+    of_object = geometry.objects == index
+    corner = geometry.corners[of_object] - np.int32(placed.first_corner)
+    if placed.reversed is not None:
+        is_reversed = placed.reversed[geometry.polygons[of_object] - placed.first_polygon]
+        corner[is_reversed] = corner[is_reversed, ::-1]
+    vertices = mesh.vertices @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
+    triangles = part.of_corner[corner]
+    return OutputMesh(name, vertices[part.source], part.of_corner, mesh.starts, triangles, attributes)
+
+
+def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
+    """Each vertex, and one more for every other row of `tables` that its corners have.
+
+    Parameters
+    ----------
+    tables : sequence of (C, k)
+        What a corner has: normals, uv, values.
+    """
+    # one number for all that a corner has
+    key = mesh.corners.astype(np.int64)
+    for table in tables:
+        _, row = np.unique(table, axis=0, return_inverse=True)
+        _, key = np.unique(key * (len(table) + 1) + row.ravel(), return_inverse=True)
+        key = key.ravel()
+    _, first, key = np.unique(key, return_index=True, return_inverse=True)
+
+    # the first of each vertex keeps its index, all others follow after the vertices
+    count = len(mesh.vertices)
+    order = np.argsort(first, kind="stable")
+    vertex = mesh.corners[first[order]]
+    is_first = np.zeros(len(order), bool)
+    is_first[np.unique(vertex, return_index=True)[1]] = True
+    number = np.empty(len(order), np.int32)
+    number[order] = np.where(is_first, vertex, count + np.cumsum(~is_first) - 1)
+    corner = np.full(count + int((~is_first).sum()), -1, np.int64)
+    corner[number] = first
+    source = np.concatenate([np.arange(count), vertex[~is_first]])
+    return SplitVertices(source, corner, number[key.ravel()])
+
+
+def split_values(baked: Baked, meshes: Sequence[Mesh], parts: Sequence[SplitVertices]) -> Baked:
+    """Values of the split vertices of all meshes: those of their corners where there are any, else of their
+    vertices."""
+    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in baked.columns()}
+    at_corners = baked.corner_columns()
+    first_vertex = first_corner = 0
+    for mesh, part in zip(meshes, parts, strict=True):
+        for name, column in baked.columns().items():
+            values = column[first_vertex + part.source]
+            if f"corner_{name}" in at_corners:
+                some = np.flatnonzero(part.corner >= 0)
+                values[some] = at_corners[f"corner_{name}"][first_corner + part.corner[some]]
+            columns[name].append(values)
+        first_vertex += len(mesh.vertices)
+        first_corner += len(mesh.corners)
+    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in columns.items()}
+    return replace(baked, **joined)

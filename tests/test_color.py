@@ -1,12 +1,11 @@
-"""The sRGB curve and its inverse."""
+"""The sRGB curve and its inverse, luminance."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from illumcli.color import from_srgb, refuse_nonfinite, to_srgb
-from illumcli.errors import IllumError
+from illumcli.color import from_srgb, luminance, to_srgb
 
 
 @pytest.mark.parametrize(
@@ -40,14 +39,6 @@ def test_precision_is_kept(dtype):
     assert from_srgb(np.ones(3, dtype)).dtype == dtype
 
 
-def test_finite_bands_pass_and_others_tell_all():
-    band = np.zeros((3, 4, 2))
-    refuse_nonfinite(band, ("R", "Z"), "a.exr")
-    band[1, 2, 0], band[2, 0, 1], band[2, 3, 1] = np.nan, np.inf, -np.inf
-    with pytest.raises(IllumError) as caught:
-        refuse_nonfinite(band, ("R", "Z"), "a.exr", y0=100)
-    first, second = str(caught.value).split("\n")
-    assert first == "a.exr: channel R: NaN or infinite in 1 pixels, the first at x 2, y 101"
-    assert second.startswith(
-        "a.exr: channel Z: NaN or infinite in 2 pixels, the first at x 0, y 102; nothing is"
-    )
+def test_luminance_of_white_is_1_and_of_green_most_of_it():
+    assert luminance(np.ones((2, 3))) == pytest.approx(1, abs=1e-15)
+    assert luminance(np.eye(3)).tolist() == [0.2126, 0.7152, 0.0722]

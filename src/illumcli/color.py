@@ -1,14 +1,14 @@
-"""What film and files both know of pixel values: the sRGB transfer curve, and that every value is finite."""
+"""Linear Rec. 709 colours: the sRGB transfer curve, both ways, and luminance."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.errors import IllumError
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear R, G and B in the luminance Y (ITU-R BT.709)."""
 
 
 def to_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
@@ -26,32 +26,6 @@ def from_srgb(display: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     return np.where(display <= 0.04045, display / 12.92, ((bright + 0.055) / 1.055) ** 2.4)
 
 
-def refuse_nonfinite(
-    band: NDArray[Any], channels: Sequence[str], place: str, y0: int = 0, x0: int = 0
-) -> None:
-    """Nothing, where all of `band` is finite.
-
-    Parameters
-    ----------
-    band : (h, W, C) float
-        Of an image, `y0` and `x0` the numbers of its first row and column.
-    channels : C names
-    place : str
-        What the error begins with, such as a file name.
-
-    Raises
-    ------
-    IllumError
-        Every channel that holds NaN or Inf, how many pixels, and the first of them.
-    """
-    if np.isfinite(band).all():
-        return
-    wrong = ~np.isfinite(band)
-    facts = []
-    for c, channel in enumerate(channels):
-        rows, places = np.nonzero(wrong[..., c])
-        if len(rows):
-            first = f"the first at x {x0 + places[0]}, y {y0 + rows[0]}"
-            facts.append(f"{place}: channel {channel}: NaN or infinite in {len(rows)} pixels, {first}")
-    facts[-1] += "; nothing is written: render the layers one by one (--only) to find where they come from"
-    raise IllumError("\n".join(facts))
+def luminance(color: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(...) luminance of linear R, G, B, (..., 3)."""
+    return color @ np.array(LUMINANCE)

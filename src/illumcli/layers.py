@@ -1,7 +1,8 @@
-"""Every output layer once: its name, what fills it, its channels in a file, the kind of its values."""
+"""Every output layer once: a new layer is a row of `LAYERS` and a node that makes its buffer."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, TypeAlias
 
 from illumcli.records import Value
@@ -9,15 +10,19 @@ from illumcli.records import Value
 Kind: TypeAlias = Literal["light", "share", "data", "id"]
 """`light`: linear and unbounded; `share`: 0 to 1; both are means over a pixel. `data` and `id`,
 whole numbers, are never filtered: the sample nearest to the pixel's centre, in 32 bits."""
+Preview: TypeAlias = Literal["value", "direction", "position", "depth", "fraction", "number"]
+"""How a layer that is no light is shown in 8 bits; `film.preview` has a row for each."""
 
 
 class Layer(Value):
-    """A layer of the picture."""
+    """A layer of the image."""
 
     name: str
-    buffer: str  # what fills it
+    buffer: str  # of the render graph, which fills it
     channels: tuple[str, ...]  # full channel names, in order
     kind: Kind = "light"
+    preview: Preview = "value"
+    signed: bool = False  # may be negative
     per_pixel: bool = False  # made pixel by pixel from whole blocks of pixels
 
     @property
@@ -26,50 +31,66 @@ class Layer(Value):
         return self.kind in ("data", "id")
 
 
-def _rgb(name: str) -> tuple[str, ...]:
-    return tuple(f"{name}.{c}" for c in "RGB")
+class PerLight(Value):
+    """A name that stands for one layer per light."""
+
+    name: str
+    layer: Callable[[str], Layer]  # of the light of a name
 
 
-FIXED = {
-    layer.name: layer
-    for layer in (
-        Layer("beauty", "beauty", ("R", "G", "B")),
-        Layer("ambient", "ambient", _rgb("ambient")),
-        Layer("diffuse", "diffuse", _rgb("diffuse")),
-        Layer("specular", "specular", _rgb("specular")),
-        Layer("emission", "emission", _rgb("emission")),
-        Layer("obscurance", "obscurance", ("obscurance.Y",), "share"),
-        Layer("alpha", "alpha", ("A",), "share"),
-        Layer("depth", "depth", ("Z",), "data"),
-        Layer("position", "world_position", ("P.X", "P.Y", "P.Z"), "data"),
-        Layer("normal", "normal", ("N.X", "N.Y", "N.Z"), "data"),
-        Layer("geometric_normal", "geometric_normal", ("Ng.X", "Ng.Y", "Ng.Z"), "data"),
-        Layer("uv", "uv", ("uv.U", "uv.V"), "data"),
-        Layer("object_id", "object_id", ("objectId.Y",), "id"),
-        Layer("material_id", "material_id", ("materialId.Y",), "id"),
-        Layer("triangle_id", "triangle_id", ("triangleId.Y",), "id"),
-        Layer("error", "error", ("error.Y",), "data", per_pixel=True),
-    )
-}
-"""The layers that any scene has; each light adds two of its own."""
-PER_LIGHT = ("lights", "shadows")
-"""Names that stand for one layer per light."""
+def _channels(group: str, names: str) -> tuple[str, ...]:
+    return tuple(f"{group}.{name}" for name in names)
 
 
-def of_light(name: str) -> Layer:
+def of_light(light: str) -> Layer:
     """The light that one light alone makes."""
-    return Layer(name, f"light:{name}", _rgb(name))
+    return Layer(light, f"light:{light}", _channels(light, "RGB"))
 
 
-def shadow_of(name: str) -> Layer:
-    """Where the light of this name arrives."""
-    return Layer(f"shadow.{name}", f"shadow:{name}", (f"shadow.{name}.Y",), "share")
+def shadow_of(light: str) -> Layer:
+    """Where one light arrives."""
+    return Layer(f"shadow.{light}", f"shadow:{light}", _channels(f"shadow.{light}", "Y"), "share")
 
 
+LAYERS: tuple[Layer | PerLight, ...] = (
+    Layer("beauty", "beauty", ("R", "G", "B")),
+    Layer("ambient", "ambient", _channels("ambient", "RGB")),
+    Layer("diffuse", "diffuse", _channels("diffuse", "RGB")),
+    Layer("specular", "specular", _channels("specular", "RGB")),
+    Layer("emission", "emission", _channels("emission", "RGB")),
+    PerLight("lights", of_light),
+    PerLight("shadows", shadow_of),
+    Layer("obscurance", "obscurance", _channels("obscurance", "Y"), "share"),
+    Layer("alpha", "alpha", ("A",), "share"),
+    Layer("depth", "depth", ("Z",), "data", "depth"),
+    Layer("position", "world_position", _channels("P", "XYZ"), "data", "position", signed=True),
+    Layer("normal", "normal", _channels("N", "XYZ"), "data", "direction", signed=True),
+    Layer("geometric_normal", "geometric_normal", _channels("Ng", "XYZ"), "data", "direction", signed=True),
+    Layer("uv", "uv", _channels("uv", "UV"), "data", "fraction", signed=True),
+    Layer("object_id", "object_id", _channels("objectId", "Y"), "id", "number"),
+    Layer("material_id", "material_id", _channels("materialId", "Y"), "id", "number"),
+    Layer("triangle_id", "triangle_id", _channels("triangleId", "Y"), "id", "number"),
+    Layer("error", "error", _channels("error", "Y"), "data", per_pixel=True),
+)
+"""In the order in which they are listed to users."""
+
+NAMES = tuple(row.name for row in LAYERS)
+FIXED = {row.name: row for row in LAYERS if isinstance(row, Layer)}
+"""The layers that any scene has."""
+PER_LIGHT = {row.name: row.layer for row in LAYERS if isinstance(row, PerLight)}
+"""Those that each light adds."""
 CHANNEL_GROUPS = {
     channel.partition(".")[0]: layer.name for layer in FIXED.values() for channel in layer.channels
 } | {"shadow": "shadows"}
 """What stands before the dot of a channel's name, or a channel without one, and its layer."""
+
+
+def layer_of_channel(channel: str) -> Layer:
+    """The layer that a channel of an image file is part of."""
+    group, _, name = channel.partition(".")
+    if group == "shadow":
+        return shadow_of(name.rpartition(".")[0])
+    return FIXED[CHANNEL_GROUPS[group]] if group in CHANNEL_GROUPS else of_light(group)
 
 
 def owner_of(name: str) -> str | None:
@@ -79,4 +100,4 @@ def owner_of(name: str) -> str | None:
     group of channels.
     """
     folded = name.casefold()
-    return folded if folded in (*FIXED, *PER_LIGHT) else CHANNEL_GROUPS.get(name)
+    return folded if folded in NAMES else CHANNEL_GROUPS.get(name)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.color import from_srgb
+from illumcli.color import from_srgb, luminance
 from illumcli.film.heat import NOT_FINITE, heat
 
 
 def lightness(colours):
-    y = from_srgb(colours / 255) @ [0.2126, 0.7152, 0.0722]
+    y = luminance(from_srgb(colours / 255))
     return np.where(y > 0.008856, 116 * np.cbrt(y) - 16, 903.3 * y)
 
 

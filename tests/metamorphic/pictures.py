@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.cache.store import Store
+from illumcli.layers import NAMES
 from illumcli.render_graph.cached import Artifacts, Memory
 from illumcli.render_graph.culling import unseen_objects, without
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
-from illumcli.scene.spec import LAYERS
 from metamorphic.scenes import Case
 
 Pictures = dict[tuple[str, str], NDArray[np.float32]]
 """(camera, layer) -> (height, width, channels)."""
 
-ALL = tuple(name for name in LAYERS if name not in ("triangle_id", "error"))
+ALL = tuple(name for name in NAMES if name not in ("triangle_id", "error"))
 """Every layer but the one that needs all objects and the one that needs a fixed number of samples."""
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from illumcli.commands.render import run
 from illumcli.errors import InputError
+from illumcli.layers import NAMES
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
-from illumcli.scene.spec import LAYERS
 
 SCENE = """
 version: 1
@@ -31,7 +31,7 @@ lights:
   - {light: point, name: key, position: [2, 3, 2], intensity: [9, 8, 7]}
   - {light: directional, name: sun, direction: [1, -2, -1], irradiance: 0.3, shadows: false}
 """
-ALL = [name for name in LAYERS if name != "error"]
+ALL = [name for name in NAMES if name != "error"]
 
 
 @pytest.fixture(scope="module")

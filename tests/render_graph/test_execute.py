@@ -9,11 +9,11 @@ import pytest
 
 from illumcli.errors import InputError
 from illumcli.graph import Node
+from illumcli.layers import NAMES
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import Plan, plan
 from illumcli.render_graph.stages import FEWEST, tiles
 from illumcli.scene.load import load
-from illumcli.scene.spec import LAYERS
 
 SCENE = """
 version: 1
@@ -37,7 +37,7 @@ lights:
   - {light: spot, name: rim, position: [-2, 3, -1], target: [0, 0, 0], angle: 40, intensity: 20}
   - {light: directional, name: sun, direction: [1, -2, -1], irradiance: 0.3, shadows: false}
 """
-ALL = list(LAYERS)
+ALL = list(NAMES)
 
 
 @pytest.fixture(scope="module")

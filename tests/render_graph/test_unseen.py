@@ -15,13 +15,13 @@ from illumcli.commands.sweep import Settings, variants_of
 from illumcli.commands.sweep import run as sweep
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import stand
+from illumcli.layers import NAMES
 from illumcli.render_graph import cached as policy
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, why_all, without
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
-from illumcli.scene.spec import LAYERS
 from illumcli.visibility.culling import (
     GROUPED_BOXES,
     LARGE_BOXES,
@@ -49,7 +49,7 @@ objects:
   - {name: behind, mesh: {shape: torus}, material: red, transform: {translate: [3, 0.5, 9]}}
 lights: [{light: point, name: key, position: [2, 4, 2], intensity: 20}]
 """
-ALL = [name for name in LAYERS if name not in ("triangle_id", "error")]
+ALL = [name for name in NAMES if name not in ("triangle_id", "error")]
 
 
 @pytest.fixture

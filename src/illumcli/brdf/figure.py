@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from illumcli.brdf import views
-from illumcli.color import to_srgb
+from illumcli.color import luminance, to_srgb
 from illumcli.errors import InputError
 from illumcli.models._base import IlluminationModel
 
@@ -98,7 +98,7 @@ def _polar(
     models: Sequence[IlluminationModel], angles: Sequence[float], log: bool, times_cos: bool
 ) -> list[Any]:
     slices = [[views.polar_slice(model, angle, times_cos) for angle in angles] for model in models]
-    top = _top([views.luminance(found[np.abs(at) < STEEPEST]) for each in slices for at, found in each])
+    top = _top([luminance(found[np.abs(at) < STEEPEST]) for each in slices for at, found in each])
 
     def panel(mine: Any) -> Any:
         def draw(axes: Any) -> None:
@@ -110,7 +110,7 @@ def _polar(
             axes.set_thetamax(90)
             for k, (angle, (view, found)) in enumerate(zip(angles, mine, strict=True)):
                 color = colormaps["viridis"](0.85 * k / max(len(angles) - 1, 1))
-                radius = _scaled(views.luminance(found), top, log)
+                radius = _scaled(luminance(found), top, log)
                 axes.plot(np.radians(view), radius, color=color, linewidth=1.2)
                 axes.plot([np.radians(angle)] * 2, [0, 1], ":", color=color, linewidth=0.6)
                 axes.plot([np.radians(-angle)] * 2, [0.93, 1.0], color=color, linewidth=2.5)
@@ -150,12 +150,12 @@ def _lobes(
     incidence = _middle(angles)
     found = [views.lobe(model, incidence, times_cos) for model in models]
     seen = np.cos(np.radians(STEEPEST))
-    top = _top([views.luminance(each[way[..., 2] > seen]) for way, each in found])
+    top = _top([luminance(each[way[..., 2] > seen]) for way, each in found])
     angle = np.radians(incidence)
 
     def panel(directions: Any, color: Any) -> Any:
         def draw(axes: Any) -> None:
-            radius = _scaled(views.luminance(color), top, log)
+            radius = _scaled(luminance(color), top, log)
             x, y, z = np.moveaxis(directions * radius[..., None], -1, 0)
             axes.plot_surface(x, y, z, color="#e0b64a", rcount=61, ccount=61, linewidth=0, antialiased=False)
             axes.plot([0, -np.sin(angle)], [0, 0], [0, np.cos(angle)], color="crimson", linewidth=1.2)

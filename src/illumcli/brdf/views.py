@@ -147,8 +147,3 @@ def _halved(lanes: Doubles, inside: NDArray[np.bool_]) -> Doubles:
     whole = np.zeros((height, width, 4))
     whole[inside] = np.concatenate([lanes, np.ones((len(lanes), 1))], axis=1)
     return whole.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3))
-
-
-def luminance(color: Doubles) -> Doubles:
-    """Of linear R, G, B (Rec. 709)."""
-    return color @ np.array([0.2126, 0.7152, 0.0722])

@@ -442,7 +442,7 @@ def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any
         layer = target.layers[0]
         if layer.kind == "light":
             return picture(parts[layer.name], scene.film.exposure, 8, str(target.path), tile.y, tile.x)
-        shown = viewable(layer.name, parts[layer.name], preview_scale(target, frame), frame.centre)
+        shown = viewable(layer, parts[layer.name], preview_scale(target, frame), frame.centre)
         return plain(shown, str(target.path), tile.y, tile.x)
     seen: dict[str, NDArray[np.float32]] = {}
     for layer in _beauty_first(target.layers):
@@ -455,7 +455,7 @@ def pixels_of(scene: Any, target: Target, tile: Tile, layers: Planes, frame: Any
 def preview_scale(target: Target, frame: Any) -> float:
     """What pictures count distances in [scene units]: the scene's radius for positions, the way from the
     camera to its target for depths."""
-    if target.layers[0].name == "position":
+    if target.layers[0].preview == "position":
         return float(frame.radius)
     camera = target.view.camera
     return float(np.linalg.norm(np.subtract(camera.target, camera.position)))
@@ -480,7 +480,7 @@ def metadata(scene: Any, target: Target, frame: Any) -> dict[str, Any]:
     if target.path.suffix.lower() == ".exr":
         values = {"illum:depth": "distance from the eye's plane in scene units, 0 where nothing is seen"}
     elif target.layers[0].kind != "light":
-        values = reading(target.layers[0].name, preview_scale(target, frame), frame.centre)
+        values = reading(target.layers[0], preview_scale(target, frame), frame.centre)
     else:
         values = {}
     return {

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.color import from_srgb, refuse_nonfinite, to_srgb
+from illumcli.color import from_srgb, to_srgb
+from illumcli.film.finite import refuse_nonfinite
 
 NAMES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 

@@ -13,9 +13,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.color import refuse_nonfinite
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import AtomicFile, refusals
+from illumcli.film.finite import refuse_nonfinite
 from illumcli.images.channels import ChannelType, Metadata
 from illumcli.images.format import ImageFile, WriteError
 from illumcli.images.names import NO_UTF8, no_utf8, printable

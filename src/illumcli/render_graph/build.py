@@ -10,7 +10,7 @@ from typing import Any
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
 from illumcli.graph import Node
-from illumcli.layers import FIXED, Layer, of_light, shadow_of
+from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.lights._base import Light
 from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel
@@ -84,10 +84,9 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
     InputError
         A name that is no layer of this scene.
     """
-    lights = [of_light(name) for name in scene.named_lights()]
-    shadows = [shadow_of(name) for name in scene.named_lights()]
-    known = {layer.name: [layer] for layer in [*lights, *shadows, *FIXED.values()]}
-    known |= {"lights": lights, "shadows": shadows}
+    per_light = {name: [of(light) for light in scene.named_lights()] for name, of in PER_LIGHT.items()}
+    layers_of_lights = [layer for layers in per_light.values() for layer in layers]
+    known = {layer.name: [layer] for layer in [*layers_of_lights, *FIXED.values()]} | per_light
     problems = [f"no layer '{name}'; {suggestion(name, tuple(known))}" for name in names if name not in known]
     if problems:
         raise InputError(problems)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
+from illumcli.color import LUMINANCE
 from illumcli.film.reconstruct import pixel_means
 from illumcli.graph import Node, topological_order
 from illumcli.rays import sampling
@@ -28,8 +29,6 @@ CELL = 2
 """One pixel in so many across and down is doubled."""
 BLOCK = 8
 """Pixels along a block, which has one error; blocks begin at the film's upper left corner."""
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Of linear Rec. 709 colours."""
 
 
 def error_recipes(

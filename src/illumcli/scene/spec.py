@@ -6,11 +6,12 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
 from illumcli.geometry.shapes import AnyShape
+from illumcli.layers import NAMES
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
 from illumcli.scene.references import reference_faults
@@ -327,12 +328,10 @@ class Obscurance(Description):
     directions that point below the polygon are mirrored at its plane. `geometric`: the polygon's own."""
 
 
-Layer: TypeAlias = Literal[
-    "beauty", "ambient", "diffuse", "specular", "emission", "lights", "shadows", "obscurance", "alpha",
-    "depth", "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
-    "error",
-]  # fmt: skip
-LAYERS: tuple[str, ...] = get_args(Layer)
+if TYPE_CHECKING:
+    Layer: TypeAlias = str
+else:
+    Layer = Literal[NAMES]
 
 
 class Outputs(Description):

@@ -11,15 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import IllumError, InputError, LimitError
+from illumcli.layers import NAMES, layer_of_channel
 from illumcli.records import Value
-
-LAYERS = (
-    "beauty", "ambient", "diffuse", "specular", "lights", "shadows", "obscurance", "alpha", "depth",
-    "position", "normal", "geometric_normal", "uv", "object_id", "material_id", "triangle_id",
-    "error",
-)  # fmt: skip
-SIGNED = ("P", "N", "Ng", "uv")
-"""Layers whose values may be below 0; all others are light, shares, distances and numbers."""
 
 Channels = dict[str, NDArray[np.float32]]
 
@@ -46,7 +39,7 @@ class Sandbox:
         return name
 
     def picture(
-        self, scene: Mapping[str, Any], layers: Sequence[str] = LAYERS, threads: int = 1
+        self, scene: Mapping[str, Any], layers: Sequence[str] = NAMES, threads: int = 1
     ) -> tuple[Channels, bytes]:
         """Every channel of the scene's image, (H, W) float32 each, and the image file's bytes.
 
@@ -97,7 +90,7 @@ class Sandbox:
         for name, values in channels.items():
             self.values += values.size
             self.not_finite += int(np.count_nonzero(~np.isfinite(values)))
-            if name.rpartition(".")[0] not in SIGNED:
+            if not layer_of_channel(name).signed:
                 self.negative += int(np.count_nonzero(values < 0))
 
 
@@ -105,12 +98,11 @@ def faults(channels: Channels) -> list[str]:
     """What no picture may have: values not finite, light, shares or distances below 0, shares above 1."""
     found = []
     for name, values in channels.items():
-        signed = name.rpartition(".")[0] in SIGNED
-        share = name == "A" or name.startswith(("obscurance", "shadow."))
+        layer = layer_of_channel(name)
         for fact, wrong in (
             ("not finite", ~np.isfinite(values)),
-            ("below 0", np.zeros(1, bool) if signed else values < 0),
-            ("above 1", values > 1 if share else np.zeros(1, bool)),
+            ("below 0", np.zeros(1, bool) if layer.signed else values < 0),
+            ("above 1", values > 1 if layer.kind == "share" else np.zeros(1, bool)),
         ):
             if wrong.any():
                 found.append(f"{name} {fact} in {np.count_nonzero(wrong)} pixels")

@@ -1,0 +1,42 @@
+"""Every value of an image is finite, or the first that is not is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import IllumError
+
+
+def refuse_nonfinite(
+    band: NDArray[Any], channels: Sequence[str], place: str, y0: int = 0, x0: int = 0
+) -> None:
+    """Nothing, where all of `band` is finite.
+
+    Parameters
+    ----------
+    band : (h, W, C) float
+        Of an image, `y0` and `x0` the numbers of its first row and column.
+    channels : C names
+    place : str
+        What the error begins with, such as a file name.
+
+    Raises
+    ------
+    IllumError
+        Every channel that holds NaN or Inf, how many pixels, and the first of them.
+    """
+    if np.isfinite(band).all():
+        return
+    wrong = ~np.isfinite(band)
+    facts = []
+    for c, channel in enumerate(channels):
+        rows, places = np.nonzero(wrong[..., c])
+        if len(rows):
+            first = f"the first at x {x0 + places[0]}, y {y0 + rows[0]}"
+            facts.append(f"{place}: channel {channel}: NaN or infinite in {len(rows)} pixels, {first}")
+    facts[-1] += "; nothing is written: render the layers one by one (--only) to find where they come from"
+    raise IllumError("\n".join(facts))

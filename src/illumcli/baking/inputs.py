@@ -22,12 +22,13 @@ from illumcli.files.outputs import is_kept
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import CornerVectors
 from illumcli.graph import topological_order
+from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph import stages
 from illumcli.render_graph.build import recipes
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs
-from illumcli.scene.load import MESH_SUFFIXES, SceneFile, load
+from illumcli.scene.load import SceneFile, load
 from illumcli.scene.spec import Scene
 from illumcli.visibility.baked import mesh_hash
 
@@ -71,7 +72,7 @@ def prepare_bake(
 
     # the scene, and whether its meshes fit into memory
     clock = StageClock()
-    is_mesh = path.suffix.lower() in MESH_SUFFIXES
+    is_mesh = is_mesh_file(path)
     loaded = mesh_alone(path, options.overrides) if is_mesh else load(path, options.overrides)
     expected = expected_memory(loaded, loaded.scene)
     expected.pop("textures", None)  # no bake reads them

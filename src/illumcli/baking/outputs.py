@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 from illumcli.baking.files import add_baked_to_glb, write_baked_glb, write_baked_ply
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.split import OutputMeshes, output_meshes
-from illumcli.scene.load import MESH_SUFFIXES
 from illumcli.visibility.baked import Baked, write_npz
 
 GlbParts: TypeAlias = tuple[tuple[dict[str, Any], bytes], list[tuple[int, int, int]]]
@@ -35,16 +34,15 @@ def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
 def _write(path: Path, work: BakeWork, baked: Baked, meshes: Callable[[bool], OutputMeshes]) -> None:
     """One file: what was baked added to the file that was read where both have one format, else all anew."""
     source, channel, split = work.path, work.settings.channel, work.settings.split
-    alone = source.suffix.lower() if source.suffix.lower() in MESH_SUFFIXES else ""
-    kind = path.suffix.lower()
+    source_kind, kind = source.suffix.lower(), path.suffix.lower()
     if kind == ".npz":
         write_npz(path, baked)
-    elif kind == ".ply" and alone == ".ply" and not split:
+    elif kind == ".ply" and source_kind == ".ply" and not split:
         write_baked_ply(path, [], baked, source, channel)
     elif kind == ".ply":
         anew = meshes(split)
         write_baked_ply(path, anew.meshes, anew.baked, None, channel)
-    elif alone == ".glb" and channel is None and (parts := glb_parts(source)):
+    elif source_kind == ".glb" and channel is None and (parts := glb_parts(source)):
         add_baked_to_glb(path, *parts, baked)
     else:
         anew = meshes(True)

@@ -19,6 +19,12 @@ from illumcli.schema.families import modules
 NO_FORMATS = frozenset({"mtl", "output_mesh"})
 """Modules beside the formats."""
 OTHER_SUFFIXES = {".glb": "gltf"}  # read by the module of another name
+UNREAD_SUFFIXES = (".off",)  # known to be meshes, so that they are not taken for scenes
+
+
+def is_mesh_file(path: Path) -> bool:
+    """Does the suffix say that the file is a mesh?"""
+    return path.suffix.lower() in (*_formats(), *UNREAD_SUFFIXES)
 
 
 def read_mesh(path: Path) -> Mesh:

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from pydantic_core import ValidationError
 
 from illumcli.errors import InputError
+from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.blame import Applied, PlacedFault, blamed
@@ -29,7 +30,6 @@ from illumcli.schema.faults import faults, shown
 
 MAX_EXTENDS = 8  # files, one extending the next
 MAX_FILES = 64
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 CHOICES = ("model", "shape", "falloff", "law", "D", "F")  # keys that say what a mapping is
 PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides an object's `mesh`
 
@@ -73,7 +73,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
     reading = _Reading(_roots(path.parent))
     changes = [change for text in overrides if (change := parse(text, reading.problems))]
     settings = [change for change in changes if change.steps[0] == SETTINGS]
-    if path.suffix.lower() in MESH_SUFFIXES:
+    if is_mesh_file(path):
         tree = _studio(path, settings, reading)
     else:
         tree = reading.file(path, ())

@@ -22,7 +22,7 @@ import numpy as np
 
 from illumcli.arrays import F, column_major
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import place
+from illumcli.geometry.scene_geometry import place_meshes
 from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.verification.inputs import Inputs
@@ -105,7 +105,7 @@ def estimated(case: Any, samples: int) -> Found:
         "obscurance": lambda: exponential(inputs),
     }[case.type]()
     around = surroundings(inputs)
-    world = place([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
+    world = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     corners = around.vertices[around.triangles[0]]
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius
     tracer = Tracer(world.vertices, world.triangles)

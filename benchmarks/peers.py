@@ -50,7 +50,7 @@ LAMPS = ((3.0, 4.0, 2.0), (-3.0, 3.0, 3.0))
 
 def placed_bunny(folder: Path) -> Path:
     """The bunny as illum's `fit: 1` places it, as a PLY with smooth normals that everybody reads."""
-    from illumcli.geometry import scene_geometry as assemble
+    from illumcli.geometry import scene_geometry, transforms
     from illumcli.geometry.normals import corner_normals
     from illumcli.geometry.shapes.teapot import Teapot
     from illumcli.mesh_files import read_mesh
@@ -58,10 +58,10 @@ def placed_bunny(folder: Path) -> Path:
 
     source = bunny(folder)
     mesh = read_mesh(folder / source) if source.endswith(".obj") else Teapot(shape="teapot").mesh()
-    matrix = assemble.transform_matrix(Transform(fit=1.0), mesh)
-    world = assemble.place([mesh], [matrix])
+    matrix = transforms.transform_matrix(Transform(fit=1.0), mesh)
+    world = scene_geometry.place_meshes([mesh], [matrix])
     points = world.frame.to_world(world.vertices.astype(np.float64))
-    normals = assemble.world_normals(world, [corner_normals(mesh)])
+    normals = scene_geometry.scene_normals(world, [corner_normals(mesh)])
     own = np.zeros((len(points), 3), np.float32)
     own[world.triangles] = normals.values[normals.index[world.corners]]
     path = folder / "placed.ply"

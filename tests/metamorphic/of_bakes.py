@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
-from illumcli.geometry.scene_geometry import transform_matrix
+from illumcli.geometry.transforms import transform_matrix
 from illumcli.mesh_files import read_mesh
 from illumcli.scene.load import load
 from illumcli.visibility.baked import read_npz

@@ -11,7 +11,8 @@ from illumcli.arrays import column_major
 from illumcli.geometry import planar
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
-from illumcli.geometry.scene_geometry import CornerVectors, place, polygon_centres, rotation
+from illumcli.geometry.scene_geometry import CornerVectors, place_meshes, polygon_centres
+from illumcli.geometry.transforms import rotation
 from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
 from illumcli.rays.interaction import SurfaceInteraction, quadratic
 
@@ -70,7 +71,7 @@ def dense(weights, world):
 
 
 def at(points, seed=3, matrix=TURNED):
-    world = place([polygon(points)], [matrix])
+    world = place_meshes([polygon(points)], [matrix])
     found = planar_polygons(world)
     assert found is not None
     hits = anywhere(world, seed=seed)
@@ -140,7 +141,7 @@ def test_values_stay_within_the_range_of_the_corners(points, seed):
 @given(points=convex | stars | st.sampled_from([L_SHAPE, ARROW, STAR, STRAIGHT]), seed=st.integers(0, 99))
 @settings(max_examples=60, deadline=None)
 def test_values_are_linear_along_edges(points, seed):
-    world = place([polygon(points)], [TURNED])
+    world = place_meshes([polygon(points)], [TURNED])
     found = planar_polygons(world)
     count = len(world.vertices)
     values = np.random.default_rng(seed).uniform(-1, 1, (count, 1)).astype(F)
@@ -164,7 +165,7 @@ def test_another_cut_gives_the_same_values(points, turn):
     """The polygon begins at another corner: fans and ears differ, values at a point do not."""
     points = np.asarray(points, float)
     values = np.random.default_rng(turn).uniform(-1, 1, (len(points), 1)).astype(F)
-    worlds = [place([polygon(np.roll(points, shift, axis=0))], [TURNED]) for shift in (0, turn)]
+    worlds = [place_meshes([polygon(np.roll(points, shift, axis=0))], [TURNED]) for shift in (0, turn)]
     triangle, u, v = anywhere(worlds[0])
     where = positions(worlds[0], triangle, u, v)
     other = np.full(len(where), -1, np.int32)
@@ -187,7 +188,7 @@ def test_another_cut_gives_the_same_values(points, turn):
 @pytest.mark.parametrize("skew", [0.0, 1e-14, 1e-9, 1e-3, 0.3, -0.3])
 def test_parallelograms_and_trapezoids_have_exact_bilinear_coordinates(skew):
     corners = np.array([[0, 0], [1, 0], [1.2 + skew, 1], [0.2 - skew, 1 + skew / 2]])
-    world = place([polygon(corners)], [np.eye(4)])
+    world = place_meshes([polygon(corners)], [np.eye(4)])
     triangle, u, v = anywhere(world)
     found = dense(corner_weights(world, planar_polygons(world), triangle, u, v), world).astype(float)
     s, t = found[:, 1] + found[:, 2], found[:, 2] + found[:, 3]
@@ -207,7 +208,7 @@ def two_quads():
 
 
 def test_a_folded_quad_is_interpolated_by_triangles_and_agrees_at_its_edge():
-    world = place([two_quads()], [np.eye(4)])
+    world = place_meshes([two_quads()], [np.eye(4)])
     found = planar_polygons(world)
     assert (found.row >= 0).tolist() == [True, True, False, False]
     values = np.random.default_rng(5).random((6, 1)).astype(F)
@@ -230,7 +231,7 @@ def test_a_folded_quad_is_interpolated_by_triangles_and_agrees_at_its_edge():
 def test_a_square_counts_as_flat_up_to_a_fold_of_2_to_the_minus_8(fold, is_flat):
     rise = np.tan(fold / 2) / np.sqrt(2)
     square = polygon([[0, 0, rise], [1, 0, 0], [1, 1, rise], [0, 1, 0]])
-    assert (planar_polygons(place([square], [np.eye(4)])) is not None) == is_flat
+    assert (planar_polygons(place_meshes([square], [np.eye(4)])) is not None) == is_flat
 
 
 def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangles():
@@ -238,11 +239,11 @@ def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangl
     large = polygon(ring(np.ones(planar.MOST_CORNERS + 1)))
     three = polygon([[0, 0], [1, 0], [0, 1]])
     for mesh in (bow, large, three):
-        assert planar_polygons(place([mesh], [np.eye(4)])) is None
+        assert planar_polygons(place_meshes([mesh], [np.eye(4)])) is None
 
 
 def test_polygons_that_are_flat_by_their_normals_are_left_out_where_nothing_else_is_asked():
-    world = place([polygon(L_SHAPE), polygon(ARROW)], [np.eye(4)] * 2)
+    world = place_meshes([polygon(L_SHAPE), polygon(ARROW)], [np.eye(4)] * 2)
     up, lean = [0, 0, 1], [0.6, 0, 0.8]
     index = np.zeros(10, np.int32)
     index[8] = 1
@@ -257,7 +258,7 @@ def test_polygons_that_are_flat_by_their_normals_are_left_out_where_nothing_else
 def test_triangles_keep_their_bits_beside_polygons():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1]], float)
     mesh = Mesh(vertices, np.array([0, 1, 2, 3, 1, 4, 2], np.int32), np.array([0, 4, 7], np.int32))
-    world = place([mesh], [TURNED])
+    world = place_meshes([mesh], [TURNED])
     hits = anywhere(world)
     whole = corner_weights(world, planar_polygons(world), *hits).interpolate_vertices(world, world.vertices)
     by_triangles = corner_weights(world, None, *hits).interpolate_vertices(world, world.vertices)
@@ -268,7 +269,7 @@ def test_triangles_keep_their_bits_beside_polygons():
 
 def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
     meshes = [polygon(L_SHAPE), two_quads(), polygon(ARROW), polygon(ring(np.ones(9)))]
-    world = place(meshes, [np.eye(4)] * 4)
+    world = place_meshes(meshes, [np.eye(4)] * 4)
     hits = anywhere(world, 1000)
     whole = corner_weights(world, planar_polygons(world), *hits)
     values = np.random.default_rng(1).random((len(world.vertices), 3)).astype(F)
@@ -284,7 +285,7 @@ def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
 
 
 def test_the_mean_of_polygons_of_any_size():
-    world = place([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
+    world = place_meshes([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
     centres = polygon_centres(world)
     group = MeanCorners(None, centres, np.array([0, 2, 1, 0], np.int32))
     weights = CornerWeights(corner_weights(world, None, *anywhere(world, 4)).hits, (group,))
@@ -301,7 +302,7 @@ def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across(
         np.arange(4, dtype=np.int32),
         np.array([0, 4], np.int32),
     )
-    world = place([mesh], [np.eye(4)])
+    world = place_meshes([mesh], [np.eye(4)])
     for t in (0.0, 0.3, 1.0):
         at = np.stack([2 * width - 1, np.full_like(width, t - 0.5)], axis=1) / world.frame.radius
         a, b, c = (world.vertices[world.triangles[0, k], :2].astype(float) for k in range(3))

@@ -7,10 +7,11 @@ import pytest
 
 from illumcli.arrays import column_major, dot, length
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import place, rotation, world_uvs
+from illumcli.geometry.scene_geometry import place_meshes, scene_uvs
 from illumcli.geometry.shapes.cylinder import Cylinder
 from illumcli.geometry.shapes.plane import Plane
 from illumcli.geometry.shapes.sphere import Sphere
+from illumcli.geometry.transforms import rotation
 from illumcli.rays.corner_weights import corner_weights
 from illumcli.rays.interaction import rings, tangent, uv_tangents
 
@@ -33,7 +34,7 @@ def position(world, triangle, u, v):
 
 def along_u(world, triangle, u, v):
     weights = corner_weights(world, None, triangle, u, v)
-    return weights.interpolate(world, uv_tangents(world, world_uvs(world)))
+    return weights.interpolate(world, uv_tangents(world, scene_uvs(world)))
 
 
 def unit_rows(x):
@@ -42,7 +43,7 @@ def unit_rows(x):
 
 @pytest.mark.parametrize("matrix", [np.eye(4), SKEWED, MIRRORED], ids=["plain", "skewed", "mirrored"])
 def test_u_grows_along_x_of_a_plane_under_any_transform(matrix):
-    world = place([Plane(resolution=(3, 2)).mesh()], [matrix])
+    world = place_meshes([Plane(resolution=(3, 2)).mesh()], [matrix])
     at = anywhere(world)
     found = along_u(world, *at)
     wanted = matrix[:3, 0] / np.linalg.norm(matrix[:3, 0])
@@ -51,7 +52,7 @@ def test_u_grows_along_x_of_a_plane_under_any_transform(matrix):
 
 @pytest.mark.parametrize("shape", [Cylinder(segments=16, caps=False), Sphere(segments=16, rings=24)])
 def test_the_grain_of_a_coarse_round_body_is_smooth(shape):
-    world = place([shape.mesh()], [np.eye(4)])
+    world = place_meshes([shape.mesh()], [np.eye(4)])
     triangle, u, v = anywhere(world)
     p = position(world, triangle, u, v)
     seam = (p[:, 0] > 0) & (np.abs(p[:, 2]) < np.tan(2 * np.pi / 16) * p[:, 0])
@@ -69,7 +70,7 @@ def test_uv_that_turn_over_at_a_seam_keep_their_sides_apart():
         uvs=np.array([[0, 0], [0, 1], [1, 0]], float),
         corner_uvs=np.array([[0, 2, 1], [0, 1, 2]], np.int32),
     )
-    world = place([mesh], [np.eye(4)])
+    world = place_meshes([mesh], [np.eye(4)])
     third = np.full(2, 1 / 3, F)
     found = along_u(world, np.array([0, 1], np.int32), third, third)
     np.testing.assert_allclose(found, [[1, 0, 0], [-1, 0, 0]], atol=1e-6)
@@ -80,8 +81,8 @@ def test_no_uv_or_flat_uv_give_no_direction():
     bare = Mesh.of_triangles(corners, [[0, 1, 2]])
     flat = Mesh.of_triangles(corners, [[0, 1, 2]], uvs=np.ones((1, 2)), corner_uvs=np.zeros((1, 3), np.int32))
     for mesh in (bare, flat):
-        world = place([mesh], [np.eye(4)])
-        assert not uv_tangents(world, world_uvs(world)).values.any()
+        world = place_meshes([mesh], [np.eye(4)])
+        assert not uv_tangents(world, scene_uvs(world)).values.any()
 
 
 @pytest.mark.parametrize("matrix", [np.eye(4), SKEWED, MIRRORED], ids=["plain", "skewed", "mirrored"])

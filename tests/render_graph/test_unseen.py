@@ -13,8 +13,8 @@ from illumcli.cache.store import Store
 from illumcli.commands.render import run
 from illumcli.commands.sweep import Settings, variants_of
 from illumcli.commands.sweep import run as sweep
+from illumcli.geometry.bounds import object_bounds
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import stand
 from illumcli.layers import NAMES
 from illumcli.render_graph import cached as policy
 from illumcli.render_graph.cached import Artifacts
@@ -338,7 +338,7 @@ def test_fewer_boxes_hold_all_of_many(count):
 def test_what_a_box_and_a_frustum_share_holds_all_points_in_both(scene):
     loaded = load(scene)
     mesh = Mesh.of_triangles([[-1, -1, -1], [1, 1, 1], [1, -1, 0]], [[0, 1, 2]])
-    frame = stand([mesh], [np.eye(4)]).frame
+    frame = object_bounds([mesh], [np.eye(4)]).frame
     planes = frustum(loaded.scene.camera, frame, 40, 30, None)
     low, high = np.array([[-0.3, -0.4, -0.6]]), np.array([[0.6, 0.5, 0.2]])
     corners = clip_boxes(planes, Boxes(low, high))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import place
+from illumcli.geometry.scene_geometry import place_meshes
 from illumcli.geometry.shapes.sphere import Sphere
 from illumcli.geometry.shapes.torus import Torus
 from illumcli.geometry.spatial_order import compact
@@ -95,7 +95,7 @@ def test_the_tree_is_built_for_many_points_only(down, built):
 
 
 def world_of(*meshes):
-    return place(list(meshes), [np.eye(4)] * len(meshes))
+    return place_meshes(list(meshes), [np.eye(4)] * len(meshes))
 
 
 def test_every_facet_of_a_convex_mesh_is_open_in_front_and_none_behind():

@@ -10,7 +10,7 @@ import pytest
 from illumcli.commands.render import run
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import corner_normals
-from illumcli.geometry.scene_geometry import place, world_normals
+from illumcli.geometry.scene_geometry import place_meshes, scene_normals
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.images.reader import read_image
 from illumcli.stress.rays import icosphere
@@ -126,8 +126,8 @@ def test_without_the_terminator_the_polygons_cast_their_own_shadow(picture):
 
 
 def parts_of(*meshes: Mesh) -> SmoothParts:
-    world = place(meshes, [np.eye(4)] * len(meshes))
-    return SmoothParts(world, world_normals(world, [corner_normals(mesh) for mesh in meshes]))
+    world = place_meshes(meshes, [np.eye(4)] * len(meshes))
+    return SmoothParts(world, scene_normals(world, [corner_normals(mesh) for mesh in meshes]))
 
 
 def test_shadows_at_the_constant_rate_do_not_depend_on_the_rates_of_others(picture):
@@ -173,7 +173,7 @@ def test_objects_that_touch_stay_apart():
 
 def test_a_creased_edge_parts_the_surfaces_beside_it():
     box = Mesh(BOX, np.ravel(BOX_FACES).astype(np.int32), np.arange(0, 25, 4, dtype=np.int32))
-    world = place([box], [np.eye(4)])
-    sharp = SmoothParts(world, world_normals(world, [corner_normals(box, crease=0.5)]))
+    world = place_meshes([box], [np.eye(4)])
+    sharp = SmoothParts(world, scene_normals(world, [corner_normals(box, crease=0.5)]))
     a, b = np.zeros(12, np.int32), np.arange(12, dtype=np.int32)
     np.testing.assert_array_equal(sharp.joined(a, b), world.polygons == 0)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry, cofactors
+from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry
+from illumcli.geometry.transforms import cofactors
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
 from illumcli.records import Record
 from illumcli.visibility.baked import Baked

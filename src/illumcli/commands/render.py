@@ -24,8 +24,8 @@ from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.reports import sealed_json
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
+from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import ObjectBounds
 from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value

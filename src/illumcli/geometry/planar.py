@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, column_major, cross, dot, length, take_rows, unit
+from illumcli.geometry.bounds import transformed_vertices
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import area_vectors
-from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, moved
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.records import Record
 
 FLATNESS = 2.0**-10
@@ -136,7 +137,7 @@ def _candidates(world: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vecto
         vertex = mesh.corners[corner]
         firsts.append(first + placed.first_corner)
         sizes.append(size)
-        places.append(world.frame.from_world(take_rows(moved(mesh, placed.matrix), vertex)))
+        places.append(world.frame.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex)))
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), places[0], vertices[0]

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.planar import PlanarPolygons
-from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, cofactors
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
+from illumcli.geometry.transforms import cofactors
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
 from illumcli.rays.embree import Closest
 from illumcli.rays.offsets import effective_edge

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, take_or_all
 from illumcli.cache.store import Store, Stored
+from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import Repair
-from illumcli.geometry.scene_geometry import CornerVectors, ObjectBounds, PlacedMesh, SceneGeometry
+from illumcli.geometry.scene_geometry import CornerVectors, PlacedMesh, SceneGeometry
 from illumcli.graph import Node
 from illumcli.rays.interaction import Hits
 from illumcli.records import Record, Value

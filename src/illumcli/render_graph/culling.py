@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from illumcli.geometry.scene_geometry import ObjectBounds
+from illumcli.geometry.bounds import ObjectBounds
 from illumcli.graph import topological_order
 from illumcli.render_graph.build import SMOOTH, active_lights, rates
 from illumcli.render_graph.cached import Artifacts, Book

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.geometry.scene_geometry import ObjectBounds
+from illumcli.geometry.bounds import ObjectBounds
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Value
 from illumcli.render_graph.build import View

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
-from illumcli.geometry import planar
-from illumcli.geometry import scene_geometry as assemble
+from illumcli.geometry import bounds, planar, scene_geometry
+from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.mesh_checks import faults
 from illumcli.geometry.planar import PlanarPolygons
@@ -30,8 +30,9 @@ from illumcli.geometry.repairs import (
     located,
     note,
 )
-from illumcli.geometry.scene_geometry import CornerVectors, ObjectBounds, PolygonCentres, SceneGeometry
+from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
+from illumcli.geometry.transforms import cofactors, transform_matrix
 from illumcli.lights._base import Light
 from illumcli.rays import interaction as surface
 from illumcli.rays import sampling
@@ -101,10 +102,8 @@ def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
 
 def standing(transforms: tuple[Any, ...], meshes: tuple[Mesh, ...]) -> ObjectBounds:
     """Where every object stands, and the scene's centre and radius."""
-    matrices = [
-        assemble.transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)
-    ]
-    return assemble.stand(meshes, matrices)
+    matrices = [transform_matrix(transform, mesh) for transform, mesh in zip(transforms, meshes, strict=True)]
+    return bounds.object_bounds(meshes, matrices)
 
 
 Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], float | None]
@@ -116,7 +115,7 @@ def framed(
 ) -> Placement:
     """Where a camera stands whose picture the object of this number fills."""
     mesh = meshes[number]
-    points = assemble.among_used(mesh, assemble.moved(mesh, standing.matrices[number]))
+    points = bounds.take_used(mesh, bounds.transformed_vertices(mesh, standing.matrices[number]))
     made = framing(camera, aspect, points)
     return made.position, made.target, getattr(made, "extent", None)
 
@@ -126,7 +125,7 @@ def implied_widths(
 ) -> NDArray[np.float64]:
     """(O,) the widest polygon of each object whose normals imply another surface [scene units], else 0."""
     sizes = [
-        0.0 if own else assemble.widest_polygon(mesh, matrix)
+        0.0 if own else bounds.widest_polygon(mesh, matrix)
         for own, mesh, matrix in zip(flat, meshes, standing.matrices, strict=True)
     ]
     return np.array(sizes, np.float64)
@@ -135,14 +134,15 @@ def implied_widths(
 def left(unseen: tuple[int, ...], meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
     """The meshes, those of objects that nobody sees without their polygons."""
     return tuple(
-        assemble.without_polygons(mesh) if number in unseen else mesh for number, mesh in enumerate(meshes)
+        scene_geometry.without_polygons(mesh) if number in unseen else mesh
+        for number, mesh in enumerate(meshes)
     )
 
 
 def world(by_file: tuple[bool, ...], meshes: tuple[Mesh, ...], standing: ObjectBounds) -> SceneGeometry:
     """All triangles, placed, recentred and scaled to unit radius; `by_file` says of which objects the
     file's normals are used."""
-    return assemble.place(meshes, standing.matrices, standing.frame, by_file)
+    return scene_geometry.place_meshes(meshes, standing.matrices, standing.frame, by_file)
 
 
 def frame(standing: ObjectBounds) -> RenderSpace:
@@ -275,12 +275,12 @@ def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], world: SceneG
             else:
                 known[key] = of_mesh(mesh)
         own.append(known[key])
-    return assemble.world_normals(world, own)
+    return scene_geometry.scene_normals(world, own)
 
 
 def uvs(world: SceneGeometry) -> CornerVectors:
     """Texture coordinates of every corner."""
-    return assemble.world_uvs(world)
+    return scene_geometry.scene_uvs(world)
 
 
 def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
@@ -296,7 +296,7 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
 
 def polygon_centres(world: SceneGeometry) -> PolygonCentres:
     """The centre of every polygon."""
-    return assemble.polygon_centres(world)
+    return scene_geometry.polygon_centres(world)
 
 
 def polygon_normals(
@@ -307,7 +307,7 @@ def polygon_normals(
 
     parts = []
     for mesh, method, placed in zip(meshes, methods, world.placed, strict=True):
-        turned = of_mesh(mesh, method) @ assemble.cofactors(placed.matrix[:3, :3]).T
+        turned = of_mesh(mesh, method) @ cofactors(placed.matrix[:3, :3]).T
         size = np.linalg.norm(turned, axis=1, keepdims=True)
         sign: Any = -1 if placed.mirrored else 1
         if placed.reversed is not None:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, column_major, cross, dot, take_rows, unit
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import SceneGeometry, place, rotation
+from illumcli.geometry.scene_geometry import SceneGeometry, place_meshes
+from illumcli.geometry.transforms import rotation
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import SurfaceInteraction, facets
 from illumcli.rays.offsets import offset_ray_origins
@@ -92,9 +93,9 @@ def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
     matrix = rotation(2, 23.0) @ rotation(1, 41.0) @ rotation(0, 17.0)
     matrix[:3, 3] = away
     if not away:
-        return place([mesh], [matrix])
+        return place_meshes([mesh], [matrix])
     speck = Mesh.of_triangles(-np.eye(3) * 1e-4 - away, [[0, 1, 2]])
-    return place([mesh, speck], [matrix, np.eye(4)])
+    return place_meshes([mesh, speck], [matrix, np.eye(4)])
 
 
 def surface_points(

@@ -12,7 +12,7 @@ import numpy as np
 
 from illumcli.arrays import F, Floats, column_major
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import place
+from illumcli.geometry.scene_geometry import place_meshes
 from illumcli.rays.embree import tracer
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import hashed, stream, unit_interval
@@ -60,7 +60,7 @@ def obscured(inputs: Inputs) -> Estimate:
 
 def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
-    world = place([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
+    world = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     ng = column_major(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
     here = np.tile(world.frame.from_world(np.zeros(3)), (PATTERNS, 1))
     corners = around.vertices[around.triangles[0]]

@@ -1,0 +1,89 @@
+"""Bounding boxes: known before any object is triangulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.geometry.mesh import Mesh
+from illumcli.records import Record
+from illumcli.render_space import RenderSpace
+
+
+class ObjectBounds(Record):
+    """Transform, bounding box and size of each of O objects, and the render space that holds them all."""
+
+    matrices: tuple[NDArray[np.float64], ...]  # (4, 4) each, object to scene
+    low: NDArray[np.float64]  # (O, 3) lowest corner of what its polygons use [scene units]; inf without any
+    high: NDArray[np.float64]  # (O, 3) highest corner; -inf without polygons
+    polygons: NDArray[np.int64]  # (O,) number of polygons
+    frame: RenderSpace
+
+
+def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> ObjectBounds:
+    """The bounds of mesh i under matrix i.
+
+    The render space is centred in the box around them all and has half its diagonal as its radius.
+    """
+    # A box for each object.
+    low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
+    for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
+        if len(mesh.corners):
+            low[number], high[number] = box_corners(take_used(mesh, transformed_vertices(mesh, matrix)))
+
+    # The box around all of them; a point at the origin where there are no polygons.
+    lowest, highest = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
+    if not np.isfinite(lowest).all():
+        lowest, highest = np.zeros(3), np.zeros(3)
+    centre = (lowest + highest) / 2
+    radius = float(np.linalg.norm((highest - lowest) / 2)) or 1.0
+    frame = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+    polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
+    return ObjectBounds(tuple(matrices), low, high, polygons, frame)
+
+
+def box_corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner, (3,) each, of the box around (N, 3) points; the origin if there are none."""
+    if not len(points):
+        return np.zeros(3), np.zeros(3)
+    # a column at a time: along the other axis numpy goes three numbers at a time
+    low, high = ([reach(column) for column in points.T] for reach in (np.min, np.max))
+    return np.array(low), np.array(high)
+
+
+def take_used(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of one point per vertex of the mesh, (V, 3), those whose vertex some polygon uses."""
+    mask = used_vertices(mesh)
+    return points if mask.all() else points[mask]
+
+
+def used_vertices(mesh: Mesh) -> NDArray[np.bool_]:
+    """(V,) True for vertices that some polygon uses."""
+    mask = np.zeros(len(mesh.vertices), np.bool_)
+    mask[mesh.corners] = True
+    return mask
+
+
+def transformed_vertices(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(V, 3) vertices in the scene [scene units]."""
+    out: NDArray[np.float64] = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return out
+
+
+def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
+    """The largest diagonal of a polygon's bounding box [scene units].
+
+    0 for a mesh that is flat across one of its own axes and whose normals all point along it, as a floor is:
+    it stands for no curved surface.
+    """
+    if not mesh.polygon_count:
+        return 0.0
+    low, high = box_corners(take_used(mesh, mesh.vertices))
+    extends = low < high
+    if not extends.all() and (mesh.normals is None or not mesh.normals[:, extends].any()):
+        return 0.0
+    corners, first = transformed_vertices(mesh, matrix)[mesh.corners], mesh.starts[:-1]
+    size = np.maximum.reduceat(corners, first, axis=0) - np.minimum.reduceat(corners, first, axis=0)
+    return float(np.sqrt(np.square(size).sum(axis=1).max()))

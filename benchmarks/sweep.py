@@ -70,10 +70,11 @@ def main() -> None:
 def swept(count: int, cold: int) -> None:
     """A sweep of one material parameter: variants against the first render, bytes against cold ones."""
     from illumcli.commands.render import run as render
-    from illumcli.commands.sweep import run, variants_of
+    from illumcli.commands.sweep import sweep_scene
+    from illumcli.scene.variants import variants_of
 
     axis = f"materials.subject.exponent=4:256:{count}log"
-    done = run(Path("scene.yaml"), variants_of([axis]))
+    done = sweep_scene(Path("scene.yaml"), variants_of([axis]))
     took = [outcome.report.total_seconds for outcome in done.outcomes if outcome.report]
     rays = [sum(outcome.report.rays.values()) for outcome in done.outcomes if outcome.report]
     rest = took[1:]

@@ -9,8 +9,11 @@ import pytest
 from illumcli.accuracy import convergence, convergence_report
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
-from illumcli.commands import render, render_all, sweep
+from illumcli.commands import render, render_all
+from illumcli.commands.sweep import sweep_scene
+from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import OutputError
+from illumcli.scene.variants import variants_of
 
 
 def picture(folder, name):
@@ -50,10 +53,10 @@ def swept(folder, name):
 
     def make(force=False):
         pattern = str(folder / "o" / "{ambient}.png")
-        settings = sweep.Settings(pattern=pattern, only=("beauty",), cache=False, force=force, threads=1)
-        files = sweep.Files(**{name.partition(".")[0]: folder / name})
-        variants = sweep.variants_of(["ambient=0.1,0.2", "film.width=16", "film.height=12"])
-        return list(map(str, sweep.run(folder / "scene.yaml", variants, settings, files).kept))
+        settings = render_all.Settings(pattern=pattern, only=("beauty",), cache=False, force=force, threads=1)
+        files = SweepFiles(**{name.partition(".")[0]: folder / name})
+        variants = variants_of(["ambient=0.1,0.2", "film.width=16", "film.height=12"])
+        return list(map(str, sweep_scene(folder / "scene.yaml", variants, settings, files).kept))
 
     return make
 

@@ -125,20 +125,23 @@ def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(py
 
 def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path):
     """One column of 60,000 pixels makes cells of 15 million; 90,000 variants make as many cells."""
-    from illumcli.commands.sweep import Settings, run, variants_of
-    from illumcli.commands.sweep_files import Files
+    from illumcli.commands.render_all import Settings
+    from illumcli.commands.sweep import sweep_scene
+    from illumcli.commands.sweep_files import SweepFiles
+    from illumcli.scene.variants import variants_of
 
     start = "version: 1\nambient: 1\nobjects: [{mesh: {shape: box}}]\n"
     (tmp_path / "s.yaml").write_text(f"{start}film: {{width: 1, height: 60000, samples: 1}}\n")
     settings = Settings(pattern=str(tmp_path / "{seed}.png"), cache=False)
+    files = SweepFiles(sheet=tmp_path / "sheet.png")
     with pytest.raises(LimitError, match="a sheet of 8 pictures, 256 x 15360000 pixels each: takes about"):
-        run(tmp_path / "s.yaml", variants_of(["seed=1:8:8"]), settings, Files(sheet=tmp_path / "sheet.png"))
+        sweep_scene(tmp_path / "s.yaml", variants_of(["seed=1:8:8"]), settings, files)
     assert not list(tmp_path.glob("*.png"))
 
 
 @pytest.mark.parametrize("said", ["9" * 5000, "\u00b2"])
 def test_references_are_numbers_of_variants_or_files(tmp_path, said):
-    from illumcli.commands.sweep_files import reference_of
+    from illumcli.commands.sweep_reference import reference_of
 
     with pytest.raises(InputError):
         reference_of(said, [])

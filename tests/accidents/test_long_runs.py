@@ -10,7 +10,9 @@ SLOW = pytest.mark.slow
 SWEEP = """
 import gc, json, os, sys
 from pathlib import Path
-from illumcli.commands import sweep
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
+from illumcli.scene.variants import variants_of
 from illumcli.render_graph import cached as artifacts
 
 count = int(sys.argv[1])
@@ -26,12 +28,12 @@ def written(outcome):
     states.append(state())
 
 gc.disable()
-variants = sweep.variants_of([f"camera.position.0=1:2:{count}"])
-settings = sweep.Settings(pattern="out/{camera.position.0}.png", force=True, only=("beauty",))
+variants = variants_of([f"camera.position.0=1:2:{count}"])
+settings = Settings(pattern="out/{camera.position.0}.png", force=True, only=("beauty",))
 for again in range(2):
     states = []
-    done = sweep.run(Path("scene.yaml"), variants, settings, written=written)
-    assert done.warnings == [], done.warnings
+    done = sweep_scene(Path("scene.yaml"), variants, settings, written=written)
+    assert done.warnings == (), done.warnings
     for outcome in done.outcomes:
         assert not again or outcome.report.rays == {}, outcome.report.rays
 print(json.dumps(states))

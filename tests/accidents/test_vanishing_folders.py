@@ -10,9 +10,10 @@ from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render
 from illumcli.commands.render_all import Settings
-from illumcli.commands.sweep import Files, variants_of
-from illumcli.commands.sweep import run as sweep
+from illumcli.commands.sweep import sweep_scene
+from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import OutputError
+from illumcli.scene.variants import variants_of
 
 SMALL = ["film.width=24", "film.height=16"]
 
@@ -44,8 +45,8 @@ def test_of_a_sweep(folder, what):
     def gone(outcome):
         shutil.rmtree(folder / "new", ignore_errors=True)
 
-    files = Files(**{what: folder / f"all.{'png' if what == 'sheet' else 'csv'}"})
+    files = SweepFiles(**{what: folder / f"all.{'png' if what == 'sheet' else 'csv'}"})
     settings = Settings(pattern=str(folder / "new" / "{ambient}.png"), cache=False, only=("beauty",))
     variants = variants_of(["ambient=0.1,0.2", *SMALL])
     with pytest.raises(OutputError, match="others took it away"):
-        sweep(folder / "scene.yaml", variants, settings, files, written=gone)
+        sweep_scene(folder / "scene.yaml", variants, settings, files, written=gone)

@@ -9,9 +9,12 @@ import re
 
 import pytest
 
-from illumcli.commands.sweep import Files, Settings, at_frame, axis_of, run, split, variants_of
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
+from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import InputError, LimitError, OutputError
 from illumcli.images.reader import read_image
+from illumcli.scene.variants import at_frame, axis_of, split_at_commas, variants_of
 
 SCENE = """
 version: 1
@@ -82,7 +85,7 @@ def test_tables_of_variants_have_limits(tmp_path, monkeypatch):
     table.write_text("a\n" + "1" * 200_000 + "\n")
     with pytest.raises(InputError, match=r"rows\.csv: cannot be read: field larger"):
         variants_of([], rows=table)
-    monkeypatch.setattr("illumcli.commands.sweep.MOST_BYTES", 10)
+    monkeypatch.setattr("illumcli.scene.variants.MAX_TABLE_BYTES", 10)
     with pytest.raises(LimitError, match="larger than 10 bytes"):
         variants_of([], rows=table)
 
@@ -105,12 +108,12 @@ def test_names_that_are_equal_by_their_pattern_are_told_without_reading_a_scene(
     tmp_path, words, pattern, said
 ):
     with pytest.raises(InputError, match=re.escape(said)):
-        run(tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), Settings(pattern=pattern))
+        sweep_scene(tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), Settings(pattern=pattern))
 
 
 def test_equal_values_that_go_with_others_are_variants(scene, tmp_path):
     variants = variants_of(["film.exposure=0,0", "seed=1,2"], together=True)
-    done = run(scene, variants, Settings(pattern=str(tmp_path / "{seed}.png")))
+    done = sweep_scene(scene, variants, Settings(pattern=str(tmp_path / "{seed}.png")))
     assert len(done.outcomes) == 2
 
 
@@ -162,7 +165,7 @@ def test_formulas_compute_and_do_nothing_else():
 
 
 def test_commas_inside_brackets_and_quotes_part_nothing():
-    assert split("f(a,b),[c,d],'e,f',g") == ["f(a,b)", "[c,d]", "'e,f'", "g"]
+    assert split_at_commas("f(a,b),[c,d],'e,f',g") == ["f(a,b)", "[c,d]", "'e,f'", "g"]
 
 
 def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
@@ -232,10 +235,10 @@ def test_pictures_that_vanish_before_the_table_is_written_are_exit_5(scene, tmp_
             path.unlink()
 
     variants = variants_of(["materials.clay.specular=0.1,0.2"])
-    files = Files(table=tmp_path / "t.csv")
+    files = SweepFiles(table=tmp_path / "t.csv")
     settings = Settings(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
     with pytest.raises(OutputError, match="others took it away"):
-        run(scene, variants, settings, files, written=gone)
+        sweep_scene(scene, variants, settings, files, written=gone)
 
 
 def test_a_moving_light_casts_its_own_rays_alone(illum, scene, tmp_path):
@@ -252,7 +255,7 @@ def test_what_has_an_effect_in_some_variant_is_not_told(scene, tmp_path):
     variants = variants_of(
         ["ambient=0,0.2", "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"]
     )
-    done = run(scene, variants, Settings(pattern=str(tmp_path / "{ambient}.png"), cache=False))
+    done = sweep_scene(scene, variants, Settings(pattern=str(tmp_path / "{ambient}.png"), cache=False))
     assert len(done.warnings) == 1
     assert "a single sample looks" in done.warnings[0]
 

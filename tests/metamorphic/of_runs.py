@@ -13,13 +13,16 @@ from unittest.mock import patch
 import numpy as np
 
 from illumcli.cache.store import Store
-from illumcli.commands import render, sweep
+from illumcli.commands import render
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
 from illumcli.images.reader import read_image
 from illumcli.render_graph import cached as artifacts
 from illumcli.render_graph.cached import Memory
 from illumcli.render_graph.execute import RenderStats, at_pixels, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
+from illumcli.scene.variants import Variant
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, pictures, same
 from metamorphic.premises import UNDRAWN, at_centres, fixed_samples, one_camera, without_rays
 from metamorphic.relation import relation
@@ -259,11 +262,11 @@ def a_sweep_is_as_many_renders(case: Case, random: Random, studio: Studio) -> No
     folder = studio.folder()
     path = case.write(folder)
     rows = [dict(text.split("=", 1) for text in change(case, random)) for _ in range(3)]
-    variants = [sweep.Variant(values, frame) for frame, values in enumerate(rows)]
+    variants = [Variant(values, frame) for frame, values in enumerate(rows)]
     layers = (*ALL, "lights", "shadows")
     keep = random.random() < 0.5
     pattern = str(folder / "swept{frame}.exr")
-    made = sweep.run(path, variants, sweep.Settings(pattern=pattern, only=layers, threads=1, cache=keep))
+    made = sweep_scene(path, variants, Settings(pattern=pattern, only=layers, threads=1, cache=keep))
     for variant, outcome in zip(variants, made.outcomes, strict=True):
         alone = folder / f"alone{variant.frame}.exr"
         render.run(path, variant.overrides, str(alone), layers, threads=1, cache=False)

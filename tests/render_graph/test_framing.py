@@ -11,8 +11,8 @@ from illumcli.accuracy.sampled import subject
 from illumcli.cache.store import Store, default_folder
 from illumcli.commands import plan as plan_job
 from illumcli.commands.render import run
-from illumcli.commands.sweep import Settings, variants_of
-from illumcli.commands.sweep import run as sweep
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
 from illumcli.errors import InputError
 from illumcli.images.reader import read_image
 from illumcli.rays.camera import MARGIN
@@ -21,6 +21,7 @@ from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.framing import framed
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
+from illumcli.scene.variants import variants_of
 
 SCENE = """
 version: 1
@@ -95,7 +96,7 @@ def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
 
 def test_a_sweep_places_its_cameras(scene, tmp_path):
     variants = variants_of(["camera.fov=10,50"])
-    done = sweep(scene, variants, Settings(pattern="{camera.fov}.exr", cache=False))
+    done = sweep_scene(scene, variants, Settings(pattern="{camera.fov}.exr", cache=False))
     assert [outcome.error for outcome in done.outcomes] == [None, None]
     for name in ("10", "50"):
         rows, _ = rows_and_columns(tmp_path / f"{name}.exr")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from illumcli.commands.render import run
-from illumcli.commands.sweep import Settings, variants_of
-from illumcli.commands.sweep import run as sweep
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
+from illumcli.scene.variants import variants_of
 
 SCENE = """version: 1
 film: {width: 40, height: 30, samples: 1}
@@ -78,7 +79,7 @@ def test_what_is_small_in_the_picture_is_not_told(told):
 
 def test_a_sweep_says_it_once(told, tmp_path):
     (tmp_path / "s.yaml").write_text(sized(1e6))
-    done = sweep(
+    done = sweep_scene(
         tmp_path / "s.yaml", variants_of(["seed=1,2,3"]), Settings(pattern="{seed}.exr", cache=False)
     )
     assert len(done.warnings) == 1

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from illumcli.cache.store import Store
 from illumcli.commands.render import run
-from illumcli.commands.sweep import Settings, variants_of
-from illumcli.commands.sweep import run as sweep
+from illumcli.commands.render_all import Settings
+from illumcli.commands.sweep import sweep_scene
 from illumcli.geometry.bounds import object_bounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.layers import NAMES
@@ -22,6 +22,7 @@ from illumcli.render_graph.culling import unseen_objects, why_all, without
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan, reusing
 from illumcli.scene.load import load
+from illumcli.scene.variants import variants_of
 from illumcli.visibility.culling import (
     GROUPED_BOXES,
     LARGE_BOXES,
@@ -174,7 +175,7 @@ def test_the_job_counts_and_names_them(scene, tmp_path, monkeypatch):
 
 def test_a_sweep_shares_what_remains(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = sweep(scene, variants_of(["materials.red.exponent=3,9,27"]), Settings(cache=False))
+    done = sweep_scene(scene, variants_of(["materials.red.exponent=3,9,27"]), Settings(cache=False))
     rays = [sum(outcome.report.rays.values()) for outcome in done.outcomes]
     assert rays[0] > 0
     assert rays[1:] == [0, 0]

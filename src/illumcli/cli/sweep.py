@@ -19,7 +19,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.commands.sweep import Outcome
+    from illumcli.commands.sweep_outcome import Outcome
 
 _FILE = click.Path(path_type=Path)
 
@@ -93,8 +93,11 @@ def sweep(
       illum sweep scene.yaml --frames 0:119 -D 'camera.position=[4*cos(frame*pi/60), 1, 4*sin(frame*pi/60)]'
     """
     from illumcli.cli._progress import reporter
-    from illumcli.commands import sweep as job
+    from illumcli.commands.render_all import Settings
+    from illumcli.commands.sweep import sweep_scene
+    from illumcli.commands.sweep_files import SweepFiles
     from illumcli.render_graph.repairs import repair_lines
+    from illumcli.scene.variants import variants_of
 
     said: set[str] = set()
 
@@ -116,13 +119,13 @@ def sweep(
 
     if reference is not None and table is None:
         raise click.UsageError("--reference is what the errors of --table are against; give --table")
-    variants = job.variants_of(overrides, together, rows, frames)
-    settings = job.Settings(
+    variants = variants_of(overrides, together, rows, frames)
+    settings = Settings(
         pattern=pattern, only=only, seed=seed, threads=threads, force=force, cache=cache, strict=strict,
         keep_going=keep_going,
     )  # fmt: skip
-    files = job.Files(sheet, table, report, reference)
-    done = job.run(scene, variants, settings, files, reporter(quiet), written)
+    files = SweepFiles(sheet, table, report, reference)
+    done = sweep_scene(scene, variants, settings, files, reporter(quiet), written)
     for warning in done.warnings:
         click.echo(warning, err=True)
     for kept in done.kept if not quiet else []:

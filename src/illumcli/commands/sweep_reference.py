@@ -1,0 +1,124 @@
+"""The image that `--reference` names: what errors in the table of a sweep are against."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.cache.fingerprint import file_digest
+from illumcli.commands.render import Work, channels
+from illumcli.commands.sweep_outcome import Outcome
+from illumcli.errors import InputError, OutputError
+from illumcli.records import Record, Value
+
+MAX_DIGITS = 9
+"""Digits of a variant's number; a longer text is the name of a file."""
+
+
+class Reference(Record):
+    """An image that others are compared with."""
+
+    content: str
+    number: int | None = None
+    """Of the variant whose image it is."""
+    pixels: NDArray[np.float32] | None = None
+    """(H, W, 1 or 3) of another image."""
+
+
+class _Kind(Value):
+    """What two images must have in common to be compared."""
+
+    height: int
+    width: int
+    channels: int
+    encoded: bool  # display values; else linear light
+
+
+def reference_of(text: str, outcomes: Sequence[Outcome]) -> Reference:
+    """The image that `--reference` names: a variant's first one, by its number or its file, or another image.
+
+    Raises
+    ------
+    InputError
+        It is not there, is no image, or differs in size or kind from that of some variant.
+    """
+    works = {outcome.number: outcome.work for outcome in outcomes if outcome.work is not None}
+    number = _variant_number(text, len(outcomes), works)
+    if number is not None:
+        work = works[number]
+        kind, reference = _kind(work), Reference(work.targets[0].content, number)
+    else:
+        pixels, encoded = colors(Path(text))
+        height, width, count = pixels.shape
+        kind, reference = (
+            _Kind(height, width, count, encoded),
+            Reference(file_digest(Path(text)), None, pixels),
+        )
+    for work in works.values():
+        if fault := _difference(_kind(work), kind):
+            name = f"--reference {text}: {work.targets[0].path}"
+            raise InputError(f"{name} {fault}; take a picture of the same kind and size")
+    return reference
+
+
+def _variant_number(text: str, count: int, works: dict[int, Work]) -> int | None:
+    """The number of the variant that `text` names; None where it names another file."""
+    if text.isascii() and text.isdecimal() and len(text) <= MAX_DIGITS:
+        number = int(text)
+        if not 1 <= number <= count:
+            raise InputError(f"--reference {text}: there are variants 1 to {count}")
+        if number not in works:
+            raise InputError(f"--reference {text}: this variant has a fault; take another")
+        return number
+    return next((each for each, work in works.items() if work.targets[0].path == Path(text)), None)
+
+
+def _kind(work: Work) -> _Kind:
+    """Of a variant's first image."""
+    target = work.targets[0]
+    count = _channel_count(channels(work.scene, target))
+    return _Kind(target.view.height, target.view.width, count, target.path.suffix.lower() == ".png")
+
+
+def _difference(kind: _Kind, reference: _Kind) -> str:
+    """How an image differs from the reference; empty where both can be compared."""
+    if (kind.height, kind.width) != (reference.height, reference.width):
+        size = f"{reference.width} x {reference.height}"
+        return f"is {kind.width} x {kind.height}, the reference {size}"
+    if kind.channels != reference.channels:
+        return f"has {kind.channels} channels, the reference {reference.channels}"
+    if kind.encoded != reference.encoded:
+        kinds = "linear light", "display values"
+        return f"holds {kinds[kind.encoded]}, the reference {kinds[reference.encoded]}"
+    return ""
+
+
+def _channel_count(names: Collection[str]) -> int:
+    return 3 if {"R", "G", "B"} <= set(names) else 1
+
+
+def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
+    """(H, W, 3) R, G and B of an image, or (H, W, 1) its first channel where it has none, and
+    whether they are encoded."""
+    from illumcli.images.reader import read_image
+
+    image = read_image(path)
+    names = ("R", "G", "B") if _channel_count(image.channels) == 3 else (next(iter(image.channels)),)
+    return np.stack([image.channels[name] for name in names], axis=-1), image.encoded
+
+
+def written_colors(path: Path) -> tuple[NDArray[np.float32], bool]:
+    """`colors` of an image that this sweep wrote.
+
+    Raises
+    ------
+    OutputError
+        It is no longer there.
+    """
+    try:
+        return colors(path)
+    except InputError as error:
+        raise OutputError(f"{path}: was written, and others took it away; run the sweep again") from error

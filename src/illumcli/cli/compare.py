@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from illumcli.cli._options import quiet_option
+
+if TYPE_CHECKING:
+    from illumcli.commands.compare import Comparison
+    from illumcli.images.comparison import LayerDifference
 
 _FILE = click.Path(path_type=Path)
 _EPILOG = """\b
@@ -59,21 +64,61 @@ def compare(
     """
     import json
 
-    from illumcli.commands.compare import as_data, as_table, check, run
+    from illumcli.commands.compare import compare_images, refuse_beyond_limits
 
     limits = {name: bound for name, bound in bounds.items() if bound is not None}
     if no_flip and "max_flip" in limits:
         raise click.UsageError("--max-flip needs FLIP; leave --no-flip out")
-    comparison = run(reference, test, names, not no_flip, heat, force)
+    comparison = compare_images(reference, test, names, not no_flip, heat, force)
     if comparison.heat_is_kept and not quiet:
         click.echo(f"{heat}: kept, its content is the same", err=True)
     if as_json:
-        click.echo(json.dumps(as_data(comparison), indent=2))
+        click.echo(json.dumps(comparison.as_data(), indent=2))
     else:
-        click.echo(as_table(comparison))
+        click.echo(comparison_table(comparison))
         if heat is not None:
             layer = comparison.layers[0].name
             click.echo(
                 f"{heat}: {layer}, black is 0, pale yellow is {comparison.heat_scale:.6g}, cyan is NaN"
             )
-    check(comparison, limits)
+    refuse_beyond_limits(comparison, limits)
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """A line per layer, and the channels that only one image has."""
+    from illumcli.tables import aligned
+
+    titles = (
+        "layer",
+        "channels",
+        "RMSE",
+        "rel. MSE",
+        "MAE",
+        "PSNR",
+        "FLIP",
+        "largest",
+        "at x, y",
+        "not finite",
+    )
+    lines = aligned([titles, *(_row(layer) for layer in comparison.layers)])
+    for path, only in (
+        (comparison.reference, comparison.only_in_reference),
+        (comparison.test, comparison.only_in_test),
+    ):
+        if only:
+            lines.append(f"only in {path}: {', '.join(only)}")
+    return "\n".join(lines)
+
+
+def _row(layer: LayerDifference) -> tuple[str, ...]:
+    difference, (x, y, channel) = layer.difference, layer.place
+    measures = (difference.rmse, difference.relative_mse, difference.mae, difference.psnr)
+    return (
+        layer.name,
+        " ".join(name.rpartition(".")[2] for name in layer.channels),
+        *(f"{value:.4g}" for value in measures),
+        "-" if layer.flip is None else f"{layer.flip:.4g}",
+        f"{difference.largest:.4g}",
+        f"{x}, {y} {channel.rpartition('.')[2]}" if difference.largest else "-",
+        str(difference.not_finite),
+    )

@@ -6,7 +6,8 @@ import random
 
 import pytest
 
-from illumcli.accuracy import convergence, convergence_report
+from illumcli.accuracy.convergence import ConvergenceSettings, measure_convergence
+from illumcli.accuracy.convergence_files import ConvergenceFiles
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render, render_all
@@ -65,14 +66,15 @@ def curves(folder, name):
     """The table or drawing of `converge`, of a small measurement."""
     if not name.endswith(".csv"):
         pytest.importorskip("matplotlib")
-    found = convergence.run(folder / "scene.yaml", first=4, last=8, samplers=("spiral",), repeats=1, width=16)
+    settings = ConvergenceSettings(first=4, last=8, samplers=("spiral",), repeats=1, width=16)
+    found = measure_convergence(folder / "scene.yaml", settings)
     contents = [run.content for curve in found.curves for point in curve.points for run in point.runs]
 
     def make(force=False):
         path = folder / name
         table, picture = (path, None) if path.suffix == ".csv" else (None, path)
-        outputs = convergence_report.Outputs(table, picture, force)
-        outputs.check(contents)
+        outputs = ConvergenceFiles(table, picture, force)
+        outputs.look(contents)
         outputs.write(found)
         return list(map(str, outputs.kept))
 

@@ -9,10 +9,11 @@ import math
 import numpy as np
 import pytest
 
-from illumcli.accuracy import convergence as converge
-from illumcli.accuracy.convergence import curve, line, point, referred, rmse_of, run
-from illumcli.accuracy.convergence_report import as_table, drawn
-from illumcli.accuracy.sampled import Sampling, subject
+from illumcli.accuracy.convergence import ConvergenceSettings, measure_convergence
+from illumcli.accuracy.convergence_table import convergence_table, text_plot
+from illumcli.accuracy.curves import Run, curve_through, fit_line, point_of, rmse_of
+from illumcli.accuracy.reference import reference_image
+from illumcli.accuracy.sampled import Sampling, sampled_layer
 from illumcli.errors import InputError
 from illumcli.scene.load import load
 
@@ -34,15 +35,19 @@ def scene(tmp_path, monkeypatch):
     return path
 
 
+def run(path, **settings):
+    return measure_convergence(path, ConvergenceSettings(**settings))
+
+
 def test_line_finds_slope_and_its_error():
     exact = [(x, 3 - 0.75 * x) for x in (1.0, 2.0, 4.0)]
-    assert line(exact) == pytest.approx((-0.75, 0, 3), abs=1e-7)
+    assert fit_line(exact) == pytest.approx((-0.75, 0, 3), abs=1e-7)
     # y = x with one point off by 1: slope 1/2, residuals 1/6, -1/3, 1/6
-    slope, error, constant = line([(0, 0), (1, 0), (2, 1)])
+    slope, error, constant = fit_line([(0, 0), (1, 0), (2, 1)])
     assert (slope, constant) == pytest.approx((0.5, -1 / 6))
     assert error == pytest.approx(math.sqrt((1 / 36 + 1 / 9 + 1 / 36) / 1 / 2))
-    assert all(math.isnan(value) for value in line([(1, 2), (1, 3)]))
-    assert all(math.isnan(value) for value in line([]))
+    assert all(math.isnan(value) for value in fit_line([(1, 2), (1, 3)]))
+    assert all(math.isnan(value) for value in fit_line([]))
 
 
 def test_the_references_own_error_is_taken_off():
@@ -55,9 +60,9 @@ def test_the_references_own_error_is_taken_off():
 
 def test_the_reference_errs_as_it_says(scene):
     fine = Sampling(1, 16, "spiral", 0)
-    own = subject(load(scene), "obscurance", threads=1)
-    truth, said = referred(own, fine, "obscurance", None)
-    much_finer, _ = referred(own, Sampling(1, 512, "spiral", 0), "obscurance", None)
+    own = sampled_layer(load(scene), "obscurance", threads=1)
+    truth, said = reference_image(own, fine, "obscurance", None)
+    much_finer, _ = reference_image(own, Sampling(1, 512, "spiral", 0), "obscurance", None)
     assert math.sqrt(np.square(truth - much_finer).mean()) == pytest.approx(said.rmse, rel=0.1)
     assert said.sampling.seed not in {r.seed for r in _runs(scene)}
 
@@ -96,13 +101,15 @@ def test_errors_are_the_same_for_any_threads_and_the_reference_is_kept(scene):
     assert [p.rmse for p in once.curves[0].points] == [p.rmse for p in again.curves[0].points]
     assert (once.reference.reused, again.reference.reused) == (False, True)
     assert once.reference.rmse == again.reference.rmse
-    other = run(scene, ["objects.0.mesh.minor=0.2"], first=4, last=8, samplers=("spiral",), repeats=1)
+    other = run(
+        scene, overrides=("objects.0.mesh.minor=0.2",), first=4, last=8, samplers=("spiral",), repeats=1
+    )
     assert not other.reference.reused
 
 
 def test_what_cannot_be_measured_is_refused(scene):
     for words, fact in (
-        ({"overrides": ["obscurance=null"], "vary": "obscurance"}, "no obscurance to vary"),
+        ({"overrides": ("obscurance=null",), "vary": "obscurance"}, "no obscurance to vary"),
         ({"vary": "obscurance", "layer": "light:point1"}, "no layer"),
         ({"vary": "obscurance", "layer": "point1"}, "casts no obscurance ray"),
         ({"vary": "pixels", "layer": "depth"}, "no mean"),
@@ -115,10 +122,10 @@ def test_what_cannot_be_measured_is_refused(scene):
 
 
 def test_a_single_level_of_no_error_has_no_slope():
-    still = curve("spiral", [point(Sampling(1, 4, "spiral", 0), 4, [converge.Run(0, 1, 10, 0.1, 0.0, "")])])
+    still = curve_through("spiral", [point_of(Sampling(1, 4, "spiral", 0), 4, [Run(0, 1, 10, 0.1, 0.0, "")])])
     assert math.isnan(still.slope)
     assert math.isnan(still.count_for(0.1))
-    assert drawn([still]) == "no error to draw"
+    assert text_plot([still]) == "no error to draw"
 
 
 def test_the_command_prints_writes_and_draws(illum, scene, tmp_path):
@@ -145,5 +152,7 @@ def test_the_command_prints_writes_and_draws(illum, scene, tmp_path):
 
 def test_the_drawing_has_a_mark_per_point(scene):
     found = run(scene, first=4, last=16, samplers=("spiral",), repeats=1)
-    assert drawn(found.curves).partition("RMSE")[0].count("o") == 3
-    assert "-  " in as_table(found) or " -\n" in as_table(found)  # no spread from a single repeat
+    assert text_plot(found.curves).partition("RMSE")[0].count("o") == 3
+    assert "-  " in convergence_table(found) or " -\n" in convergence_table(
+        found
+    )  # no spread from a single repeat

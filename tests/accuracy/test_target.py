@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy import target
-from illumcli.accuracy.sampled import Sampling, subject
-from illumcli.accuracy.target import Law, chosen, pair
+from illumcli.accuracy.sampled import Sampling, sampled_layer
+from illumcli.accuracy.target import VarianceLaw, choose_sampling, paired_error
 from illumcli.errors import InputError, LimitError
 from illumcli.scene.load import load
 
@@ -32,16 +32,16 @@ def scene(tmp_path):
 
 
 def true_rmse(path, choice, layer="beauty"):
-    own = subject(load(path), layer)
+    own = sampled_layer(load(path), layer)
     fine = Sampling(32, 32, "owen", 77)
-    truth = np.mean([own.picture(fine)[0], own.picture(Sampling(32, 32, "owen", 78))[0]], axis=0, dtype=float)
-    made = own.picture(Sampling(choice.sampling.pixel, choice.sampling.obscurance, "spiral", 0))[0]
+    truth = np.mean([own.render(fine)[0], own.render(Sampling(32, 32, "owen", 78))[0]], axis=0, dtype=float)
+    made = own.render(Sampling(choice.sampling.pixel, choice.sampling.obscurance, "spiral", 0))[0]
     return math.sqrt(np.square(made - truth).mean())
 
 
 @pytest.mark.parametrize("error", [0.04, 0.02])
 def test_the_picture_errs_as_asked_and_says_so(scene, error):
-    choice = chosen(scene, error)
+    choice = choose_sampling(scene, error)
     truth = true_rmse(scene, choice)
     assert choice.expected <= error
     assert truth < 1.15 * error
@@ -52,42 +52,42 @@ def test_the_picture_errs_as_asked_and_says_so(scene, error):
 def test_200_doubled_pixels_tell_the_error_of_a_picture(scene, monkeypatch):
     monkeypatch.setattr(target, "PIXELS", 200)
     monkeypatch.setattr(target, "SHARE", 10**9)
-    own = subject(load(scene), "obscurance")
-    every = [pair(own, Sampling(1, 8, "spiral", 0), f"try {k}")[0] for k in range(12)]
-    truth = own.picture(Sampling(1, 2048, "owen", 4))[0].astype(float)
-    pictures = [own.picture(Sampling(1, 8, "spiral", seed))[0] for seed in range(8)]
+    own = sampled_layer(load(scene), "obscurance")
+    every = [paired_error(own, Sampling(1, 8, "spiral", 0), f"try {k}")[0] for k in range(12)]
+    truth = own.render(Sampling(1, 2048, "owen", 4))[0].astype(float)
+    pictures = [own.render(Sampling(1, 8, "spiral", seed))[0] for seed in range(8)]
     error = math.sqrt(np.mean([np.square(picture - truth).mean() for picture in pictures]))
     assert math.sqrt(np.mean(every)) == pytest.approx(error, rel=0.1)
     assert np.std(np.sqrt(every)) < 0.15 * np.mean(np.sqrt(every))
 
 
 def test_laws_go_through_their_points():
-    law = Law.through((4, 0.04), (16, 0.005))
+    law = VarianceLaw.through((4, 0.04), (16, 0.005))
     assert law.power == pytest.approx(1.5)
     assert (law.at(4), law.at(16)) == pytest.approx((0.04, 0.005))
-    assert Law.through((4, 0.0), (16, 0.0)).at(2) == 0
-    assert Law.through((4, 1.0), (16, 2.0)).power == 1  # never taken to grow with samples
+    assert VarianceLaw.through((4, 0.0), (16, 0.0)).at(2) == 0
+    assert VarianceLaw.through((4, 1.0), (16, 2.0)).power == 1  # never taken to grow with samples
 
 
 def test_pilots_share_no_random_number_with_the_picture(scene, monkeypatch):
     seeds = []
-    own = subject(load(scene), "beauty")
+    own = sampled_layer(load(scene), "beauty")
     monkeypatch.setattr(
         type(own),
-        "pixels",
+        "render_pixels",
         lambda self, sampling, x, y: (seeds.append(sampling.seed), (np.zeros((3, 1)), 0))[1],
     )
     for k in range(3):
-        pair(own, Sampling(2, 4, "spiral", 0), f"check {k}")
+        paired_error(own, Sampling(2, 4, "spiral", 0), f"check {k}")
     assert 0 not in seeds
     assert len(set(seeds)) == 6 * target.SEEDS
 
 
 def test_nothing_to_reach_and_too_much(scene):
     with pytest.raises(InputError, match="nothing to reach"):
-        chosen(scene, 0.01, only=["depth"])
+        choose_sampling(scene, 0.01, only=["depth"])
     with pytest.raises(LimitError, match="aim for a larger"):
-        chosen(scene, 1e-9)
+        choose_sampling(scene, 1e-9)
 
 
 def test_the_command_chooses_renders_and_reports(illum, scene, tmp_path):

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from illumcli.accuracy.sampled import subject
+from illumcli.accuracy.sampled import sampled_layer
 from illumcli.cache.store import Store, default_folder
 from illumcli.commands import plan as plan_job
 from illumcli.commands.render import run
@@ -105,7 +105,7 @@ def test_a_sweep_places_its_cameras(scene, tmp_path):
 
 def test_a_view_that_is_measured_is_placed_too(scene):
     loaded = load(scene)
-    own = subject(loaded, "beauty")
+    own = sampled_layer(loaded, "beauty")
     assert own.view.camera == framed(plan(loaded.scene, loaded), Artifacts(), RenderStats()).views[0].camera
 
 

@@ -1,1 +1,1 @@
-"""Error against time: how far off a picture is, and how finely to sample for a given error."""
+"""Error against time: how far an image is from its limit, and how finely to sample for a given error."""

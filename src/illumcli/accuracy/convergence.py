@@ -1,100 +1,64 @@
-"""Run time against error: a layer at doubling samples, beside a reference that other random numbers made.
-
-References
-----------
-Efron, B. and Tibshirani, R. (1993). An Introduction to the Bootstrap: two halves of a sample tell its error.
-"""
+"""Run time against error: a layer at doubling samples, beside a reference from other random numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from statistics import median
-from typing import Any, Literal, TypeAlias
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, TypeAlias
 
 from illumcli import __version__
-from illumcli.accuracy.sampled import Sampler, Sampling, Subject, subject
-from illumcli.cache.fingerprint import digest
-from illumcli.cache.store import Store
+from illumcli.accuracy.curves import Curve, Run, curve_through, point_of, rmse_of
+from illumcli.accuracy.reference import Reference, Vary, reference_image, run_content
+from illumcli.accuracy.sampled import SampledLayer, Sampler, Sampling, sampled_layer
 from illumcli.commands.render import opened_store, versions
 from illumcli.errors import InputError
+from illumcli.progress import Progress, no_progress
 from illumcli.rays.sampling import stream
 from illumcli.records import Value
-from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 
-Vary: TypeAlias = Literal["obscurance", "pixels", "both"]
-Progress = Callable[[str, int, int], None]
-
 SAMPLERS: tuple[Sampler, ...] = ("spiral", "owen", "random")
-PICTURES = 5
-"""Whole pictures that are held at once, in double precision."""
+IMAGES = 5
+"""Images that are held at once, in double precision."""
 DOUBLED: dict[Vary, tuple[int, int]] = {"obscurance": (4, 256), "pixels": (2, 64), "both": (8, 512)}
 """From where to where samples are doubled by default: rays, samples, or rays of all samples of a pixel."""
-FINER: dict[Vary, tuple[int, int]] = {"obscurance": (1, 4), "pixels": (4, 1), "both": (2, 2)}
-"""How many times the samples and the rays each of the finest run a half of the reference has."""
+
+RunKey: TypeAlias = tuple[Sampler, int, int]
+"""Sampler, count and repeat."""
 
 
-class Reference(Value):
-    """What errors are measured against: the mean of two independent halves."""
+class ConvergenceSettings(Value):
+    """What is measured."""
 
-    sampling: Sampling  # of each half, but for the seed
-    rmse: float
-    """Root of the mean square of half the halves' difference: the mean errs as much."""
-    reused: bool
-
-
-class Run(Value):
-    """One picture."""
-
-    repeat: int
-    seed: int
-    rays: int
-    seconds: float
-    rmse: float
-    """Against the reference, its own error taken off."""
-    content: str
-    """Hash of all that the error depends on."""
-
-
-class Point(Value):
-    """All repeats at one sampling."""
-
-    pixel: int
-    obscurance: int
-    count: int  # what is doubled, per pixel
-    rays: int
-    seconds: float  # median
-    rmse: float  # over all repeats
-    spread: float  # standard error of `rmse`, nan for a single repeat
-    runs: tuple[Run, ...]
-
-
-class Curve(Value):
-    """A sampler's points and the line log rmse = constant + slope * log count through its runs."""
-
-    sampler: Sampler
-    points: tuple[Point, ...]
-    slope: float
-    slope_error: float  # standard error
-    constant: float
-
-    def count_for(self, rmse: float) -> float:
-        """How many samples have this error, by the fitted line; nan where there is none."""
-        if not (rmse > 0 and self.slope < 0):
-            return math.nan
-        return math.exp((math.log(rmse) - self.constant) / self.slope)
+    overrides: tuple[str, ...] = ()
+    vary: Vary | None = None
+    """`obscurance`: rays per sample, with one sample through each pixel's centre. `pixels`: samples per
+    pixel, each with the scene's obscurance rays. `both`: the two in turn. By default obscurance where the
+    scene has any."""
+    first: int | None = None
+    last: int | None = None
+    """The fewest and most per pixel of what is doubled; by default those of `DOUBLED`."""
+    layer: str | None = None
+    """By default `obscurance` where only that is varied, else `beauty`."""
+    samplers: tuple[Sampler, ...] = SAMPLERS
+    repeats: int = 3
+    width: int | None = 320
+    """The film is scaled down to at most this: error per pixel hardly depends on it."""
+    camera: str | None = None
+    """By default the first."""
+    seed: int | None = None
+    """By default the scene's."""
+    threads: int | None = None
+    cache: bool = True
+    """Keep the reference for later runs."""
 
 
 class Convergence(Value):
-    """What `run` found."""
+    """A layer's error at every sampling, in the order in which JSON has it."""
 
     scene: str
     layer: str
@@ -109,104 +73,90 @@ class Convergence(Value):
     curves: tuple[Curve, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """The result as JSON has it; what is not a number is null."""
+        """The result as JSON holds it; what is not a finite number is null."""
         return _finite({"illum": __version__, **asdict(self), "versions": versions()})
 
 
-def run(
+def measure_convergence(
     path: Path,
-    overrides: Sequence[str] = (),
-    vary: Vary | None = None,
-    first: int | None = None,
-    last: int | None = None,
-    layer: str | None = None,
-    samplers: Sequence[Sampler] = SAMPLERS,
-    repeats: int = 3,
-    seed: int | None = None,
-    threads: int | None = None,
-    camera: str | None = None,
-    width: int | None = 320,
-    progress: Progress = lambda what, done, of: None,
-    cache: bool = True,
+    settings: ConvergenceSettings | None = None,
+    progress: Progress = no_progress,
     planned: Callable[[list[str]], None] = lambda contents: None,
 ) -> Convergence:
     """A scene's layer rendered at doubling samples, by every sampler in turn, and its error.
 
     Parameters
     ----------
-    vary
-        `obscurance`: rays per sample, with one sample through each pixel's centre. `pixels`: samples per
-        pixel, each with the scene's obscurance rays. `both`: the two in turn. By default obscurance where the
-        scene has any.
-    first, last
-        The fewest and most per pixel of what is doubled; by default as `DOUBLED` has them.
-    layer
-        By default `obscurance` where only that is varied, else `beauty`.
-    width
-        The film is scaled down to at most this: error per pixel hardly depends on it.
     planned
-        Gets the content of every picture before any is rendered, in the order of the result's runs.
+        Gets the content of every image before any is rendered, in the order of the result's runs.
     """
-    loaded = load(path, overrides)
-    if seed is not None:
-        loaded = replace(loaded, scene=loaded.scene.replaced(seed=seed))
+    settings = settings or ConvergenceSettings()
+    loaded = load(path, settings.overrides)
+    if settings.seed is not None:
+        loaded = replace(loaded, scene=loaded.scene.replaced(seed=settings.seed))
     scene = loaded.scene
-    vary = vary or ("obscurance" if scene.obscurance is not None else "pixels")
-    own = subject(
-        loaded, layer or ("obscurance" if vary == "obscurance" else "beauty"), threads, camera, width
-    )
+
+    # what is varied, of which layer, and how far
+    vary = settings.vary or ("obscurance" if scene.obscurance is not None else "pixels")
+    name = settings.layer or ("obscurance" if vary == "obscurance" else "beauty")
+    layer = sampled_layer(loaded, name, settings.threads, settings.camera, settings.width)
     few, many = DOUBLED[vary]
-    levels = samplings(scene, vary, first or few, last or max(many, 2 * (first or few)), samplers)
-    _check(own, vary)
-    held = PICTURES * len(own.layer.channels)
-    refuse_memory(own.view.height, own.view.width, held, expected_memory(loaded, scene), str(path))
+    first = settings.first or few
+    last = settings.last or max(many, 2 * first)
+    levels = samplings(scene, vary, first, last, settings.samplers)
+    _refuse_unvaried(layer, vary)
+    held = IMAGES * len(layer.layer.channels)
+    refuse_memory(layer.view.height, layer.view.width, held, expected_memory(loaded, scene), str(path))
+
+    # the content of every image
     finest = max(levels, key=lambda level: level.rays)
-    contents = {
-        (level.sampler, _count(level, vary), repeat): _content(
-            own, replace(level, seed=own_seed), finest, vary
+    seeds = [stream(scene.seed, f"converge:{repeat}") for repeat in range(settings.repeats)]
+    contents: dict[RunKey, str] = {
+        (level.sampler, _count(level, vary), repeat): run_content(
+            layer, replace(level, seed=seed), finest, vary
         )
-        for repeat, own_seed in enumerate(_seeds(scene, repeats))
+        for repeat, seed in enumerate(seeds)
         for level in levels
     }
-    planned([contents[key] for key in sorted(contents, key=lambda key: (samplers.index(key[0]), *key[1:]))])
-    expected = sum(level.pixel * (1 + level.obscurance) for level in levels) * repeats
-    made = 0
+    in_order = sorted(contents, key=lambda key: (settings.samplers.index(key[0]), *key[1:]))
+    planned([contents[key] for key in in_order])
 
-    def advance(sampling: Sampling) -> None:
-        nonlocal made
-        made += sampling.pixel * (1 + sampling.obscurance)
-        progress(own.loaded.name, made, expected)
-
-    truth, reference = referred(own, finest, vary, opened_store() if cache else None)
-    runs: dict[tuple[Sampler, int], list[Run]] = {}
-    for repeat, own_seed in enumerate(_seeds(scene, repeats)):
-        for level in levels:  # in turn, so that whatever else the machine does meets all alike
-            sampling = replace(level, seed=own_seed)
-            values, rays, seconds = own.picture(sampling)
+    # the images and their errors
+    truth, reference = reference_image(layer, finest, vary, opened_store() if settings.cache else None)
+    runs: dict[RunKey, Run] = {}
+    total, done = settings.repeats * sum(map(_cost, levels)), 0
+    for repeat, seed in enumerate(seeds):
+        for level in levels:  # in turn, so that other load of the machine meets all samplers alike
+            key = level.sampler, _count(level, vary), repeat
+            values, rays, seconds = layer.render(replace(level, seed=seed))
             error = rmse_of(values, truth, reference.rmse)
-            key = level.sampler, _count(level, vary)
-            content = contents[(*key, repeat)]
-            runs.setdefault(key, []).append(Run(repeat, own_seed, rays, seconds, error, content))
-            advance(sampling)
-    curves = tuple(
-        curve(
-            sampler,
-            [
-                point(level, _count(level, vary), runs[sampler, _count(level, vary)])
-                for level in levels
-                if level.sampler == sampler
-            ],
-        )
-        for sampler in samplers
-    )
+            runs[key] = Run(repeat, seed, rays, seconds, error, contents[key])
+            done += _cost(level)
+            progress(loaded.name, done, total)
     return Convergence(
-        str(path), own.layer.name, own.view.name, own.view.width, own.view.height,
-        vary, repeats, scene.seed, own.threads, reference, curves,
+        str(path), layer.layer.name, layer.view.name, layer.view.width, layer.view.height,
+        vary, settings.repeats, scene.seed, layer.threads, reference, _curves(settings, levels, vary, runs),
     )  # fmt: skip
 
 
+def _curves(
+    settings: ConvergenceSettings, levels: Sequence[Sampling], vary: Vary, runs: Mapping[RunKey, Run]
+) -> tuple[Curve, ...]:
+    """A curve for each sampler."""
+    curves = []
+    for sampler in settings.samplers:
+        points = []
+        for level in levels:
+            count = _count(level, vary)
+            if level.sampler == sampler:
+                repeats = [runs[sampler, count, repeat] for repeat in range(settings.repeats)]
+                points.append(point_of(level, count, repeats))
+        curves.append(curve_through(sampler, points))
+    return tuple(curves)
+
+
 def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequence[Sampler]) -> list[Sampling]:
-    """Every sampling to measure, from few to many, samplers in turn; seeds are put in later.
+    """Every sampling to measure, from few to many, samplers in turn, with seed 0.
 
     Raises
     ------
@@ -222,106 +172,34 @@ def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequenc
         raise InputError(
             "the scene has no obscurance to vary; use --vary pixels, or -D obscurance.samples=64"
         )
+
+    # samples per pixel and rays per sample at each count
     rays = scene.obscurance.samples if scene.obscurance is not None else 0
-    found = []
+    levels = []
     for count in [first << k for k in range((last // first).bit_length())]:
         root = 1 << count.bit_length() // 2
         pixel, each = {"obscurance": (1, count), "pixels": (count, rays), "both": (root, count // root)}[vary]
-        found += [Sampling(pixel, each, sampler, 0) for sampler in samplers]
-    return found
-
-
-def _seeds(scene: Scene, repeats: int) -> list[int]:
-    return [stream(scene.seed, f"converge:{repeat}") for repeat in range(repeats)]
-
-
-def _content(own: Subject, sampling: Sampling, finest: Sampling, vary: Vary) -> str:
-    """Hash of all that a picture and its reference depend on."""
-    halves = [_key(own, half) for half in _halves(own, finest, vary)]
-    return digest((own.layer.name, _key(own, sampling), halves))
-
-
-def _halves(own: Subject, finest: Sampling, vary: Vary) -> list[Sampling]:
-    """How the two halves of the reference are sampled; by Owen's sampler: a bias of the spiral would show."""
-    pixel, each = FINER[vary]
-    half = Sampling(finest.pixel * pixel, finest.obscurance * each, "owen", 0)
-    return [replace(half, seed=stream(own.scene.seed, f"reference:{name}")) for name in "ab"]
+        levels += [Sampling(pixel, each, sampler, 0) for sampler in samplers]
+    return levels
 
 
 def _count(sampling: Sampling, vary: Vary) -> int:
+    """Of what is doubled, per pixel."""
     return sampling.pixel if vary == "pixels" else sampling.rays
 
 
-def _check(own: Subject, vary: Vary) -> None:
-    """Refuse a layer that what is varied does not change."""
-    steps, _ = own.planned(Sampling(1, 1, "spiral", 0))
+def _cost(sampling: Sampling) -> int:
+    """Rays per pixel, those of the camera included."""
+    return sampling.pixel * (1 + sampling.obscurance)
+
+
+def _refuse_unvaried(layer: SampledLayer, vary: Vary) -> None:
+    """Raise InputError for a layer that does not depend on what is varied."""
+    steps, _ = layer.planned(Sampling(1, 1, "spiral", 0))
     if vary == "obscurance" and "obscurance" not in {step.output for step in steps.tile}:
         raise InputError(
-            f"layer '{own.layer.name}' casts no obscurance ray; use --vary pixels or another --layer"
+            f"layer '{layer.layer.name}' casts no obscurance ray; use --vary pixels or another --layer"
         )
-
-
-def referred(
-    own: Subject, finest: Sampling, vary: Vary, store: Store | None
-) -> tuple[NDArray[np.float64], Reference]:
-    """The reference and its error, kept in the store."""
-    halves = _halves(own, finest, vary)
-    key = digest([(own.layer.name, *_key(own, half)) for half in halves])
-    stored = store.read(key) if store is not None else None
-    shape = (own.view.height, own.view.width, len(own.layer.channels))
-    arrays = () if stored is None else stored.arrays
-    reused = [(each.shape, each.dtype.str) for each in arrays] == [(shape, "<f4")] * 2
-    if reused:
-        a, b = arrays
-    else:
-        a, b = (own.picture(half)[0] for half in halves)
-        if store is not None:
-            store.save(key, {"buffer": "reference", "layer": own.layer.name}, [a, b])
-            store.finish()
-    error = math.sqrt(np.square((a.astype(np.float64) - b) / 2).mean())
-    return (a.astype(np.float64) + b) / 2, Reference(replace(halves[0], seed=0), error, reused)
-
-
-def _key(own: Subject, sampling: Sampling) -> tuple[str, str]:
-    steps, view = own.planned(sampling)
-    return Keys(steps.book, view, code())(own.layer.buffer), repr(view)
-
-
-def rmse_of(values: NDArray[np.float32], truth: NDArray[np.float64], reference: float) -> float:
-    """Root of the mean squared difference, less what the reference itself errs; at least 0."""
-    square = np.square(values - truth).mean() - reference**2
-    return math.sqrt(max(float(square), 0.0))
-
-
-def point(sampling: Sampling, count: int, runs: Sequence[Run]) -> Point:
-    """What the repeats say together."""
-    errors = np.array([run.rmse for run in runs])
-    pooled = math.sqrt(np.square(errors).mean())
-    spread = float(errors.std(ddof=1) / math.sqrt(len(errors))) if len(errors) > 1 else math.nan
-    rays, seconds = round(median(run.rays for run in runs)), median(run.seconds for run in runs)
-    return Point(
-        sampling.pixel, sampling.obscurance, count, rays, seconds, pooled, spread, tuple(runs)
-    )  # fmt: skip
-
-
-def curve(sampler: Sampler, points: Sequence[Point]) -> Curve:
-    """The points with the line through all runs that have an error, in logarithms."""
-    pairs = [(math.log(p.count), math.log(run.rmse)) for p in points for run in p.runs if run.rmse > 0]
-    slope, error, constant = line(pairs)
-    return Curve(sampler, tuple(points), slope, error, constant)
-
-
-def line(pairs: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
-    """Slope, its standard error and constant of least squares; nan where the pairs do not tell."""
-    x, y = np.array(pairs, np.float64).reshape(-1, 2).T
-    wide = float(np.square(x - x.mean()).sum()) if len(x) else 0.0
-    if wide == 0:
-        return math.nan, math.nan, math.nan
-    slope = float(((x - x.mean()) * (y - y.mean())).sum()) / wide
-    constant = float(y.mean() - slope * x.mean())
-    rest = float(np.square(y - constant - slope * x).sum())
-    error = math.sqrt(rest / (len(x) - 2) / wide) if len(x) > 2 else math.nan
-    return slope, error, constant
 
 
 def _finite(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A scene's layer at any sampling, as an array, whole or at some pixels: what measuring its error takes."""
+"""One layer of a scene rendered at any sampling, all of it or some pixels, to measure its error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Sampler: TypeAlias = Literal["spiral", "owen", "random"]
 
 
 class Sampling(Value):
-    """How finely a picture is sampled, and by which random numbers."""
+    """How finely an image is sampled, and with which random numbers."""
 
     pixel: int  # samples per pixel; 1 looks through the pixel's centre
     obscurance: int  # rays per sample
@@ -40,8 +40,8 @@ class Sampling(Value):
         return self.pixel * self.obscurance
 
 
-class Subject(Record):
-    """A view of a scene and one of its layers, with the buffers that no sampling changes."""
+class SampledLayer(Record):
+    """One layer of a view, with the buffers that do not depend on its sampling."""
 
     loaded: SceneFile
     view: View
@@ -53,7 +53,7 @@ class Subject(Record):
     def scene(self) -> Scene:
         return self.loaded.scene
 
-    def seen_by(self, view: View) -> Subject:
+    def seen_by(self, view: View) -> SampledLayer:
         """The same from another view, all of whose pixels get all samples."""
         if view.camera.fit is not None:
             name = f"camera:{view.name}"
@@ -75,7 +75,7 @@ class Subject(Record):
                 self.shared[step.output] = step.run(self.shared)
         return steps, replace(self.view, samples=sampling.pixel)
 
-    def picture(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
+    def render(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
         """(H, W, channels) the layer at a sampling, the rays it took, and the seconds."""
         steps, view = self.planned(sampling)
         tally, start = RenderStats(), time.perf_counter()
@@ -83,7 +83,7 @@ class Subject(Record):
         seconds = time.perf_counter() - start
         return np.concatenate([row[self.layer.name] for row in rows]), sum(tally.rays.values()), seconds
 
-    def pixels(
+    def render_pixels(
         self, sampling: Sampling, x: NDArray[np.int64], y: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], int]:
         """(K, channels) the layer at K pixels, and the rays it took."""
@@ -92,7 +92,7 @@ class Subject(Record):
         made = at_pixels(steps, self.shared, view, x, y, self.threads, tally)
         return made[self.layer.name].astype(np.float64), sum(tally.rays.values())
 
-    def scattered(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def random_pixels(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Columns and rows of `count` pixels drawn at random; of all of them where they are fewer."""
         pixels = self.view.width * self.view.height
         random = np.random.default_rng(stream(self.scene.seed, purpose))
@@ -100,13 +100,13 @@ class Subject(Record):
         return x, y
 
 
-def subject(
+def sampled_layer(
     loaded: SceneFile,
     name: str,
     threads: int | None = None,
     camera: str | None = None,
     width: int | None = None,
-) -> Subject:
+) -> SampledLayer:
     """A scene's layer, ready to be sampled.
 
     Parameters
@@ -131,8 +131,8 @@ def subject(
         )
     if width is not None and view.width > width:
         view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
-    own = Subject(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
-    return own.seen_by(view)
+    layer = SampledLayer(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+    return layer.seen_by(view)
 
 
 def chosen_view(views: Sequence[View], camera: str | None) -> View:

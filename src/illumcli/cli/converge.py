@@ -16,7 +16,7 @@ from illumcli.cli._options import (
 )
 
 if TYPE_CHECKING:
-    from illumcli.accuracy.convergence import Vary
+    from illumcli.accuracy.reference import Vary
     from illumcli.accuracy.sampled import Sampler
 
 _FILE = click.Path(path_type=Path)
@@ -89,21 +89,33 @@ def converge(
     import json
     import sys
 
-    from illumcli.accuracy import convergence_report as converge_report
-    from illumcli.accuracy.convergence import SAMPLERS, run
+    from illumcli.accuracy.convergence import SAMPLERS, ConvergenceSettings, measure_convergence
+    from illumcli.accuracy.convergence_files import ConvergenceFiles
+    from illumcli.accuracy.convergence_table import convergence_table, text_plot
     from illumcli.cli._progress import reporter
 
-    files = converge_report.Outputs(csv_file, output, force)
-    found = run(
-        scene, overrides, vary, first, last, layer, samplers or SAMPLERS, repeats, seed, threads, camera,
-        width, reporter(quiet), cache, files.check,
-    )  # fmt: skip
-    files.write(found)
+    settings = ConvergenceSettings(
+        overrides,
+        vary,
+        first,
+        last,
+        layer,
+        samplers or SAMPLERS,
+        repeats,
+        width,
+        camera,
+        seed,
+        threads,
+        cache,
+    )
+    files = ConvergenceFiles(csv_file, output, force)
+    result = measure_convergence(scene, settings, reporter(quiet), files.look)
+    files.write(result)
     for kept in files.kept if not quiet else []:
         click.echo(f"{kept}: kept, its content is the same", err=True)
     if as_json:
-        click.echo(json.dumps(found.as_data(), indent=2))
+        click.echo(json.dumps(result.as_data(), indent=2))
         return
-    click.echo(converge_report.as_table(found))
+    click.echo(convergence_table(result))
     if sys.stdout.isatty():
-        click.echo(converge_report.drawn(found.curves))
+        click.echo(text_plot(result.curves))

@@ -95,9 +95,9 @@ def _rendered(scene: Path, work: Work, settings: Settings, progress: Progress) -
     start = time.perf_counter()
     choice = None
     if settings.target_error is not None:
-        from illumcli.accuracy.target import chosen
+        from illumcli.accuracy.target import choose_sampling
 
-        choice = chosen(
+        choice = choose_sampling(
             scene, settings.target_error, settings.overrides, settings.only, settings.seed, settings.threads
         )
         settings = replace(settings, overrides=(*settings.overrides, *choice.overrides))

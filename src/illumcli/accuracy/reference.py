@@ -1,0 +1,79 @@
+"""The reference of a convergence measurement: two independent halves, whose difference is its error.
+
+References
+----------
+Efron, B. and Tibshirani, R. (1993). An Introduction to the Bootstrap: two halves of a sample tell its error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.accuracy.sampled import SampledLayer, Sampling
+from illumcli.cache.fingerprint import digest
+from illumcli.cache.store import Store
+from illumcli.rays.sampling import stream
+from illumcli.records import Value
+from illumcli.render_graph.keys import Keys, code
+
+Vary: TypeAlias = Literal["obscurance", "pixels", "both"]
+
+FINER: dict[Vary, tuple[int, int]] = {"obscurance": (1, 4), "pixels": (4, 1), "both": (2, 2)}
+"""How many times the samples and the rays each of the finest run a half of the reference has."""
+
+
+class Reference(Value):
+    """What errors are measured against: the mean of two independent halves."""
+
+    sampling: Sampling  # of each half, but for the seed
+    rmse: float
+    """Root mean square of half the difference between the halves, which is the error of their mean."""
+    reused: bool
+
+
+def reference_image(
+    layer: SampledLayer, finest: Sampling, vary: Vary, store: Store | None
+) -> tuple[NDArray[np.float64], Reference]:
+    """(H, W, channels) the reference and its error; its halves are kept in the store."""
+    # the halves, from the store where it has them
+    halves = reference_halves(layer, finest, vary)
+    key = digest([(layer.layer.name, *image_key(layer, half)) for half in halves])
+    stored = store.read(key) if store is not None else None
+    shape = (layer.view.height, layer.view.width, len(layer.layer.channels))
+    arrays = () if stored is None else stored.arrays
+    reused = [(each.shape, each.dtype.str) for each in arrays] == [(shape, "<f4")] * 2
+    if reused:
+        a, b = arrays
+    else:
+        a, b = (layer.render(half)[0] for half in halves)
+        if store is not None:
+            store.save(key, {"buffer": "reference", "layer": layer.layer.name}, [a, b])
+            store.finish()
+
+    # their mean and its error
+    error = math.sqrt(np.square((a.astype(np.float64) - b) / 2).mean())
+    return (a.astype(np.float64) + b) / 2, Reference(replace(halves[0], seed=0), error, reused)
+
+
+def reference_halves(layer: SampledLayer, finest: Sampling, vary: Vary) -> list[Sampling]:
+    """How the two halves are sampled; by Owen's sampler, so that a bias of the spiral would show."""
+    pixel, each = FINER[vary]
+    half = Sampling(finest.pixel * pixel, finest.obscurance * each, "owen", 0)
+    return [replace(half, seed=stream(layer.scene.seed, f"reference:{name}")) for name in "ab"]
+
+
+def run_content(layer: SampledLayer, sampling: Sampling, finest: Sampling, vary: Vary) -> str:
+    """Hash of all that an image and its reference depend on."""
+    halves = [image_key(layer, half) for half in reference_halves(layer, finest, vary)]
+    return digest((layer.layer.name, image_key(layer, sampling), halves))
+
+
+def image_key(layer: SampledLayer, sampling: Sampling) -> tuple[str, str]:
+    """What the image of a layer at a sampling depends on."""
+    steps, view = layer.planned(sampling)
+    return Keys(steps.book, view, code())(layer.layer.buffer), repr(view)

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from illumcli.brdf import VIEWS, described, run
+from illumcli.brdf import VIEWS, Plot, described, draw_brdfs
 from illumcli.brdf.views import lit_plane, lit_sphere, lobe, polar_slice, slice_angles
 from illumcli.errors import IllumError, InputError, OutputError
 from illumcli.images.reader import read_image
@@ -134,7 +134,7 @@ def test_what_a_model_needs_is_said():
 
 def test_the_table_holds_the_slices_to_the_last_digit(tmp_path):
     path = tmp_path / "slices.csv"
-    assert run(["lambert", "phong"], table=path, angles=(20.0, 60.0)) == ([path], [])
+    assert draw_brdfs(["lambert", "phong"], table=path, plot=Plot(angles=(20.0, 60.0))) == ([path], [])
     with path.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["model", "incidence", "view", "f.R", "f.G", "f.B"]
@@ -146,8 +146,8 @@ def test_the_table_holds_the_slices_to_the_last_digit(tmp_path):
 def test_pictures_have_a_column_per_model_and_are_the_same_twice(tmp_path):
     one, again, two = (tmp_path / f"{name}.png" for name in ("one", "again", "two"))
     for path in (one, again):
-        run(["phong"], output=path, chosen=("polar", "sphere", "plane"))
-    run(["phong", "ward"], output=two, chosen=("polar",), log=True)
+        draw_brdfs(["phong"], output=path, plot=Plot(("polar", "sphere", "plane")))
+    draw_brdfs(["phong", "ward"], output=two, plot=Plot(("polar",), log=True))
     assert one.read_bytes() == again.read_bytes()
     assert read_image(two).width == 2 * read_image(one).width
     assert min(read_image(path).channels["G"].std() for path in (one, two)) > 0.05
@@ -155,40 +155,40 @@ def test_pictures_have_a_column_per_model_and_are_the_same_twice(tmp_path):
 
 def test_an_svg_holds_every_view(tmp_path):
     path = tmp_path / "all.svg"
-    run(["blinn_phong"], output=path, chosen=VIEWS)
+    draw_brdfs(["blinn_phong"], output=path, plot=Plot(VIEWS))
     text = path.read_text()
     assert text.startswith("<?xml")
     assert text.count("<image") == 2  # sphere and plane
     first = path.read_bytes()
-    assert run(["blinn_phong"], output=path, chosen=VIEWS) == ([path], [path])
+    assert draw_brdfs(["blinn_phong"], output=path, plot=Plot(VIEWS)) == ([path], [path])
     assert path.read_bytes() == first
 
 
 def test_black_models_are_drawn_too(tmp_path):
-    run(["lambert"], ["diffuse=0"], tmp_path / "black.png", chosen=("polar", "lobe"))
+    draw_brdfs(["lambert"], ["diffuse=0"], tmp_path / "black.png", plot=Plot(("polar", "lobe")))
 
 
 def test_no_other_file_is_replaced_unasked(tmp_path):
     path = tmp_path / "slices.csv"
     path.write_text("mine")
     with pytest.raises(OutputError, match="--force"):
-        run(["lambert"], table=path)
+        draw_brdfs(["lambert"], table=path)
     assert path.read_text() == "mine"
-    run(["lambert"], table=path, force=True)
+    draw_brdfs(["lambert"], table=path, force=True)
     assert path.read_text().startswith("model,")
 
 
 def test_only_png_and_svg_are_drawn(tmp_path):
     with pytest.raises(InputError, match=r"is written as \.png or \.svg"):
-        run(["lambert"], output=tmp_path / "x.pdf")
+        draw_brdfs(["lambert"], output=tmp_path / "x.pdf")
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(IllumError, match=r"pip install 'illumcli\[plot\]'"):
-        run(["lambert"], output=tmp_path / "x.png", table=tmp_path / "x.csv")
+        draw_brdfs(["lambert"], output=tmp_path / "x.png", table=tmp_path / "x.csv")
     assert list(tmp_path.iterdir()) == []
-    run(["lambert"], table=tmp_path / "x.csv")
+    draw_brdfs(["lambert"], table=tmp_path / "x.csv")
 
 
 def test_the_command_prints_its_files_and_needs_no_pyplot(illum, tmp_path):

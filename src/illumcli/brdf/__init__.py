@@ -11,6 +11,7 @@ from typing import Any
 from pydantic_core import ValidationError
 
 from illumcli.brdf import views
+from illumcli.brdf.plot import PLOT, VIEWS, Plot
 from illumcli.errors import InputError, OutputError
 from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
 from illumcli.models._base import IlluminationModel
@@ -20,22 +21,20 @@ from illumcli.schema.description import Description
 from illumcli.schema.families import member, suggestion
 from illumcli.schema.faults import faults
 
-VIEWS = ("polar", "sphere", "plane", "lobe")
+__all__ = ["PLOT", "VIEWS", "Plot", "described", "draw_brdfs", "slices_table"]
+
 PACKAGE = "illumcli.models"
 
 
-def run(
+def draw_brdfs(
     names: Sequence[str],
     overrides: Sequence[str] = (),
     output: Path | None = None,
     table: Path | None = None,
-    chosen: Sequence[str] = VIEWS,
-    angles: Sequence[float] = (15.0, 40.0, 65.0),
-    log: bool = False,
-    times_cos: bool = False,
+    plot: Plot = PLOT,
     force: bool = False,
 ) -> tuple[list[Path], list[Path]]:
-    """Draw the models `names` side by side; the paths written, and those of them that are kept.
+    """Draw the models `names` side by side; the paths of the files, and those of them that were kept.
 
     Parameters
     ----------
@@ -45,8 +44,6 @@ def run(
         A picture, .png or .svg.
     table : Path, optional
         The polar slices as CSV.
-    angles : sequence of float
-        Angles of incidence [degrees].
 
     Raises
     ------
@@ -55,6 +52,7 @@ def run(
     OutputError
         A different file is there and `force` is not given.
     """
+    # Refuse outputs that cannot be written before anything is computed.
     if output is not None:
         refuse_suffix(output, "a picture of BRDFs", ".png", ".svg")
     if table is not None:
@@ -62,15 +60,15 @@ def run(
     for path in (table, output):
         if path is not None:
             refuse_unwritable(path)
+
     models = described(names, overrides)
     files: dict[Path, bytes] = {}
     if table is not None:
-        files[table] = slices_table(models, angles, times_cos).encode()
+        files[table] = slices_table(models, plot).encode()
     if output is not None:
-        from illumcli.brdf.figure import drawn
+        from illumcli.brdf.figure import figure_file
 
-        kind = output.suffix.lower().removeprefix(".")
-        files[output] = drawn(models, chosen, angles, log, times_cos, kind)
+        files[output] = figure_file(models, plot, output.suffix.lower().removeprefix("."))
     return list(files), _write(files, force)
 
 
@@ -148,24 +146,25 @@ def _described(
         return None, found
 
 
-def slices_table(models: Mapping[str, IlluminationModel], angles: Sequence[float], times_cos: bool) -> str:
+def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:
     """The polar slices as CSV: model, both angles [degrees], values; the light is at negative angles."""
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
-    kind = "response" if times_cos else "f"
+    kind = "response" if plot.times_cos else "f"
     rows.writerow(["model", "incidence", "view", *(f"{kind}.{channel}" for channel in "RGB")])
     for title, model in models.items():
-        for angle in angles:
-            view, found = views.polar_slice(model, angle, times_cos)
-            for at, color in zip(view.tolist(), found.tolist(), strict=True):
-                rows.writerow([title, f"{angle:g}", f"{at:.10g}", *(repr(each) for each in color)])
+        for incidence in plot.angles:
+            angles, values = views.polar_slice(model, incidence, plot.times_cos)
+            for angle, color in zip(angles.tolist(), values.tolist(), strict=True):
+                rows.writerow([title, f"{incidence:g}", f"{angle:.10g}", *(repr(each) for each in color)])
     return out.getvalue()
 
 
 def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
-    """Write the files but those that hold the same bytes already; these."""
+    """Write the files, except those that hold the same bytes already; these are returned."""
     from illumcli.files.atomic import refusals, write_bytes
 
+    # Refuse all before any is written.
     kept = []
     for path, data in files.items():
         with refusals(str(path)):

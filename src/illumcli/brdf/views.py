@@ -1,9 +1,9 @@
-"""What the views of a BRDF show, as arrays in double precision: slices, lobes, a lit sphere, a lit plane.
+"""The data of BRDF views, in double precision: slices, lobes, a lit sphere, a lit plane.
 
 The surface is z = 0 with its normal along z and its grain along x; light comes from the left, in the plane of
-x and z. A value is f_r = response / n.l, or with `times_cos` the response itself, which is what a light of
-irradiance 1 makes leave. For the intensity models of the texts f_r is what a BRDF would be that gives the
-same picture; it grows without bound as the light sinks to the horizon.
+x and z. A value is f_r = response / n.l, or with `times_cos` the response itself: the radiance that leaves
+under a light of unit irradiance across its own direction. For the intensity models of the texts f_r is the
+BRDF that would give the same image; it grows without bound as the light sinks to the horizon.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from illumcli.shading.terms import evaluate, words
 Doubles = NDArray[np.float64]
 
 SUN = (-0.55, 0.6, 0.58)
-"""From the sphere to its light; the eye looks along -z."""
+"""Direction from the sphere to its light; the eye looks along -z."""
 LAMP = (0.0, 3.0, 0.8)
-"""The light over the plane, behind what the eye looks at."""
+"""Position of the light over the plane, on the far side, so that the eye looks against it."""
 EYE = (0.0, -4.0, 1.5)
 
 
 def values(
     model: IlluminationModel, n: Vectors, l: Vectors, v: Vectors, t: Vectors, times_cos: bool = True
 ) -> Doubles:
-    """(N, 3) the response, or f_r, per lane; 0 where light or eye is at or below the horizon."""
+    """(N, 3) the response, or f_r, of N directions; 0 where light or eye is at or below the horizon."""
     out = np.zeros(l.shape, order="F")
     n_l = dot(n, l)
     lit = np.flatnonzero((n_l > 0) & (dot(n, v) > 0))
     lobes = model.lobes()
     if not (lit.size and lobes):
         return out
-    at = {"n": n, "l": l, "v": v, "t": t}
-    given: dict[str, Any] = {word: column_major(at[word][lit]) for word in words(lobes) & at.keys()}
+    vectors = {"n": n, "l": l, "v": v, "t": t}
+    given: dict[str, Any] = {word: column_major(vectors[word][lit]) for word in words(lobes) & vectors.keys()}
     if "light" in words(lobes):
         given["light"] = np.ones(3)
     out[lit] = sum(evaluate(lobes, given).values())
@@ -91,18 +91,22 @@ def lobe(
     The columns run from the mirror direction to the horizon, crowded at their beginning: a narrow highlight
     is drawn as well as a wide one.
     """
+    # Polar coordinates about the mirror direction; `away` ends at the horizon.
     angle = np.radians(incidence)
     around = np.linspace(0, 2 * np.pi, 2 * steps + 1)
     horizon = np.arctan2(np.cos(angle), np.cos(around) * np.sin(angle)) - 1e-6
     away = np.linspace(0, 1, steps + 1)[:, None] ** 2 * horizon
+
+    # Turned from the mirror direction to the normal.
     x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
     v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
-    found = _seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
-    return v, np.reshape(found, v.shape)
+    values = _seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
+    return v, np.reshape(values, v.shape)
 
 
 def irradiance(model: IlluminationModel) -> float:
-    """Of the light in pictures: pi for a BRDF, so that white Lambert is white, 1 for the intensity models."""
+    """Irradiance of the light in pictures: pi for a BRDF, so that white Lambert is white, 1 for the intensity
+    models."""
     return np.pi if model.physical or getattr(model, "normalised", False) else 1.0
 
 
@@ -121,6 +125,7 @@ def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
 
     Its grain runs from left to right. The light does not fall off with distance.
     """
+    # Rays through twice the pixels, to where they meet the floor.
     across, down = np.meshgrid(
         (np.arange(2 * size) + 0.5) / size - 1, 0.32 + 0.68 * (np.arange(size) + 0.5) / size
     )
@@ -128,6 +133,8 @@ def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
     ray = forward + np.stack([0.75 * across, 0 * across, -0.75 * down], axis=-1)
     distance = eye[2] / -ray[..., 2]
     p = (eye + distance[..., None] * ray).reshape(-1, 3)
+
+    # The part of the floor that is drawn.
     inside = (np.abs(p[:, 0]) < 1.5) & (p[:, 1] < 2.6)
     p = column_major(p[inside])
     n, t = (np.broadcast_to(np.array(a), p.shape) for a in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
@@ -141,9 +148,9 @@ def _disc(size: int) -> tuple[Doubles, Doubles, NDArray[np.bool_]]:
     return x / 0.98, y / 0.98, x * x + y * y < 0.98**2
 
 
-def _halved(lanes: Doubles, inside: NDArray[np.bool_]) -> Doubles:
-    """(H / 2, W / 2, 4) the means of two by two pixels; `lanes` are those `inside`."""
+def _halved(colors: Doubles, inside: NDArray[np.bool_]) -> Doubles:
+    """(H / 2, W / 2, 4) the means of two by two pixels, of which those `inside` have `colors`, (N, 3)."""
     height, width = inside.shape
-    whole = np.zeros((height, width, 4))
-    whole[inside] = np.concatenate([lanes, np.ones((len(lanes), 1))], axis=1)
-    return whole.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3))
+    pixels = np.zeros((height, width, 4))
+    pixels[inside] = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
+    return pixels.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3))

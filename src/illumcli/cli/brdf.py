@@ -72,12 +72,13 @@ def brdf(
     and lobes share one scale; they show response / n.l, for the intensity models the BRDF that would give
     the same picture. Pictures need matplotlib: pip install 'illumcli[plot]'.
     """
-    from illumcli.brdf import VIEWS, run
+    from illumcli.brdf import VIEWS, Plot, draw_brdfs
 
     if output is None and table is None:
         output = Path("brdf.png")
     views = VIEWS if "all" in chosen else [view for view in VIEWS if view in chosen]
-    paths, kept = run(models, overrides, output, table, views, angles, log, times_cos, force)
+    plot = Plot(views, angles, log, times_cos)
+    paths, kept = draw_brdfs(models, overrides, output, table, plot, force)
     for path in paths:
         click.echo(path)
     for path in [] if quiet else kept:

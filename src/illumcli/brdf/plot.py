@@ -1,0 +1,30 @@
+"""What a drawing of BRDFs shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from illumcli.records import Value
+
+VIEWS = ("polar", "sphere", "plane", "lobe")
+
+
+class Plot(Value):
+    """The rows of a drawing, and what their axes show."""
+
+    views: Sequence[str] = VIEWS
+    """A row each."""
+    angles: Sequence[float] = (15.0, 40.0, 65.0)
+    """Angles of incidence of the polar slices [degrees]."""
+    log: bool = False
+    """Slices and lobes on a logarithmic scale."""
+    times_cos: bool = False
+    """The response, cosine included, instead of the BRDF."""
+
+    @property
+    def lobe_angle(self) -> float:
+        """Angle of incidence of the lobe [degrees]: the middle one of the slices."""
+        return sorted(self.angles)[len(self.angles) // 2]
+
+
+PLOT = Plot()

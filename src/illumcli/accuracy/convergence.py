@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from illumcli import __version__
 from illumcli.accuracy.curves import Curve, Run, curve_through, point_of, rmse_of
 from illumcli.accuracy.reference import Reference, Vary, reference_image, run_content
-from illumcli.accuracy.sampled import SampledLayer, Sampler, Sampling, sampled_layer
+from illumcli.accuracy.sampled import SampledLayer, Sampling, sampled_layer
 from illumcli.commands.render import opened_store, versions
 from illumcli.errors import InputError
 from illumcli.progress import Progress, no_progress
@@ -20,14 +20,14 @@ from illumcli.records import Value
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
+from illumcli.visibility.samplers import SAMPLERS
 
-SAMPLERS: tuple[Sampler, ...] = ("spiral", "owen", "random")
 IMAGES = 5
 """Images that are held at once, in double precision."""
 DOUBLED: dict[Vary, tuple[int, int]] = {"obscurance": (4, 256), "pixels": (2, 64), "both": (8, 512)}
 """From where to where samples are doubled by default: rays, samples, or rays of all samples of a pixel."""
 
-RunKey: TypeAlias = tuple[Sampler, int, int]
+RunKey: TypeAlias = tuple[str, int, int]
 """Sampler, count and repeat."""
 
 
@@ -44,7 +44,7 @@ class ConvergenceSettings(Value):
     """The fewest and most per pixel of what is doubled; by default those of `DOUBLED`."""
     layer: str | None = None
     """By default `obscurance` where only that is varied, else `beauty`."""
-    samplers: tuple[Sampler, ...] = SAMPLERS
+    samplers: tuple[str, ...] = tuple(SAMPLERS)
     repeats: int = 3
     width: int | None = 320
     """The film is scaled down to at most this: error per pixel hardly depends on it."""
@@ -155,7 +155,7 @@ def _curves(
     return tuple(curves)
 
 
-def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequence[Sampler]) -> list[Sampling]:
+def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequence[str]) -> list[Sampling]:
     """Every sampling to measure, from few to many, samplers in turn, with seed 0.
 
     Raises

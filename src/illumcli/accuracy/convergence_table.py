@@ -9,12 +9,12 @@ from illumcli.accuracy.convergence import Convergence
 from illumcli.accuracy.curves import Curve
 from illumcli.files.reports import sealed_csv
 from illumcli.tables import aligned
+from illumcli.visibility.samplers import SAMPLERS
 
 COLUMNS = (
     "scene", "camera", "layer", "width", "height", "vary", "sampler", "pixel_samples", "obscurance_rays",
     "count", "repeat", "seed", "content", "rays", "seconds", "rmse", "reference_rmse",
 )  # fmt: skip
-MARKS = {"spiral": "o", "owen": "x", "random": "."}
 
 
 def convergence_table(result: Convergence) -> str:
@@ -86,7 +86,7 @@ def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str
     """Error over samples, drawn with characters on logarithmic axes."""
     # the marks, and the range of each axis
     dots = [
-        (math.log2(p.count), math.log2(p.rmse), MARKS[curve.sampler])
+        (math.log2(p.count), math.log2(p.rmse), SAMPLERS[curve.sampler].mark)
         for curve in curves
         for p in curve.points
         if p.rmse > 0
@@ -108,5 +108,5 @@ def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str
     edges = {0: f"{2**high:.2g}", height - 1: f"{2**low:.2g}"}
     lines = [f"{edges.get(k, ''):>8} |{''.join(line).rstrip()}" for k, line in enumerate(field)]
     ends = f"{2**left:.0f}".ljust(width - 8) + f"{2**right:.0f}".rjust(8)
-    legend = "   ".join(f"{MARKS[curve.sampler]} {curve.sampler}" for curve in curves)
+    legend = "   ".join(f"{SAMPLERS[curve.sampler].mark} {curve.sampler}" for curve in curves)
     return "\n".join([*lines, f"{'RMSE':>8} +{'-' * width}", f"{'':8}  {ends}", f"{'':8}  {legend}"])

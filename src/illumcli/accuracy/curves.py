@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.accuracy.sampled import Sampler, Sampling
+from illumcli.accuracy.sampled import Sampling
 from illumcli.records import Value
 
 
@@ -42,7 +42,7 @@ class Point(Value):
 class Curve(Value):
     """A sampler's points and the line log rmse = constant + slope * log count through its runs."""
 
-    sampler: Sampler
+    sampler: str
     points: tuple[Point, ...]
     slope: float
     slope_error: float  # standard error
@@ -70,7 +70,7 @@ def point_of(sampling: Sampling, count: int, runs: Sequence[Run]) -> Point:
     return Point(sampling.pixel, sampling.obscurance, count, rays, seconds, pooled, spread, tuple(runs))
 
 
-def curve_through(sampler: Sampler, points: Sequence[Point]) -> Curve:
+def curve_through(sampler: str, points: Sequence[Point]) -> Curve:
     """The points with the line through all runs that have an error."""
     pairs = [(math.log(p.count), math.log(run.rmse)) for p in points for run in p.runs if run.rmse > 0]
     slope, error, constant = fit_line(pairs)

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import field, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +23,13 @@ from illumcli.render_graph.schedule import Plan, plan
 from illumcli.scene.load import SceneFile
 from illumcli.scene.spec import Scene
 
-Sampler: TypeAlias = Literal["spiral", "owen", "random"]
-
 
 class Sampling(Value):
     """How finely an image is sampled, and with which random numbers."""
 
     pixel: int  # samples per pixel; 1 looks through the pixel's centre
     obscurance: int  # rays per sample
-    sampler: Sampler
+    sampler: str
     seed: int
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -12,6 +12,26 @@ import click
 
 C = TypeVar("C", bound=Callable[..., Any])
 
+
+class _Names(click.Choice):
+    """A choice among the names of a table, which is imported when the option is used or shown."""
+
+    def __init__(self, table: Callable[[], Iterable[str]]) -> None:
+        self.case_sensitive = True
+        self._table = table
+
+    @property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
+        return tuple(self._table())
+
+
+def _samplers() -> Iterable[str]:
+    from illumcli.visibility.samplers import SAMPLERS
+
+    return SAMPLERS
+
+
+SAMPLER = _Names(_samplers)
 SCENE = click.Path(path_type=Path)
 """Whether it is there is found when it is read: one that is missing stops no other."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from illumcli.cli._options import (
+    SAMPLER,
     SCENE,
     keep_going_option,
     overrides_option,
@@ -77,9 +78,7 @@ class _Distance(click.ParamType):
 @click.option(
     "--exponent", type=click.FloatRange(0, min_open=True), help="Of --falloff power, by default 0.5."
 )
-@click.option(
-    "--sampler", type=click.Choice(["spiral", "owen", "random"]), default="spiral", show_default=True
-)
+@click.option("--sampler", type=SAMPLER, default="spiral", show_default=True)
 @click.option(
     "--faces",
     type=click.Choice(["count", "ignore", "one-sided"]),

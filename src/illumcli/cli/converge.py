@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from illumcli.cli._options import (
+    SAMPLER,
     no_cache_option,
     overrides_option,
     quiet_option,
@@ -17,7 +18,6 @@ from illumcli.cli._options import (
 
 if TYPE_CHECKING:
     from illumcli.accuracy.reference import Vary
-    from illumcli.accuracy.sampled import Sampler
 
 _FILE = click.Path(path_type=Path)
 _EPILOG = """\b
@@ -44,7 +44,7 @@ Examples:
     "--sampler",
     "samplers",
     multiple=True,
-    type=click.Choice(["spiral", "owen", "random"]),
+    type=SAMPLER,
     help="Only this sampler of obscurance rays; may be repeated.",
 )
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Other seeds.")
@@ -67,7 +67,7 @@ def converge(
     first: int | None,
     last: int | None,
     layer: str | None,
-    samplers: tuple[Sampler, ...],
+    samplers: tuple[str, ...],
     repeats: int,
     width: int,
     camera: str | None,
@@ -89,7 +89,7 @@ def converge(
     import json
     import sys
 
-    from illumcli.accuracy.convergence import SAMPLERS, ConvergenceSettings, measure_convergence
+    from illumcli.accuracy.convergence import ConvergenceSettings, measure_convergence
     from illumcli.accuracy.convergence_files import ConvergenceFiles
     from illumcli.accuracy.convergence_table import convergence_table, text_plot
     from illumcli.cli._progress import reporter
@@ -100,7 +100,7 @@ def converge(
         first,
         last,
         layer,
-        samplers or SAMPLERS,
+        samplers or tuple(SAMPLER.choices),
         repeats,
         width,
         camera,

@@ -34,10 +34,19 @@ from illumcli.schema.fields import (
     spread,
 )
 from illumcli.visibility.falloffs import AnyFalloff
+from illumcli.visibility.samplers import SAMPLERS
 
 Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
 Count: TypeAlias = Annotated[int, Whole(ge=1, le=2**31 - 1)]
 Row: TypeAlias = tuple[Number, Number, Number, Number]
+
+# names of tables
+if TYPE_CHECKING:
+    Layer: TypeAlias = str
+    Sampler: TypeAlias = str
+else:
+    Layer = Literal[NAMES]
+    Sampler = Literal[tuple(SAMPLERS)]
 
 NOTHING: Any = written({})  # a mapping without a key: a description with all its defaults
 
@@ -317,7 +326,7 @@ class Obscurance(Description):
     """Rays per pixel sample."""
     falloff: AnyFalloff = written({"falloff": "step"})
     """By default every occluder counts fully: ambient occlusion."""
-    sampler: Literal["spiral", "owen", "random"] = "spiral"
+    sampler: Sampler = "spiral"
     """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
     less error where mu is smooth. `random`: independent rays, for scale."""
     faces: Literal["count", "ignore", "one_sided"] = "count"
@@ -326,12 +335,6 @@ class Obscurance(Description):
     about: Literal["shading", "geometric"] = "shading"
     """What the hemisphere stands about. `shading`: the interpolated normal that direct light is shaded with;
     directions that point below the polygon are mirrored at its plane. `geometric`: the polygon's own."""
-
-
-if TYPE_CHECKING:
-    Layer: TypeAlias = str
-else:
-    Layer = Literal[NAMES]
 
 
 class Outputs(Description):

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
-
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, dot, repeat_rows, take_rows
-from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
+from illumcli.arrays import F, Vectors, dot, repeat_rows, take_rows
 from illumcli.records import Record
-
-Sampler: TypeAlias = Literal["spiral", "owen", "random"]
+from illumcli.visibility.samplers import GRAZING, SAMPLERS
 
 ORIGIN_STRIDE = 13
 """From the origin of one ray to that of the next: neither neighbours on a spiral nor rays of one ring share
 theirs, for 16 origins."""
-GRAZING = 2.0**-20
-"""Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
 
 
 class Hemispheres(Record):
@@ -67,34 +61,9 @@ class Hemispheres(Record):
         return (np.arange(len(self.n))[:, None] * each + of_point).ravel()
 
 
-def hemisphere_samples(draws: NDArray[np.float64], samples: int, sampler: Sampler) -> NDArray[np.float32]:
-    """(M, 3, samples) float32 cosine-weighted unit directions about the third axis.
-
-    Parameters
-    ----------
-    draws : (2, M) float64
-        In [0, 1): what each point's pattern is phased or scrambled by.
-    """
-    if sampler == "spiral":
-        table = spiral_table(samples)
-        return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
-
-    # Points of the unit square, by a scrambled Sobol sequence or by hashing.
-    seeds = (draws * 2.0**32).astype(np.uint32)
-    if sampler == "owen":
-        u, v = (owen(base[None, :], seed[:, None]) for base, seed in zip(sobol(samples), seeds, strict=True))
-    else:
-        ray = np.arange(samples, dtype=np.uint32)[None, :]
-        u, v = (unit_interval(hashed(k, hashed(k + 7, seeds[k])[:, None] + ray)) for k in (0, 1))
-
-    # Malley's method: uniform on the disc, projected up to the hemisphere.
-    r, angle = np.sqrt(u), 2 * np.pi * v
-    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=1).astype(F)
-
-
-def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: Sampler) -> NDArray[np.float32]:
-    """(M, 3, 3) float32 the axes of each point's pattern, as rows; spirals are turned at random."""
-    angle = 2 * np.pi * draws[0] if sampler == "spiral" else np.zeros(len(n))
+def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: str) -> NDArray[np.float32]:
+    """(M, 3, 3) float32 the axes of each point's pattern, as rows; some are turned at random."""
+    angle = 2 * np.pi * draws[0] if SAMPLERS[sampler].turned else np.zeros(len(n))
     return turned_frame(n, angle.astype(F))
 
 
@@ -124,7 +93,7 @@ def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def directions(
-    frames: NDArray[np.float32], draws: NDArray[np.float64], samples: int, sampler: Sampler
+    frames: NDArray[np.float32], draws: NDArray[np.float64], samples: int, sampler: str
 ) -> Vectors:
     """(M * samples, 3) float32 directions of the rays, one point after the other.
 
@@ -135,13 +104,12 @@ def directions(
     """
     out = np.empty((3, len(frames), samples), F)
     # a long row per component: three times as fast as one of three numbers per ray
-    np.matmul(
-        frames.transpose(0, 2, 1), hemisphere_samples(draws, samples, sampler), out=out.transpose(1, 0, 2)
-    )
+    pattern = SAMPLERS[sampler].directions(draws, samples)
+    np.matmul(frames.transpose(0, 2, 1), pattern, out=out.transpose(1, 0, 2))
     return out.reshape(3, -1).T
 
 
-def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: Sampler) -> None:
+def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: str) -> None:
     """Mirror those of the rays `d` that point below the plane of the triangle they leave, in place.
 
     Parameters
@@ -156,7 +124,7 @@ def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: Sampler) 
     each = over.origins_per_point
     axes = over.n if each == 1 else repeat_rows(over.n, each)
     cosine = dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1)
-    number = max_rays_below(cosine, samples, sampler)
+    number = SAMPLERS[sampler].max_below(cosine, samples)
     point = np.repeat(np.arange(len(over.n)), number)
     from_last = np.arange(len(point)) - np.repeat(np.cumsum(number) - number, number)
     ray = point * samples + samples - 1 - from_last
@@ -170,21 +138,3 @@ def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: Sampler) 
     up = np.maximum(-height, F(GRAZING)) - height
     for component, along in zip(d.T, take_rows(normal, below).T, strict=True):
         component[ray] += up * along
-
-
-def max_rays_below(cosine: Floats, samples: int, sampler: Sampler) -> NDArray[np.int64]:
-    """(M,) upper bound on how many rays, the last of each pattern, point below a plane.
-
-    Ray i of a spiral leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose
-    normal is at an angle t to the axis unless sin^2 > cos^2 t. Other samplers are in no order.
-
-    Parameters
-    ----------
-    cosine : (M,) float32
-        Of the angle between the pattern's axis and the plane's normal.
-    """
-    if sampler != "spiral":
-        return np.full(len(cosine), samples)
-    least = 1 / (4 * len(spiral_table(samples)))  # half of what the last phase leaves of the rim
-    sine2 = 1 - np.square(np.clip(cosine, 0, 1).astype(np.float64)) + GRAZING
-    return np.clip(np.ceil(sine2 * samples - least), 0, samples).astype(np.int64)

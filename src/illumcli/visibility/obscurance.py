@@ -15,8 +15,9 @@ from illumcli.arrays import F, Floats, Vectors, column_major, dot, repeat_rows, 
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record
 from illumcli.visibility.falloffs._base import Falloff
-from illumcli.visibility.hemisphere import Hemispheres, Sampler, directions, mirror_below, sample_frames
-from illumcli.visibility.obscurance_error import Estimates, neighbor_variation
+from illumcli.visibility.hemisphere import Hemispheres, directions, mirror_below, sample_frames
+from illumcli.visibility.obscurance_error import Estimates
+from illumcli.visibility.samplers import SAMPLERS
 
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
@@ -33,7 +34,7 @@ class Method(Record):
     samples: int
     falloff: Falloff
     radius: float  # of the scene [scene units]
-    sampler: Sampler = "spiral"
+    sampler: str = "spiral"
     faces: Faces = "count"
     facets: Vectors | None = None  # (T, 3) float32 normals of all triangles, unless every face counts
 
@@ -97,7 +98,7 @@ def estimates(
         mu = occluder_weights(tracer, origins, d, method).reshape(-1, method.samples)
         w[points] = mean_openness(mu)
         if errors:
-            variation[points] = neighbor_variation(mu, method.sampler)
+            variation[points] = SAMPLERS[method.sampler].variation(mu)
         if bent_normal is not None:
             bent_normal[points] = mean_open_direction(d, mu)
     return Estimates(w, variation, bent_normal, count - casting)

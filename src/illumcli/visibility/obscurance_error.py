@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors
 from illumcli.records import Record, Value
-from illumcli.visibility.hemisphere import Sampler
 
 NO_HIT_QUANTILE = 3 / 1.96
 """Rule of three: where none of K rays was blocked, at most 3 / K are, with 95 % confidence; as a standard
@@ -63,40 +62,6 @@ class Errors(Value):
         """(M,) float32 standard error of each estimate."""
         scaled = self.floor + self.slope * neighbor_variation.astype(np.float64)
         return (np.sqrt(scaled) / samples).astype(F)
-
-
-def neighbor_variation(mu: NDArray[Any], sampler: Sampler) -> NDArray[np.float32]:
-    """(M,) variation of mu between neighbouring rays; predicts the error of the point set.
-
-    On a golden-angle spiral, points whose numbers differ by a Fibonacci number near sqrt(N) are neighbours.
-    Their squared differences count how many cells the edges of occluders cross, and only those cause error.
-    For other samplers it is N times the variance.
-
-    Parameters
-    ----------
-    mu : (M, samples) bool or float32
-        Of each point's rays in the order of its pattern.
-    """
-    samples = mu.shape[1]
-    if sampler != "spiral":
-        mean = mu.mean(axis=1, dtype=np.float64)
-        square = mean if mu.dtype == np.bool_ else np.square(mu, dtype=np.float64).mean(axis=1)
-        return (samples * np.maximum(square - mean * mean, 0)).astype(F)
-    total = np.zeros(len(mu), F)
-    for step in neighbor_steps(samples):
-        if mu.dtype == np.bool_:
-            total += np.count_nonzero(mu[:, step:] != mu[:, :-step], axis=1)
-        else:
-            total += np.square(mu[:, step:] - mu[:, :-step]).sum(axis=1)
-    return total
-
-
-def neighbor_steps(samples: int) -> list[int]:
-    """Two consecutive Fibonacci numbers from 3/4 sqrt(samples) on, as far as they are below `samples`."""
-    a, b = 1, 2
-    while a < 0.75 * samples**0.5:
-        a, b = b, a + b
-    return [step for step in (a, b) if step < samples]
 
 
 def _line(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:

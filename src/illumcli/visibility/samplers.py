@@ -1,0 +1,131 @@
+"""Samplers: point sets of rays over the hemisphere. `SAMPLERS`, at the end, has a row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats
+from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
+from illumcli.records import Value
+
+Directions: TypeAlias = Callable[[NDArray[np.float64], int], NDArray[np.float32]]
+GRAZING = 2.0**-20
+"""Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
+
+
+def variance(mu: NDArray[Any]) -> NDArray[np.float32]:
+    """(M,) N times the variance of each row of mu, (M, N)."""
+    mean = mu.mean(axis=1, dtype=np.float64)
+    square = mean if mu.dtype == np.bool_ else np.square(mu, dtype=np.float64).mean(axis=1)
+    return (mu.shape[1] * np.maximum(square - mean * mean, 0)).astype(F)
+
+
+def every_ray(cosine: Floats, samples: int) -> NDArray[np.int64]:
+    """(M,) `samples`: a pattern in no order bounds nothing."""
+    return np.full(len(cosine), samples)
+
+
+class Sampler(Value):
+    """A point set over the hemisphere."""
+
+    mark: str
+    """The letter that stands for it in plots of letters."""
+    directions: Directions
+    """(M, 3, samples) float32 cosine-weighted unit directions about the third axis, from (2, M) draws in
+    [0, 1) that each point's pattern is phased or scrambled by, and the number of samples."""
+    turned: bool = False
+    """Is the pattern turned about the normal, too, by the first draw?"""
+    variation: Callable[[NDArray[Any]], NDArray[np.float32]] = variance
+    """(M,) variation of mu, (M, samples), that predicts the error of the point set."""
+    max_below: Callable[[Floats, int], NDArray[np.int64]] = every_ray
+    """(M,) upper bound on how many rays, the last of each pattern, point below a plane whose normal is at an
+    angle of this cosine, (M,), to the pattern's axis."""
+
+
+# --- from points of the unit square -------------------------------------------------------------------
+
+
+def malley(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(M, 3, N) cosine-weighted directions of points of the unit square, (M, N) each.
+
+    Malley's method: uniform on the disc, projected up to the hemisphere.
+    """
+    r, angle = np.sqrt(u), 2 * np.pi * v
+    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=1).astype(F)
+
+
+def owen_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.float32]:
+    """Owen-scrambled Sobol points, another scramble for each point."""
+    seeds = (draws * 2.0**32).astype(np.uint32)
+    u, v = (owen(base[None, :], seed[:, None]) for base, seed in zip(sobol(samples), seeds, strict=True))
+    return malley(u, v)
+
+
+def random_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.float32]:
+    """Independent points."""
+    seeds = (draws * 2.0**32).astype(np.uint32)
+    ray = np.arange(samples, dtype=np.uint32)[None, :]
+    u, v = (unit_interval(hashed(k, hashed(k + 7, seeds[k])[:, None] + ray)) for k in (0, 1))
+    return malley(u, v)
+
+
+# --- the spiral ---------------------------------------------------------------------------------------
+
+
+def spiral_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.float32]:
+    """Golden-angle spirals, phased by the second draw."""
+    table = spiral_table(samples)
+    return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
+
+
+def spiral_variation(mu: NDArray[Any]) -> NDArray[np.float32]:
+    """(M,) sum of squared differences of mu between neighbouring rays.
+
+    On a golden-angle spiral, points whose numbers differ by a Fibonacci number near sqrt(N) are neighbours.
+    Their squared differences count how many cells the edges of occluders cross, and only those cause error.
+
+    Parameters
+    ----------
+    mu : (M, N) bool or float32
+        Of each point's rays in the order of the spiral.
+    """
+    total = np.zeros(len(mu), F)
+    for step in neighbor_steps(mu.shape[1]):
+        if mu.dtype == np.bool_:
+            total += np.count_nonzero(mu[:, step:] != mu[:, :-step], axis=1)
+        else:
+            total += np.square(mu[:, step:] - mu[:, :-step]).sum(axis=1)
+    return total
+
+
+def neighbor_steps(samples: int) -> list[int]:
+    """Two consecutive Fibonacci numbers from 3/4 sqrt(samples) on, as far as they are below `samples`."""
+    a, b = 1, 2
+    while a < 0.75 * samples**0.5:
+        a, b = b, a + b
+    return [step for step in (a, b) if step < samples]
+
+
+def spiral_max_below(cosine: Floats, samples: int) -> NDArray[np.int64]:
+    """(M,) how many rays at most point below the plane.
+
+    Ray i leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose normal is at
+    an angle t to the axis unless sin^2 > cos^2 t.
+    """
+    least = 1 / (4 * len(spiral_table(samples)))  # half of what the last phase leaves of the rim
+    sine2 = 1 - np.square(np.clip(cosine, 0, 1).astype(np.float64)) + GRAZING
+    return np.clip(np.ceil(sine2 * samples - least), 0, samples).astype(np.int64)
+
+
+SAMPLERS: Mapping[str, Sampler] = {
+    "spiral": Sampler(
+        "o", spiral_directions, turned=True, variation=spiral_variation, max_below=spiral_max_below
+    ),
+    "owen": Sampler("x", owen_directions),
+    "random": Sampler(".", random_directions),
+}
+"""By the name in scenes and on the command line; the first is the default."""

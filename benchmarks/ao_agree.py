@@ -26,7 +26,7 @@ from illumcli.arrays import F, column_major, cross, dot, length, take_rows, unit
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeSettings
 from illumcli.graph import topological_order
-from illumcli.rays.interaction import Hits, facets
+from illumcli.rays.interaction import Hits, interact
 from illumcli.render_graph.build import recipes
 from illumcli.scene.load import SceneFile, load
 from illumcli.visibility.baked import read_npz
@@ -35,7 +35,7 @@ POINTS = 20 if SMALL else 2000
 RAYS = 64 if SMALL else 256
 AROUND = 16
 INSIDE = 1e-3
-MADE = ("world", "tracer", "corner_normals")
+MADE = ("geometry", "tracer", "corner_normals")
 
 
 class Pictures:
@@ -43,10 +43,10 @@ class Pictures:
 
     def __init__(self, loaded: SceneFile) -> None:
         self.book = recipes(loaded.scene, loaded)
-        given = ("hits", "facets", "obscurance_draws", "view", "tile")
+        given = ("hits", "interaction", "obscurance_draws", "view", "tile")
         self.steps = topological_order(self.book, [*MADE, "obscurance"], given)
         self.known: dict[str, Any] = {}
-        self.at: set[str] = {"hits", "facets", "obscurance_draws"}
+        self.at: set[str] = {"hits", "interaction", "obscurance_draws"}
         for step in self.steps:
             if self.at & set(step.inputs.values()):
                 self.at.add(step.output)
@@ -55,15 +55,15 @@ class Pictures:
 
     def w(self, triangle: np.ndarray, weights: np.ndarray, seed: int = 0) -> np.ndarray:
         """(M,) obscurance at points on triangles with (M, 3) barycentric weights."""
-        world = self.known["world"]
+        geometry = self.known["geometry"]
         triangle, (_, u, v) = triangle.astype(np.int32), weights.T.astype(F)
         a, b, c = (
-            column_major(take_rows(world.vertices, world.triangles[triangle, k]), np.float64)
+            column_major(take_rows(geometry.vertices, geometry.triangles[triangle, k]), np.float64)
             for k in range(3)
         )
         own = dict(self.known)
         own["hits"] = Hits(np.arange(len(triangle), dtype=np.int32), triangle, u, v)
-        own["facets"] = facets(world, triangle, u, v, unit(cross(b - a, c - a)))
+        own["interaction"] = interact(geometry, triangle, u, v, unit(cross(b - a, c - a)))
         own["obscurance_draws"] = np.random.default_rng(seed).random((2, len(triangle)))
         for step in self.steps:
             if step.output in self.at:
@@ -73,16 +73,21 @@ class Pictures:
 
 def around(pictures: Pictures, corner: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
     """(K * AROUND,) triangles and (K * AROUND, 3) weights of points close to K corners."""
-    world, normals = pictures.known["world"], pictures.known["corner_normals"]
-    places = [column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3)]
+    geometry, normals = pictures.known["geometry"], pictures.known["corner_normals"]
+    places = [
+        column_major(take_rows(geometry.vertices, geometry.triangles[:, k]), np.float64) for k in range(3)
+    ]
     ahead, back = ([places[(k + s) % 3] - places[k] for k in range(3)] for s in (1, 2))
     areas = [length(cross(a, b)) for a, b in zip(ahead, back, strict=True)]
     angle = np.stack(
         [np.arctan2(areas[k], dot(ahead[k], back[k])) * (areas[k] > 0) for k in range(3)], axis=1
     )
-    vertex, own = world.triangles.ravel(), take_rows(normals.values, normals.index[world.corners.ravel()])
+    vertex, own = (
+        geometry.triangles.ravel(),
+        take_rows(normals.values, normals.index[geometry.corners.ravel()]),
+    )
     by_vertex = np.argsort(vertex, kind="stable")
-    begins = np.searchsorted(vertex[by_vertex], np.arange(len(world.vertices) + 1))
+    begins = np.searchsorted(vertex[by_vertex], np.arange(len(geometry.vertices) + 1))
     triangles, weights = [], []
     for each in corner:
         beside = by_vertex[begins[vertex[each]] : begins[vertex[each] + 1]]
@@ -117,23 +122,25 @@ def agreement(path: Path, folder: Path) -> list[float]:
     asked = Pictures(load(scene, ()))
     scene.write_text(about % (RAYS, mesh.name, f", obscurance: {baked.name}"))
     reads = Pictures(load(scene, ()))
-    values, world = read_npz(baked), asked.known["world"]
-    corners = world.placed[0].mesh.corners
-    w = values.of_corners("mesh", corners, len(world.vertices))
+    values, geometry = read_npz(baked), asked.known["geometry"]
+    corners = geometry.placed[0].mesh.corners
+    w = values.of_corners("mesh", corners, len(geometry.vertices))
     error = values.standard_error[corners]
     if values.corner_standard_error is not None:
         error = values.corner_standard_error
 
     # at corners that cast rays
     random = np.random.default_rng(0)
-    few = random.permutation(np.flatnonzero(error[world.corners.ravel()] > 0))[:POINTS]
+    few = random.permutation(np.flatnonzero(error[geometry.corners.ravel()] > 0))[:POINTS]
     found = asked.w(*around(asked, few, random)).reshape(len(few), AROUND)
-    at = world.corners.ravel()[few]
+    at = geometry.corners.ravel()[few]
     spread = found.std(axis=1, ddof=1) / AROUND**0.5
     z = (w[at] - found.mean(axis=1)) / np.hypot(spread, error[at])
 
     # all over the area
-    a, b, c = (column_major(take_rows(world.vertices, world.triangles[:, k]), np.float64) for k in range(3))
+    a, b, c = (
+        column_major(take_rows(geometry.vertices, geometry.triangles[:, k]), np.float64) for k in range(3)
+    )
     area = length(cross(b - a, c - a))
     triangle = random.choice(len(area), POINTS, p=area / area.sum())
     weights = random.dirichlet((1, 1, 1), POINTS)

@@ -105,17 +105,17 @@ def estimated(case: Any, samples: int) -> Found:
         "obscurance": lambda: exponential(inputs),
     }[case.type]()
     around = surroundings(inputs)
-    world = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
+    geometry = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     corners = around.vertices[around.triangles[0]]
-    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius
-    tracer = Tracer(world.vertices, world.triangles)
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / geometry.render_space.radius
+    tracer = Tracer(geometry.vertices, geometry.triangles)
     rng = np.random.default_rng(1)
 
     def cast(count: int) -> Estimates:
         ng = column_major(np.tile([0.0, 0.0, 1.0], (count, 1)), F)
-        here = np.tile(world.frame.from_world(np.zeros(3)), (count, 1))
+        here = np.tile(geometry.render_space.from_world(np.zeros(3)), (count, 1))
         origins = offset_ray_origins(here, ng, np.full(count, edge))
-        method = Method(samples, falloff, world.frame.radius)
+        method = Method(samples, falloff, geometry.render_space.radius)
         return estimates(tracer, Hemispheres(ng, origins), rng.random((2, count)), method)
 
     return Found(case.expected[0], cast(SCRAMBLES), cast(OWN), cast(OWN))

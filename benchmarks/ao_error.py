@@ -41,7 +41,7 @@ def caster(
     geometry = surfaces.geometry
     settings = BakeSettings(sampler=sampler, ground=ground)
     vertices = vertex_points(surfaces)
-    method = Method(256, settings.obscurance().falloff, geometry.frame.radius, sampler)
+    method = Method(256, settings.obscurance().falloff, geometry.render_space.radius, sampler)
     threads = len(os.sched_getaffinity(0))
     made = BakeSampler(
         vertices.points, occluders_of(scene, geometry, settings), method, seed, threads, no_progress

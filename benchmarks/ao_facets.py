@@ -44,7 +44,7 @@ def shared_edges(triangles: np.ndarray) -> np.ndarray:
     return np.stack([at[first], at[first + 1]], axis=1)
 
 
-def beside(world: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
+def beside(geometry: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
     """Points just inside triangles, beside the middle of a side, seen from in front."""
     triangle, k = np.divmod(side, 3)
     weights = np.full((len(side), 3), (1 - INSIDE) / 2, F)
@@ -52,11 +52,12 @@ def beside(world: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
     u, v = weights[:, 1], weights[:, 2]
     triangle = triangle.astype(np.int32)
     corner = [
-        column_major(take_rows(world.vertices, world.triangles[triangle, k]), np.float64) for k in range(3)
+        column_major(take_rows(geometry.vertices, geometry.triangles[triangle, k]), np.float64)
+        for k in range(3)
     ]
     front = unit(np.cross(corner[1] - corner[0], corner[2] - corner[0]))
     hits = Hits(np.arange(len(side), dtype=np.int32), triangle, u, v)
-    return hits, facets(world, triangle, u, v, column_major(front, np.float64))
+    return hits, facets(geometry, triangle, u, v, column_major(front, np.float64))
 
 
 def jumps(path: Path) -> tuple[int, float, float, float]:
@@ -64,23 +65,23 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     loaded = mesh_alone(path)
     made: dict[str, Any] = {}
     for step in topological_order(
-        recipes(loaded.scene, loaded), ["world", "tracer", "corner_normals", "planar_polygons"]
+        recipes(loaded.scene, loaded), ["geometry", "tracer", "corner_normals", "planar_polygons"]
     ):
         made[step.output] = step.run(made)
-    world = made["world"]
+    geometry = made["geometry"]
     sides = []
-    for side in shared_edges(world.triangles).T:
-        hits, facet = beside(world, side)
-        weights = corner_weights(world, hits, made["planar_polygons"])
-        n = obscurance_normals(["phong"], world, weights, facet, made["corner_normals"])
+    for side in shared_edges(geometry.triangles).T:
+        hits, facet = beside(geometry, side)
+        weights = corner_weights(geometry, hits, made["planar_polygons"])
+        n = obscurance_normals(["phong"], geometry, weights, facet, made["corner_normals"])
         sides.append((hits, facet, n))
     (_, left, n), (_, right, m) = sides
-    polygon = [world.polygons[hits.triangle] for hits, _, _ in sides]
+    polygon = [geometry.polygons[hits.triangle] for hits, _, _ in sides]
     sound = (length(left.ng) > 0.5) & (length(right.ng) > 0.5) & (polygon[0] != polygon[1])
     smooth = np.flatnonzero(sound & (length(n - m) < AGREE) & (dot(left.ng, right.ng) < 1 - 1e-6))
     few = np.sort(np.random.default_rng(0).permutation(smooth)[:EDGES])
 
-    method = Method(RAYS, Step(), world.frame.radius)
+    method = Method(RAYS, Step(), geometry.render_space.radius)
     found = []
     for seed, (_, facet, normal) in enumerate([*sides, sides[0]]):
         own = SurfaceInteraction(*(take_rows(values, few) for values in vars(facet).values()))

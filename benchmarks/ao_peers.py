@@ -122,7 +122,7 @@ def illum(path: Path, truth: np.ndarray) -> Baker:
 
     def bake(rays: int) -> np.ndarray:
         points = vertex_points(surfaces).points
-        method = Method(rays, settings.obscurance().falloff, geometry.frame.radius)
+        method = Method(rays, settings.obscurance().falloff, geometry.render_space.radius)
         occluders = occluders_of(loaded.scene, geometry, settings)
         made = BakeSampler(points, occluders, method, 0, THREADS, no_progress)
         lanes = np.flatnonzero(~made.open_points())
@@ -139,8 +139,8 @@ def illum(path: Path, truth: np.ndarray) -> Baker:
 def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
     """Those that are installed."""
     loaded = mesh_alone(path)
-    world = surfaces_of(loaded.scene, loaded)[0].geometry
-    vertices, faces = np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles)
+    geometry = surfaces_of(loaded.scene, loaded)[0].geometry
+    vertices, faces = np.ascontiguousarray(geometry.vertices), np.ascontiguousarray(geometry.triangles)
     origins, n = np.ascontiguousarray(starts(own)), np.ascontiguousarray(own.points.n)
     found = []
     for name, make in {

@@ -59,22 +59,22 @@ def placed_bunny(folder: Path) -> Path:
     source = bunny(folder)
     mesh = read_mesh(folder / source) if source.endswith(".obj") else Teapot(shape="teapot").mesh()
     matrix = transforms.transform_matrix(Transform(fit=1.0), mesh)
-    world = scene_geometry.place_meshes([mesh], [matrix])
-    points = world.frame.to_world(world.vertices.astype(np.float64))
-    normals = scene_geometry.scene_normals(world, [corner_normals(mesh)])
+    geometry = scene_geometry.place_meshes([mesh], [matrix])
+    points = geometry.render_space.to_world(geometry.vertices.astype(np.float64))
+    normals = scene_geometry.scene_normals(geometry, [corner_normals(mesh)])
     own = np.zeros((len(points), 3), np.float32)
-    own[world.triangles] = normals.values[normals.index[world.corners]]
+    own[geometry.triangles] = normals.values[normals.index[geometry.corners]]
     path = folder / "placed.ply"
     vertices = np.concatenate([points, own], axis=1).astype("<f4")
-    faces = np.empty(len(world.triangles), [("n", "u1"), ("v", "<i4", 3)])
-    faces["n"], faces["v"] = 3, world.triangles
+    faces = np.empty(len(geometry.triangles), [("n", "u1"), ("v", "<i4", 3)])
+    faces["n"], faces["v"] = 3, geometry.triangles
     names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     path.write_bytes(
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{names}"
         f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n".encode()
         + vertices.tobytes() + faces.tobytes()
     )  # fmt: skip
-    np.savez(folder / "placed.npz", points=points, normals=own, triangles=world.triangles)
+    np.savez(folder / "placed.npz", points=points, normals=own, triangles=geometry.triangles)
     return path
 
 

@@ -22,10 +22,10 @@ import numpy as np
 
 from _bench import REPEATS, SMALL, Took, ambient_scene, header, ratio, table, took
 from illumcli.commands.render import run
+from illumcli.film.tiles import Tile
 from illumcli.rays.embree import Tracer
 from illumcli.render_graph import execute
 from illumcli.render_graph.schedule import plan
-from illumcli.render_graph.stages import Tile
 from illumcli.scene.load import load
 
 Question = tuple[str, np.ndarray, np.ndarray, Any]
@@ -60,20 +60,20 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
             ]
             x, rows = (np.concatenate(part) for part in zip(*(tile.pixels() for tile in tiles), strict=True))
             execute.at_pixels(steps, shared, view, x, rows, threads, execute.RenderStats())
-            yield shared["world"], asked[:]
+            yield shared["geometry"], asked[:]
             asked.clear()
     finally:
         for name, function in own.items():
             setattr(Tracer, name, function)
 
 
-def scene_of(world: Any) -> Any:
+def scene_of(geometry: Any) -> Any:
     """embreex's own scene over the world's triangles, built."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
     scene = EmbreeScene(robust=True)
-    TriangleMesh(scene, np.ascontiguousarray(world.vertices), np.ascontiguousarray(world.triangles))
+    TriangleMesh(scene, np.ascontiguousarray(geometry.vertices), np.ascontiguousarray(geometry.triangles))
     probe = np.zeros((1, 3), np.float32)
     scene.run(probe, probe + np.float32(1), query="OCCLUDED")
     return scene
@@ -96,8 +96,8 @@ def replay(path: Path, threads: int) -> tuple[Took, int]:
     wall = cpu = 0.0
     rays, scene = 0, None
     with ThreadPoolExecutor(threads) as pool:
-        for world, questions in recorded(path, threads):
-            scene = scene or scene_of(world)
+        for geometry, questions in recorded(path, threads):
+            scene = scene or scene_of(geometry)
             own = took(lambda s=scene, q=questions: list(pool.map(lambda each: ask(s, each), q)))
             wall, cpu = wall + own.wall, cpu + own.cpu
             rays += sum(len(question[1]) for question in questions)

@@ -17,17 +17,17 @@ from unittest.mock import patch
 
 import numpy as np
 
-from illumcli.arrays import take_rows
+from illumcli.arrays import dot, take_rows
+from illumcli.lights import incident
+from illumcli.lights.incident import LitPoints
 from illumcli.models._base import IlluminationModel
 from illumcli.render_graph import build as recipes
-from illumcli.render_graph import stages
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import unseen_objects, without
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 from illumcli.shading import direct
-from illumcli.visibility import incident as arriving
 
 SCENE = """
 version: 1
@@ -65,31 +65,29 @@ class Skip:
     """More of them."""
 
 
-def everywhere(light, frame, position, n=None):
-    """Every lane is asked about, those that get nothing with strength 0."""
-    got = light.arriving(position, frame)
-    reached = got.strength > 0
-    if n is not None:
-        reached &= arriving.dot(n, got.l) > 0
-    strength = np.where(reached, got.strength, 0).astype(np.float32)
-    lane = np.arange(len(position), dtype=np.int32)
-    return arriving.LitPoints(lane, len(position), got.l, got.distance, strength)
+def everywhere(light, render_space, points):
+    """Every point is asked about, those that get nothing with scale 0."""
+    sample = light.sample_at(points.position, render_space)
+    reached = (sample.irradiance_scale > 0) & (dot(points.n, sample.l) > 0)
+    scale = np.where(reached, sample.irradiance_scale, 0).astype(np.float32)
+    index = np.arange(len(points.position), dtype=np.int32)
+    return LitPoints(index, len(index), sample.l, sample.distance, scale)
 
 
-def asked(light, frame, points, shadow):
-    """Every lane that is not in shadow, those that get nothing with strength 0."""
-    lit = everywhere(light, frame, points.position, points.n)
+def asked(light, render_space, points, shadow):
+    """Every point that is not in shadow, those that get nothing with scale 0."""
+    lit = everywhere(light, render_space, points)
     free = np.flatnonzero(shadow)
-    lane, l, distance, strength = (
-        take_rows(part, free) for part in (lit.lane, lit.l, lit.distance, lit.strength)
+    index, l, distance, scale = (
+        take_rows(part, free) for part in (lit.index, lit.l, lit.distance, lit.irradiance_scale)
     )
-    return arriving.LitPoints(lane, lit.count, l, distance, strength)
+    return LitPoints(index, lit.count, l, distance, scale)
 
 
-def dimmed(light, frame, points, shadow):
-    """Every lit point is evaluated, those in shadow with strength 0."""
-    lit = arriving.lit(light, frame, points.position, points.n)
-    return replace(lit, strength=lit.strength * shadow.take(lit.lane))
+def dimmed(light, render_space, points, shadow):
+    """Every lit point is evaluated, those in shadow with scale 0."""
+    lit = incident.incident(light, render_space, points)
+    return replace(lit, irradiance_scale=lit.irradiance_scale * shadow.take(lit.index))
 
 
 def yes(*_):
@@ -109,8 +107,12 @@ plan_module = import_module("illumcli.render_graph.schedule")
 AMBIENT = ((recipes, "is_ambient", yes), (plan_module, "is_ambient", yes))
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
-    Skip("points a light does not reach", (), ((stages, "lit_lanes", everywhere), (stages, "free", asked))),
-    Skip("points in shadow", (), ((stages, "free", dimmed),)),
+    Skip(
+        "points a light does not reach",
+        (),
+        ((incident, "incident", everywhere), (incident, "unshadowed", asked)),
+    ),
+    Skip("points in shadow", (), ((incident, "unshadowed", dimmed),)),
     Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),
     Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),
@@ -135,7 +137,7 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
     response, evaluate = direct.response, direct.evaluate
 
     def counted(models, lobes, material, lit, *rest):
-        counts["responses"] += len(lit.lane)
+        counts["responses"] += len(lit.index)
         return response(models, lobes, material, lit, *rest)
 
     def counted_lobes(lobes, given):
@@ -151,7 +153,7 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
         parts = list(bands(made, shared, made.views[0], 1, tally))
     counts["rays"] = sum(tally.rays.values())
     counts["steps"] = len(made.once) + len(made.tile)
-    counts["triangles"] = len(shared["world"].triangles)
+    counts["triangles"] = len(shared["geometry"].triangles)
     return {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}, counts
 
 

@@ -20,7 +20,8 @@ FOLDERS = (
     "render_graph",
     "shading images cache scene",
     "visibility mesh_files",
-    "rays files film",
+    "film",
+    "rays files",
     "lights models geometry",
     "schema",
 )

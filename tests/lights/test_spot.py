@@ -19,7 +19,7 @@ def cone(angle: float, softness: float, theta: np.ndarray) -> np.ndarray:
     spot = Spot.validated({**light, "angle": angle, "softness": softness})
     floor = np.zeros((len(theta), 3), np.float32, order="F")
     floor[:, 0] = HEIGHT * np.tan(theta)
-    return spot.arriving(floor, FRAME).strength
+    return spot.sample_at(floor, FRAME).irradiance_scale
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -44,4 +44,4 @@ def test_soft_rim_is_a_smooth_step_in_the_cosine(angle, softness):
 def test_cone_of_180_degrees_is_everything():
     every = {"light": "spot", "position": [0, 1, 0], "angle": 180, "softness": 0}
     points = np.array([[0, 0, 0], [5, 1, 0], [0, 9, 0], [0.1, 9, 0.3]], np.float32, order="F")
-    assert (Spot.validated(every).arriving(points, FRAME).strength > 0).all()
+    assert (Spot.validated(every).sample_at(points, FRAME).irradiance_scale > 0).all()

@@ -17,7 +17,8 @@ UNIT = RenderSpace((0.0, 0.0, 0.0), 1.0)
 def test_the_centre_looks_at_the_target_and_corners_open_by_the_field_of_view():
     camera = Perspective(position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), fov=90.0)
     points = np.array([[100.0, 50.0], [100.0, 0.0], [0.0, 50.0], [200.0, 100.0]])
-    o, d, skipped = camera_rays(camera, UNIT, 200, 100, points)
+    rays = camera_rays(camera, UNIT, 200, 100, points)
+    o, d, skipped = rays.origins, rays.directions, rays.start_distance
     np.testing.assert_allclose(d[0], [0, 0, -1], atol=1e-7)
     np.testing.assert_allclose(d[1], np.array([0, 1, -1]) / 2**0.5, atol=1e-7)
     np.testing.assert_allclose(d[2], np.array([-2, 0, -1]) / 5**0.5, atol=1e-7)
@@ -29,7 +30,8 @@ def test_orthographic_rays_are_parallel_and_span_the_extent():
     camera = Orthographic(
         projection="orthographic", position=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), extent=4.0
     )
-    o, d, _ = camera_rays(camera, UNIT, 200, 100, np.array([[100.0, 0.0], [200.0, 50.0]]))
+    rays = camera_rays(camera, UNIT, 200, 100, np.array([[100.0, 0.0], [200.0, 50.0]]))
+    o, d = rays.origins, rays.directions
     np.testing.assert_allclose(d, [[0, 0, -1]] * 2, atol=1e-7)
     np.testing.assert_allclose(o[:, :2], [[0, 2], [4, 0]], atol=1e-6)
 
@@ -39,7 +41,8 @@ def test_a_camera_a_million_radii_away_aims_as_well_as_a_near_one():
         camera = Orthographic(
             projection="orthographic", position=(0.3, 0.2, distance), target=(0.3, 0.2, 0.0)
         )
-        o, _, skipped = camera_rays(camera, UNIT, 100, 100, np.array([[50.5, 50.5]]))
+        rays = camera_rays(camera, UNIT, 100, 100, np.array([[50.5, 50.5]]))
+        o, skipped = rays.origins, rays.start_distance
         np.testing.assert_allclose(o[0], [0.31, 0.19, 1.25], atol=1e-6)
         assert skipped[0] == pytest.approx(distance - 1.25)
 

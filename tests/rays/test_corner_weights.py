@@ -51,31 +51,33 @@ def polygon(points):
     return Mesh(points, np.arange(len(points), dtype=np.int32), np.array([0, len(points)], np.int32))
 
 
-def anywhere(world, count=400, seed=3):
+def anywhere(geometry, count=400, seed=3):
     random = np.random.default_rng(seed)
-    triangle = random.integers(0, len(world.triangles), count).astype(np.int32)
+    triangle = random.integers(0, len(geometry.triangles), count).astype(np.int32)
     a, b = np.sort(random.random((2, count)), axis=0)
     return triangle, a.astype(F), (b - a).astype(F)
 
 
-def positions(world, triangle, u, v):
-    a, b, c = (world.vertices[world.triangles[triangle, k]].astype(float) for k in range(3))
+def positions(geometry, triangle, u, v):
+    a, b, c = (geometry.vertices[geometry.triangles[triangle, k]].astype(float) for k in range(3))
     u, v = u.astype(float)[:, None], v.astype(float)[:, None]
     return (1 - u - v) * a + u * b + v * c
 
 
-def dense(weights, world):
+def dense(weights, geometry):
     """(M, C) weights of all the World's corners."""
-    corners = CornerVectors(np.eye(world.corners.max() + 1, dtype=F), np.arange(world.corners.max() + 1))
-    return weights.interpolate(world, corners)
+    corners = CornerVectors(
+        np.eye(geometry.corners.max() + 1, dtype=F), np.arange(geometry.corners.max() + 1)
+    )
+    return weights.interpolate(geometry, corners)
 
 
 def at(points, seed=3, matrix=TURNED):
-    world = place_meshes([polygon(points)], [matrix])
-    found = planar_polygons(world)
+    geometry = place_meshes([polygon(points)], [matrix])
+    found = planar_polygons(geometry)
     assert found is not None
-    hits = anywhere(world, seed=seed)
-    return world, hits, corner_weights(world, found, *hits)
+    hits = anywhere(geometry, seed=seed)
+    return geometry, hits, corner_weights(geometry, found, *hits)
 
 
 convex = st.builds(
@@ -105,35 +107,35 @@ stars = st.builds(
 @given(points=convex | stars, mirrored=st.booleans())
 @settings(max_examples=60, deadline=None)
 def test_weights_sum_to_one_and_linear_functions_come_back(points, mirrored):
-    world, hits, weights = at(points, matrix=MIRRORED if mirrored else TURNED)
+    geometry, hits, weights = at(points, matrix=MIRRORED if mirrored else TURNED)
     own = weights.groups[0]
     np.testing.assert_allclose(sum(own.weight(k) for k in range(own.count)), 1, atol=3e-7)
     np.testing.assert_allclose(
-        weights.interpolate_vertices(world, world.vertices), positions(world, *hits), atol=4e-7
+        weights.interpolate_vertices(geometry, geometry.vertices), positions(geometry, *hits), atol=4e-7
     )
 
 
 @given(points=convex)
 @settings(max_examples=60, deadline=None)
 def test_no_weight_is_negative_in_a_convex_polygon(points):
-    world, _, weights = at(points)
-    assert dense(weights, world).min() >= -1e-6  # a hit lies across an edge by the rounding of u, v
+    geometry, _, weights = at(points)
+    assert dense(weights, geometry).min() >= -1e-6  # a hit lies across an edge by the rounding of u, v
 
 
 @pytest.mark.parametrize("name", NAMED)
 def test_the_named_polygons_are_interpolated_with_linear_precision(name):
-    world, hits, weights = at(NAMED[name])
+    geometry, hits, weights = at(NAMED[name])
     np.testing.assert_allclose(
-        weights.interpolate_vertices(world, world.vertices), positions(world, *hits), atol=4e-7
+        weights.interpolate_vertices(geometry, geometry.vertices), positions(geometry, *hits), atol=4e-7
     )
 
 
 @given(points=convex | stars | st.sampled_from(list(NAMED.values())), seed=st.integers(0, 99))
 @settings(max_examples=60, deadline=None)
 def test_values_stay_within_the_range_of_the_corners(points, seed):
-    world, _, weights = at(points)
-    values = np.random.default_rng(seed).uniform(-1, 1, (len(world.vertices), 2)).astype(F)
-    found = weights.interpolate_vertices(world, values)
+    geometry, _, weights = at(points)
+    values = np.random.default_rng(seed).uniform(-1, 1, (len(geometry.vertices), 2)).astype(F)
+    found = weights.interpolate_vertices(geometry, values)
     assert (found >= values.min(axis=0) - 1e-6).all()
     assert (found <= values.max(axis=0) + 1e-6).all()
 
@@ -141,20 +143,20 @@ def test_values_stay_within_the_range_of_the_corners(points, seed):
 @given(points=convex | stars | st.sampled_from([L_SHAPE, ARROW, STAR, STRAIGHT]), seed=st.integers(0, 99))
 @settings(max_examples=60, deadline=None)
 def test_values_are_linear_along_edges(points, seed):
-    world = place_meshes([polygon(points)], [TURNED])
-    found = planar_polygons(world)
-    count = len(world.vertices)
+    geometry = place_meshes([polygon(points)], [TURNED])
+    found = planar_polygons(geometry)
+    count = len(geometry.vertices)
     values = np.random.default_rng(seed).uniform(-1, 1, (count, 1)).astype(F)
     share = np.linspace(0, 1, 17).astype(F)
-    for triangle in range(len(world.triangles)):
+    for triangle in range(len(geometry.triangles)):
         for k in range(3):
-            a, b = (int(world.corners[triangle, (k + step) % 3]) for step in (0, 1))
+            a, b = (int(geometry.corners[triangle, (k + step) % 3]) for step in (0, 1))
             if (b - a) % count not in (1, count - 1):
                 continue  # a diagonal
             w = np.zeros((3, len(share)), F)
             w[k], w[(k + 1) % 3] = 1 - share, share
             which = np.full(len(share), triangle, np.int32)
-            along = corner_weights(world, found, which, w[1], w[2]).interpolate_vertices(world, values)
+            along = corner_weights(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
             wanted = (1 - share) * values[a] + share * values[b]
             np.testing.assert_allclose(along[:, 0], wanted, atol=2e-6)
 
@@ -188,13 +190,13 @@ def test_another_cut_gives_the_same_values(points, turn):
 @pytest.mark.parametrize("skew", [0.0, 1e-14, 1e-9, 1e-3, 0.3, -0.3])
 def test_parallelograms_and_trapezoids_have_exact_bilinear_coordinates(skew):
     corners = np.array([[0, 0], [1, 0], [1.2 + skew, 1], [0.2 - skew, 1 + skew / 2]])
-    world = place_meshes([polygon(corners)], [np.eye(4)])
-    triangle, u, v = anywhere(world)
-    found = dense(corner_weights(world, planar_polygons(world), triangle, u, v), world).astype(float)
+    geometry = place_meshes([polygon(corners)], [np.eye(4)])
+    triangle, u, v = anywhere(geometry)
+    found = dense(corner_weights(geometry, planar_polygons(geometry), triangle, u, v), geometry).astype(float)
     s, t = found[:, 1] + found[:, 2], found[:, 2] + found[:, 3]
     wanted = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
     np.testing.assert_allclose(found, wanted, atol=3e-7)
-    np.testing.assert_allclose(found @ world.vertices, positions(world, triangle, u, v), atol=3e-7)
+    np.testing.assert_allclose(found @ geometry.vertices, positions(geometry, triangle, u, v), atol=3e-7)
 
 
 def two_quads():
@@ -208,22 +210,22 @@ def two_quads():
 
 
 def test_a_folded_quad_is_interpolated_by_triangles_and_agrees_at_its_edge():
-    world = place_meshes([two_quads()], [np.eye(4)])
-    found = planar_polygons(world)
+    geometry = place_meshes([two_quads()], [np.eye(4)])
+    found = planar_polygons(geometry)
     assert (found.row >= 0).tolist() == [True, True, False, False]
     values = np.random.default_rng(5).random((6, 1)).astype(F)
     share = np.linspace(0, 1, 9).astype(F)
     seen = {0: 0, 1: 0}
-    for triangle, vertices in enumerate(world.triangles):
+    for triangle, vertices in enumerate(geometry.triangles):
         where = [list(vertices).index(v) for v in (1, 2) if v in vertices]
         if len(where) < 2:
             continue
         w = np.zeros((3, len(share)), F)
         w[where[0]], w[where[1]] = 1 - share, share
         which = np.full(len(share), triangle, np.int32)
-        along = corner_weights(world, found, which, w[1], w[2]).interpolate_vertices(world, values)
+        along = corner_weights(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
         np.testing.assert_allclose(along[:, 0], (1 - share) * values[1] + share * values[2], atol=1e-6)
-        seen[int(world.polygons[triangle])] += 1
+        seen[int(geometry.polygons[triangle])] += 1
     assert all(seen.values())
 
 
@@ -243,53 +245,55 @@ def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangl
 
 
 def test_polygons_that_are_flat_by_their_normals_are_left_out_where_nothing_else_is_asked():
-    world = place_meshes([polygon(L_SHAPE), polygon(ARROW)], [np.eye(4)] * 2)
+    geometry = place_meshes([polygon(L_SHAPE), polygon(ARROW)], [np.eye(4)] * 2)
     up, lean = [0, 0, 1], [0.6, 0, 0.8]
     index = np.zeros(10, np.int32)
     index[8] = 1
-    found = planar_polygons(world, CornerVectors(column_major([up, lean], F), index))
+    found = planar_polygons(geometry, CornerVectors(column_major([up, lean], F), index))
     assert (found.row >= 0).tolist() == [False] * 4 + [True] * 2
-    assert planar_polygons(world, CornerVectors(column_major([up, lean], F), index * 0)) is None
-    assert planar_polygons(world, CornerVectors(-column_major([up, lean], F), index * 0)) is None
-    leaning = planar_polygons(world, CornerVectors(column_major([up, lean], F), index * 0 + 1))
+    assert planar_polygons(geometry, CornerVectors(column_major([up, lean], F), index * 0)) is None
+    assert planar_polygons(geometry, CornerVectors(-column_major([up, lean], F), index * 0)) is None
+    leaning = planar_polygons(geometry, CornerVectors(column_major([up, lean], F), index * 0 + 1))
     assert (leaning.row >= 0).all()
 
 
 def test_triangles_keep_their_bits_beside_polygons():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1]], float)
     mesh = Mesh(vertices, np.array([0, 1, 2, 3, 1, 4, 2], np.int32), np.array([0, 4, 7], np.int32))
-    world = place_meshes([mesh], [TURNED])
-    hits = anywhere(world)
-    whole = corner_weights(world, planar_polygons(world), *hits).interpolate_vertices(world, world.vertices)
-    by_triangles = corner_weights(world, None, *hits).interpolate_vertices(world, world.vertices)
-    alone = world.polygons[hits[0]] == 1
+    geometry = place_meshes([mesh], [TURNED])
+    hits = anywhere(geometry)
+    whole = corner_weights(geometry, planar_polygons(geometry), *hits).interpolate_vertices(
+        geometry, geometry.vertices
+    )
+    by_triangles = corner_weights(geometry, None, *hits).interpolate_vertices(geometry, geometry.vertices)
+    alone = geometry.polygons[hits[0]] == 1
     assert alone.any()
     np.testing.assert_array_equal(whole[alone], by_triangles[alone])
 
 
 def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
     meshes = [polygon(L_SHAPE), two_quads(), polygon(ARROW), polygon(ring(np.ones(9)))]
-    world = place_meshes(meshes, [np.eye(4)] * 4)
-    hits = anywhere(world, 1000)
-    whole = corner_weights(world, planar_polygons(world), *hits)
-    values = np.random.default_rng(1).random((len(world.vertices), 3)).astype(F)
-    all_of_them = whole.interpolate_vertices(world, values)
+    geometry = place_meshes(meshes, [np.eye(4)] * 4)
+    hits = anywhere(geometry, 1000)
+    whole = corner_weights(geometry, planar_polygons(geometry), *hits)
+    values = np.random.default_rng(1).random((len(geometry.vertices), 3)).astype(F)
+    all_of_them = whole.interpolate_vertices(geometry, values)
     half = [np.flatnonzero(hits[0] % 2 == rest) for rest in (0, 1)]
     parts = [whole.take(lanes) for lanes in half]
     for lanes, part in zip(half, parts, strict=True):
-        np.testing.assert_array_equal(part.interpolate_vertices(world, values), all_of_them[lanes])
-    joined = concatenated(parts).interpolate_vertices(world, values)
+        np.testing.assert_array_equal(part.interpolate_vertices(geometry, values), all_of_them[lanes])
+    joined = concatenated(parts).interpolate_vertices(geometry, values)
     np.testing.assert_array_equal(joined, all_of_them[np.concatenate(half)])
     nothing = whole.take(half[0][:0])
-    assert nothing.interpolate_vertices(world, values).shape == (0, 3)
+    assert nothing.interpolate_vertices(geometry, values).shape == (0, 3)
 
 
 def test_the_mean_of_polygons_of_any_size():
-    world = place_meshes([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
-    centres = polygon_centres(world)
+    geometry = place_meshes([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
+    centres = polygon_centres(geometry)
     group = MeanCorners(None, centres, np.array([0, 2, 1, 0], np.int32))
-    weights = CornerWeights(corner_weights(world, None, *anywhere(world, 4)).hits, (group,))
-    found = weights.interpolate_vertices(world, world.vertices)
+    weights = CornerWeights(corner_weights(geometry, None, *anywhere(geometry, 4)).hits, (group,))
+    found = weights.interpolate_vertices(geometry, geometry.vertices)
     np.testing.assert_allclose(found, centres.position[[0, 2, 1, 0]], atol=1e-6)
 
 
@@ -302,17 +306,17 @@ def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across(
         np.arange(4, dtype=np.int32),
         np.array([0, 4], np.int32),
     )
-    world = place_meshes([mesh], [np.eye(4)])
+    geometry = place_meshes([mesh], [np.eye(4)])
     for t in (0.0, 0.3, 1.0):
-        at = np.stack([2 * width - 1, np.full_like(width, t - 0.5)], axis=1) / world.frame.radius
-        a, b, c = (world.vertices[world.triangles[0, k], :2].astype(float) for k in range(3))
+        at = np.stack([2 * width - 1, np.full_like(width, t - 0.5)], axis=1) / geometry.render_space.radius
+        a, b, c = (geometry.vertices[geometry.triangles[0, k], :2].astype(float) for k in range(3))
         u, v = np.linalg.solve(np.stack([b - a, c - a], axis=1), (at - a).T)  # beyond the triangle too
         first = np.zeros(len(width), np.int32)
-        weights = corner_weights(world, planar_polygons(world), first, u.astype(F), v.astype(F))
+        weights = corner_weights(geometry, planar_polygons(geometry), first, u.astype(F), v.astype(F))
         normals = CornerVectors(column_major(lean[None], F), np.zeros(4, np.int32))
-        facets = SurfaceInteraction(
+        interact = SurfaceInteraction(
             at, column_major(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_)
         )
         bent = lean - (width * (1 - width) * 3 * 1.2)[:, None] * [1, 0, 0]
         wanted = bent / np.linalg.norm(bent, axis=1)[:, None]
-        np.testing.assert_allclose(quadratic(world, normals, weights, facets), wanted, atol=2e-6)
+        np.testing.assert_allclose(quadratic(geometry, normals, weights, interact), wanted, atol=2e-6)

@@ -20,21 +20,21 @@ SKEWED = rotation(0, 30) @ np.diag([2.0, 0.5, 1.0, 1.0]) @ rotation(2, 50)
 MIRRORED = np.diag([-1.0, 1.0, 3.0, 1.0])
 
 
-def anywhere(world, count=2000, seed=3):
+def anywhere(geometry, count=2000, seed=3):
     random = np.random.default_rng(seed)
-    triangle = random.integers(0, len(world.triangles), count).astype(np.int32)
+    triangle = random.integers(0, len(geometry.triangles), count).astype(np.int32)
     a, b = np.sort(random.random((2, count)), axis=0)
     return triangle, a.astype(F), (b - a).astype(F)
 
 
-def position(world, triangle, u, v):
-    p0, p1, p2 = (world.vertices[world.triangles[triangle, k]].astype(float) for k in range(3))
+def position(geometry, triangle, u, v):
+    p0, p1, p2 = (geometry.vertices[geometry.triangles[triangle, k]].astype(float) for k in range(3))
     return (1 - u - v)[:, None] * p0 + u[:, None] * p1 + v[:, None] * p2
 
 
-def along_u(world, triangle, u, v):
-    weights = corner_weights(world, None, triangle, u, v)
-    return weights.interpolate(world, uv_tangents(world, scene_uvs(world)))
+def along_u(geometry, triangle, u, v):
+    weights = corner_weights(geometry, None, triangle, u, v)
+    return weights.interpolate(geometry, uv_tangents(geometry, scene_uvs(geometry)))
 
 
 def unit_rows(x):
@@ -43,21 +43,21 @@ def unit_rows(x):
 
 @pytest.mark.parametrize("matrix", [np.eye(4), SKEWED, MIRRORED], ids=["plain", "skewed", "mirrored"])
 def test_u_grows_along_x_of_a_plane_under_any_transform(matrix):
-    world = place_meshes([Plane(resolution=(3, 2)).mesh()], [matrix])
-    at = anywhere(world)
-    found = along_u(world, *at)
+    geometry = place_meshes([Plane(resolution=(3, 2)).mesh()], [matrix])
+    at = anywhere(geometry)
+    found = along_u(geometry, *at)
     wanted = matrix[:3, 0] / np.linalg.norm(matrix[:3, 0])
     np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=1e-5)
 
 
 @pytest.mark.parametrize("shape", [Cylinder(segments=16, caps=False), Sphere(segments=16, rings=24)])
 def test_the_grain_of_a_coarse_round_body_is_smooth(shape):
-    world = place_meshes([shape.mesh()], [np.eye(4)])
-    triangle, u, v = anywhere(world)
-    p = position(world, triangle, u, v)
+    geometry = place_meshes([shape.mesh()], [np.eye(4)])
+    triangle, u, v = anywhere(geometry)
+    p = position(geometry, triangle, u, v)
     seam = (p[:, 0] > 0) & (np.abs(p[:, 2]) < np.tan(2 * np.pi / 16) * p[:, 0])
     keep = (np.hypot(p[:, 0], p[:, 2]) > 0.2) & ~seam
-    found = unit_rows(along_u(world, triangle, u, v))[keep]
+    found = unit_rows(along_u(geometry, triangle, u, v))[keep]
     wanted = unit_rows(np.cross([0, 1, 0], p))[keep]
     assert np.degrees(np.arccos(np.clip(dot(found, wanted), -1, 1))).max() < 2  # a facet spans 22.5
 
@@ -70,9 +70,9 @@ def test_uv_that_turn_over_at_a_seam_keep_their_sides_apart():
         uvs=np.array([[0, 0], [0, 1], [1, 0]], float),
         corner_uvs=np.array([[0, 2, 1], [0, 1, 2]], np.int32),
     )
-    world = place_meshes([mesh], [np.eye(4)])
+    geometry = place_meshes([mesh], [np.eye(4)])
     third = np.full(2, 1 / 3, F)
-    found = along_u(world, np.array([0, 1], np.int32), third, third)
+    found = along_u(geometry, np.array([0, 1], np.int32), third, third)
     np.testing.assert_allclose(found, [[1, 0, 0], [-1, 0, 0]], atol=1e-6)
 
 
@@ -81,8 +81,8 @@ def test_no_uv_or_flat_uv_give_no_direction():
     bare = Mesh.of_triangles(corners, [[0, 1, 2]])
     flat = Mesh.of_triangles(corners, [[0, 1, 2]], uvs=np.ones((1, 2)), corner_uvs=np.zeros((1, 3), np.int32))
     for mesh in (bare, flat):
-        world = place_meshes([mesh], [np.eye(4)])
-        assert not uv_tangents(world, scene_uvs(world)).values.any()
+        geometry = place_meshes([mesh], [np.eye(4)])
+        assert not uv_tangents(geometry, scene_uvs(geometry)).values.any()
 
 
 @pytest.mark.parametrize("matrix", [np.eye(4), SKEWED, MIRRORED], ids=["plain", "skewed", "mirrored"])

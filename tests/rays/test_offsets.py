@@ -98,8 +98,8 @@ def test_a_way_is_shortened_to_its_bound_and_never_lengthened():
 
 def test_a_needle_turned_out_of_its_axes_does_not_hit_itself():
     ball = icosphere(5)
-    world = world_of(Mesh.of_triangles(ball.vertices * [1, 1e-3, 1e-3], ball.corners))
-    tracer = Tracer(world.vertices, world.triangles)
-    position, facet = surface_points(world, 50_000, seed=0)
-    up = grazing(facet.ng.astype(float), seed=0)
-    assert not tracer.occluded(offset_ray_origins(position, facet.ng, facet.edge), up).any()
+    geometry = world_of(Mesh.of_triangles(ball.vertices * [1, 1e-3, 1e-3], ball.corners))
+    tracer = Tracer(geometry.vertices, geometry.triangles)
+    position, interaction = surface_points(geometry, 50_000, seed=0)
+    up = grazing(interaction.ng.astype(float), seed=0)
+    assert not tracer.occluded(offset_ray_origins(position, interaction.ng, interaction.edge), up).any()

@@ -111,7 +111,7 @@ def test_a_second_run_makes_neither_meshes_nor_rays_and_the_same_bits(scene, sto
         same(cold[0], again)
         assert rays == {}
         assert not made & {"meshes", "tracer", "hits", "obscurance", "shadow:key", "shadow:rim"}
-        assert "world" in reused
+        assert "geometry" in reused
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -143,7 +143,15 @@ def test_a_change_of_material_or_light_colour_takes_no_ray_no_mesh_no_tree(scene
     picture(scene, store=store, only=["beauty"])
     _, made, rays, _ = picture(scene, change, store=store, only=["beauty"])
     assert rays == {}
-    assert not made & {"tracer", "meshes", "mesh:ball", "mesh:wedge.obj", "world", "corner_normals", "hits"}
+    assert not made & {
+        "tracer",
+        "meshes",
+        "mesh:ball",
+        "mesh:wedge.obj",
+        "geometry",
+        "corner_normals",
+        "hits",
+    }
 
 
 def test_a_moved_light_casts_its_own_shadow_rays_alone(scene, store):
@@ -157,7 +165,7 @@ def test_a_moved_eye_parses_no_mesh(scene, store):
     picture(scene, store=store, only=["beauty"])
     _, made, rays, _ = picture(scene, "camera.position=[1,2,3]", store=store, only=["beauty"])
     assert rays.keys() == {"hits", "obscurance", "shadow:key", "shadow:rim"}
-    assert not made & {"meshes", "mesh:ball", "mesh:wedge.obj", "world", "corner_normals"}
+    assert not made & {"meshes", "mesh:ball", "mesh:wedge.obj", "geometry", "corner_normals"}
 
 
 def test_a_changed_byte_of_a_mesh_spoils_what_is_made_of_it_alone(scene, store):
@@ -167,7 +175,7 @@ def test_a_changed_byte_of_a_mesh_spoils_what_is_made_of_it_alone(scene, store):
     cold = picture(scene)[0]
     warm, made, _, reused = picture(scene, store=store)
     same(cold, warm)
-    assert {"mesh:wedge.obj", "world", "tracer", "hits", "corner_normals"} <= made
+    assert {"mesh:wedge.obj", "geometry", "tracer", "hits", "corner_normals"} <= made
     assert "mesh:ball" in reused
     mesh.write_text(WEDGE)
     assert picture(scene, store=store)[2] == {}
@@ -294,17 +302,17 @@ def test_memory_gives_up_what_does_not_fit(scene):
 def test_buffers_come_back_as_they_were(scene):
     loaded = load(scene)
     made = plan(loaded.scene, loaded, ["beauty"])
-    world = run_once(made, RenderStats())["world"]
+    geometry = run_once(made, RenderStats())["geometry"]
     arrays = []
-    said = encode(world, arrays, {})
+    said = encode(geometry, arrays, {})
     assert sum(array.nbytes for array in arrays) < 1.05 * sum(
-        {id(array): array.nbytes for array in policy.arrays_in(world)}.values()
-    ) + sum(a.nbytes for placed in world.placed for a in policy.arrays_in(placed))
+        {id(array): array.nbytes for array in policy.arrays_in(geometry)}.values()
+    ) + sum(a.nbytes for placed in geometry.placed for a in policy.arrays_in(placed))
     again = decode(said, tuple(arrays))
-    assert again.frame == world.frame
+    assert again.render_space == geometry.render_space
     assert again.placed[1].mesh.corners is again.placed[2].mesh.corners
     for name in ("vertices", "triangles", "corners", "polygons", "objects"):
-        a, b = getattr(world, name), getattr(again, name)
+        a, b = getattr(geometry, name), getattr(again, name)
         np.testing.assert_array_equal(a, b)
         assert a.flags.f_contiguous == b.flags.f_contiguous
 
@@ -329,7 +337,7 @@ def test_a_look_reads_nothing_and_finds_what_is_there(scene, store):
     picture(scene, store=store, only=["beauty"])
     for entry in store.entries():
         entry.path.write_bytes(b"")
-    assert {"hits", "world"} <= reusing(made, made.views[0], Artifacts(store, look=True)).reused.keys()
+    assert {"hits", "geometry"} <= reusing(made, made.views[0], Artifacts(store, look=True)).reused.keys()
 
 
 def test_buffers_of_another_rate_are_not_kept(scene, store):
@@ -341,9 +349,9 @@ def test_buffers_of_another_rate_are_not_kept(scene, store):
 
 
 def test_what_this_run_made_is_loaded_from_nowhere(scene):
-    recipe = Artifacts(made={"key": "the buffer"}).recipe("world", "key", None)
+    recipe = Artifacts(made={"key": "the buffer"}).recipe("geometry", "key", None)
     assert recipe.function() == "the buffer"
-    assert Artifacts(made={"key": "the buffer"}).recipe("world", "other", None) is None
+    assert Artifacts(made={"key": "the buffer"}).recipe("geometry", "other", None) is None
 
 
 def test_a_store_too_small_for_a_buffer_keeps_none_of_it(scene, store):

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
+from illumcli.film.tiles import FEWEST, tiles
 from illumcli.graph import Node
 from illumcli.layers import NAMES
 from illumcli.render_graph.execute import RenderStats, bands, run_once
 from illumcli.render_graph.schedule import Plan, plan
-from illumcli.render_graph.stages import FEWEST, tiles
 from illumcli.scene.load import load
 
 SCENE = """
@@ -242,7 +242,7 @@ def test_what_a_layer_does_not_reach_is_not_run(tmp_path):
     loaded = load(path)
     p = plan(loaded.scene, loaded, ["depth"])
     made = {step.output for step in (*p.once, *p.tile)}
-    assert not made & {"corner_normals", "points", "shadow:key", "obscurance", "lit:key", "uvs"}
+    assert not made & {"corner_normals", "points", "shadow:key", "obscurance", "incident:key", "uvs"}
     assert p.skipped["shadow:sun"] == "the light casts no shadows"
     assert p.expected_rays == {"primary": 83 * 61 * 3}
 
@@ -253,9 +253,9 @@ def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
     loaded = load(path, ["lights.key.intensity=0", "ambient=0", "obscurance=null"])
     p = plan(loaded.scene, loaded)
     made = {step.output for step in p.tile}
-    assert not made & {"lit:key", "shadow:key", "obscurance", "ambient"}
+    assert not made & {"incident:key", "shadow:key", "obscurance", "ambient"}
     assert p.skipped["shadow:key"] == "the light's intensity is 0"
-    assert "lit:rim" in made
+    assert "incident:rim" in made
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def pictures(path, overrides=(), only=ALL, leave_out=True, store=None):
         for name in parts[0].layers:
             out[view.name, name] = np.concatenate([part.layers[name] for part in parts])
     names = loaded.scene.object_names()
-    triangles = len(shared["world"].triangles) if "world" in shared else None
+    triangles = len(shared["geometry"].triangles) if "geometry" in shared else None
     return out, [names[number] for number in numbers], triangles
 
 
@@ -339,7 +339,7 @@ def test_fewer_boxes_hold_all_of_many(count):
 def test_what_a_box_and_a_frustum_share_holds_all_points_in_both(scene):
     loaded = load(scene)
     mesh = Mesh.of_triangles([[-1, -1, -1], [1, 1, 1], [1, -1, 0]], [[0, 1, 2]])
-    frame = object_bounds([mesh], [np.eye(4)]).frame
+    frame = object_bounds([mesh], [np.eye(4)]).render_space
     planes = frustum(loaded.scene.camera, frame, 40, 30, None)
     low, high = np.array([[-0.3, -0.4, -0.6]]), np.array([[0.6, 0.5, 0.2]])
     corners = clip_boxes(planes, Boxes(low, high))

@@ -443,8 +443,8 @@ def test_a_glb_brings_the_images_within(tmp_path, picture, print_, image):
     (tmp_path / "assets").mkdir()
     data = print_.read_bytes()
     print_.unlink()
-    unlit = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 0.5, 1]}
-    materials = [{"pbrMetallicRoughness": unlit, "extensions": {"KHR_materials_unlit": {}}}]
+    irradiance = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 0.5, 1]}
+    materials = [{"pbrMetallicRoughness": irradiance, "extensions": {"KHR_materials_unlit": {}}}]
     glb(tmp_path / "assets" / "sheet.glb", data if image == "whole" else data[:60], materials)
     path = tmp_path / "scene.yaml"
     text = SCENE.format(

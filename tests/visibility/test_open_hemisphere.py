@@ -99,18 +99,18 @@ def world_of(*meshes):
 
 
 def test_every_facet_of_a_convex_mesh_is_open_in_front_and_none_behind():
-    world = world_of(Sphere(shape="sphere").mesh())
-    triangle = np.repeat(np.arange(len(world.triangles), dtype=np.int32), 2)
-    front = np.tile([False, True], len(world.triangles))
-    opened = OpenTriangles(world).is_open(triangle, front, 1)
+    geometry = world_of(Sphere(shape="sphere").mesh())
+    triangle = np.repeat(np.arange(len(geometry.triangles), dtype=np.int32), 2)
+    front = np.tile([False, True], len(geometry.triangles))
+    opened = OpenTriangles(geometry).is_open(triangle, front, 1)
     assert opened[~front].all()
     assert not opened[front].any()
 
 
 def test_facets_that_few_samples_lie_on_are_not_looked_at():
-    world = world_of(Sphere(shape="sphere").mesh())
-    triangle = np.arange(len(world.triangles), dtype=np.int32)[:70]
-    opened = OpenTriangles(world).is_open(triangle, np.zeros(70, bool), 10)
+    geometry = world_of(Sphere(shape="sphere").mesh())
+    triangle = np.arange(len(geometry.triangles), dtype=np.int32)[:70]
+    opened = OpenTriangles(geometry).is_open(triangle, np.zeros(70, bool), 10)
     assert opened.tolist() == [True] * 64 + [False] * 6
 
 
@@ -121,29 +121,33 @@ def test_a_world_without_open_facets_is_not_looked_through(monkeypatch):
     saddle = Mesh.of_triangles(np.stack([x, y, x * y], axis=1), np.concatenate(halves))
     monkeypatch.setattr(OpenTriangles, "_test", lambda self, groups: pytest.fail("a group was tested"))
     triangle = np.arange(2 * len(corner), dtype=np.int32)
-    for behind in (False, True):
-        assert not OpenTriangles(world_of(saddle)).is_open(triangle, np.full(len(triangle), behind), 1).any()
+    for back_facing in (False, True):
+        assert (
+            not OpenTriangles(world_of(saddle))
+            .is_open(triangle, np.full(len(triangle), back_facing), 1)
+            .any()
+        )
 
 
 def test_an_open_facet_does_not_depend_on_who_asks_first():
-    world = world_of(Torus(shape="torus").mesh(), Sphere(shape="sphere").mesh())
-    triangle = np.arange(len(world.triangles), dtype=np.int32)
-    behind = np.zeros(len(triangle), bool)
-    whole = OpenTriangles(world).is_open(triangle, behind, 1)
-    parts = OpenTriangles(world)
+    geometry = world_of(Torus(shape="torus").mesh(), Sphere(shape="sphere").mesh())
+    triangle = np.arange(len(geometry.triangles), dtype=np.int32)
+    back_facing = np.zeros(len(triangle), bool)
+    whole = OpenTriangles(geometry).is_open(triangle, back_facing, 1)
+    parts = OpenTriangles(geometry)
     for part in np.array_split(np.random.default_rng(1).permutation(len(triangle)), 50):
-        assert np.array_equal(parts.is_open(triangle[part], behind[part], 1), whole[part])
+        assert np.array_equal(parts.is_open(triangle[part], back_facing[part], 1), whole[part])
 
 
 def test_open_facets_are_open_to_every_vertex():
-    world = world_of(Torus(shape="torus").mesh())
-    triangle = np.arange(len(world.triangles), dtype=np.int32)
-    opened = OpenTriangles(world).is_open(triangle, np.zeros(len(triangle), bool), 1)
-    corner = world.vertices[world.triangles[:, 0]].astype(float)
-    sides = [world.vertices[world.triangles[:, k]].astype(float) - corner for k in (1, 2)]
+    geometry = world_of(Torus(shape="torus").mesh())
+    triangle = np.arange(len(geometry.triangles), dtype=np.int32)
+    opened = OpenTriangles(geometry).is_open(triangle, np.zeros(len(triangle), bool), 1)
+    corner = geometry.vertices[geometry.triangles[:, 0]].astype(float)
+    sides = [geometry.vertices[geometry.triangles[:, k]].astype(float) - corner for k in (1, 2)]
     n = np.cross(*sides)
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    above = (n @ world.vertices.astype(float).T).max(axis=1) - np.einsum("ij,ij->i", n, corner)
+    above = (n @ geometry.vertices.astype(float).T).max(axis=1) - np.einsum("ij,ij->i", n, corner)
     assert 0.3 < opened.mean() < 0.7
     assert (above[opened] < 1e-6).all()
     assert (above[~opened] > 1e-6).mean() > 0.9

@@ -126,8 +126,8 @@ def test_without_the_terminator_the_polygons_cast_their_own_shadow(picture):
 
 
 def parts_of(*meshes: Mesh) -> SmoothParts:
-    world = place_meshes(meshes, [np.eye(4)] * len(meshes))
-    return SmoothParts(world, scene_normals(world, [corner_normals(mesh) for mesh in meshes]))
+    geometry = place_meshes(meshes, [np.eye(4)] * len(meshes))
+    return SmoothParts(geometry, scene_normals(geometry, [corner_normals(mesh) for mesh in meshes]))
 
 
 def test_shadows_at_the_constant_rate_do_not_depend_on_the_rates_of_others(picture):
@@ -173,7 +173,7 @@ def test_objects_that_touch_stay_apart():
 
 def test_a_creased_edge_parts_the_surfaces_beside_it():
     box = Mesh(BOX, np.ravel(BOX_FACES).astype(np.int32), np.arange(0, 25, 4, dtype=np.int32))
-    world = place_meshes([box], [np.eye(4)])
-    sharp = SmoothParts(world, scene_normals(world, [corner_normals(box, crease=0.5)]))
+    geometry = place_meshes([box], [np.eye(4)])
+    sharp = SmoothParts(geometry, scene_normals(geometry, [corner_normals(box, crease=0.5)]))
     a, b = np.zeros(12, np.int32), np.arange(12, dtype=np.int32)
-    np.testing.assert_array_equal(sharp.joined(a, b), world.polygons == 0)
+    np.testing.assert_array_equal(sharp.joined(a, b), geometry.polygons == 0)

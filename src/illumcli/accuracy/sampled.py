@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.film.view import View
 from illumcli.graph import topological_order
 from illumcli.layers import Layer
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import View, recipes
+from illumcli.render_graph.build import recipes
 from illumcli.render_graph.execute import RenderStats, at_pixels, bands
 from illumcli.render_graph.framing import placed
 from illumcli.render_graph.schedule import Plan, plan

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, length, take_rows, unit
 from illumcli.baking.points import Points, Surfaces
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, triangle_corners
-from illumcli.rays.interaction import facets, with_facet
+from illumcli.rays.interaction import interact, with_facet
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
 from illumcli.visibility.hemisphere import Hemispheres
@@ -58,16 +58,16 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     a, b = np.where(over, 1 - a, a), np.where(over, 1 - b, b)
 
     # shading normals; the triangle's own where there is none
-    facet = facets(geometry, triangle, a, b, np.zeros((len(triangle), 3), F))
-    n = with_facet(_interpolated(surfaces.normals, geometry, triangle, a, b), facet.ng)
+    interaction = interact(geometry, triangle, a, b, np.zeros((len(triangle), 3), F))
+    n = with_facet(_interpolated(surfaces.normals, geometry, triangle, a, b), interaction.ng)
     return AreaPoints(
         geometry,
         column_major(n, F),
-        column_major(facet.position, F),
+        column_major(interaction.position, F),
         np.arange(len(triangle), dtype=np.uint32),
         geometry.objects[triangle],
-        offset_ray_origins(facet.position, facet.ng, facet.edge),
-        facet.ng,
+        offset_ray_origins(interaction.position, interaction.ng, interaction.edge),
+        interaction.ng,
         triangle,
         a,
         b,

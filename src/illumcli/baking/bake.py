@@ -86,7 +86,9 @@ def point_values(work: BakeWork, threads: int, progress: Progress, journal: Jour
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
     wanted = settings.obscurance()
-    method = Method(settings.samples, wanted.falloff, geometry.frame.radius, wanted.sampler, wanted.faces)
+    method = Method(
+        settings.samples, wanted.falloff, geometry.render_space.radius, wanted.sampler, wanted.faces
+    )
     work.clock.lap("build")
     context = BakeContext(work.surfaces, occluders, method, settings, threads, progress, work.clock, journal)
     return METHODS[settings.method](context)

@@ -115,9 +115,9 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The scene's placed meshes, the same as a render's, with the normals that obscurance is about; what was
     repaired."""
     buffers: dict[str, Any] = {}
-    for node in topological_order(recipes(scene, loaded), ["world", "corner_normals", "repairs"]):
+    for node in topological_order(recipes(scene, loaded), ["geometry", "corner_normals", "repairs"]):
         buffers[node.output] = node.run(buffers)
-    geometry, normals = buffers["world"], buffers["corner_normals"]
+    geometry, normals = buffers["geometry"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":
         normals = stages.corner_normals(("flat",) * len(geometry.placed), buffers["meshes"], geometry)
     return Surfaces(geometry, normals), buffers["repairs"].repairs

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
-from illumcli.rays.interaction import facets
+from illumcli.rays.interaction import interact
 from illumcli.records import Record
 
 
@@ -52,13 +52,13 @@ def triangles_of(geometry: SceneGeometry) -> Triangles:
     """Normal, edge, height and area of every triangle of the scene."""
     every = np.arange(len(geometry.triangles), dtype=np.int32)
     zero = np.zeros(len(every), F)
-    facet = facets(geometry, every, zero, zero, np.zeros((len(every), 3), F))
+    interaction = interact(geometry, every, zero, zero, np.zeros((len(every), 3), F))
     corner = triangle_corners(geometry.vertices, geometry.triangles)
     edges = [corner[k - 2] - corner[k] for k in range(3)]
     area = length(cross(edges[0], edges[1]))
     longest = np.maximum.reduce([length(edge) for edge in edges])
     height = np.divide(area, longest, out=np.zeros_like(area), where=longest > 0)
-    return Triangles(facet.ng, facet.edge, height.astype(F), area.astype(F))
+    return Triangles(interaction.ng, interaction.edge, height.astype(F), area.astype(F))
 
 
 def corner_wedges(geometry: SceneGeometry, polygons: PolygonCorners, triangles: Triangles) -> CornerWedges:

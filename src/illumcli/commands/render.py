@@ -24,12 +24,13 @@ from illumcli.files.outputs import is_kept, refresh
 from illumcli.files.reports import sealed_json
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
+from illumcli.film.tiles import MOST, Tile
+from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.repairs import Repairs
 from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value
-from illumcli.render_graph.build import View
 from illumcli.render_graph.cached import Artifacts, Memory
 from illumcli.render_graph.culling import unseen_objects, without
 from illumcli.render_graph.execute import Planes, RenderStats, bands, run_once
@@ -38,7 +39,6 @@ from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_me
 from illumcli.render_graph.proportions import disproportion
 from illumcli.render_graph.repairs import refuse_repairs, repairs, repairs_data
 from illumcli.render_graph.schedule import Plan, content_key, plan, read_by_others, reusing
-from illumcli.render_graph.stages import MOST, Tile
 from illumcli.scene.load import SceneFile, lacking_lines, load, refuse_outside, told, unused_lines
 from illumcli.scene.spec import Scene
 
@@ -74,8 +74,8 @@ class Report:
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
     spared: dict[str, int] = field(default_factory=dict)
-    """Points that a light does not reach (`lit`) or not freely (`free`): no ray, no response. Polygons of
-    objects that no view can tell. Samples of pixels that adaptive antialiasing leaves at the first few."""
+    """Points that a light does not reach (`incident`) or not freely (`unshadowed`): no ray, no response.
+    Polygons of objects that no view can tell. Samples of pixels that adaptive antialiasing leaves at few."""
     refined: int = 0
     """Pixels that adaptive antialiasing gave all samples."""
     reused: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -273,7 +273,7 @@ def rendered(
             report.skipped = dict(narrowed.skipped)
             shared = run_once(narrowed, tally, artifacts, threads)
             report.repairs = {**report.repairs, **repairs(shared)}
-            report.warnings = proportions(work, steps, shared.get("standing"))
+            report.warnings = proportions(work, steps, shared.get("object_bounds"))
             if strict:
                 refuse_repairs(report.scene, report.repairs)
             sums = ErrorSums()
@@ -291,11 +291,11 @@ def rendered(
     return report
 
 
-def proportions(work: Work, steps: Plan, standing: ObjectBounds | None) -> list[str]:
+def proportions(work: Work, steps: Plan, object_bounds: ObjectBounds | None) -> list[str]:
     """A line where rays that leave surfaces start visibly far off those around some object."""
-    if standing is None or all(step.output != "ray_origins" for step in steps.tile):
+    if object_bounds is None or all(step.output != "ray_origins" for step in steps.tile):
         return []
-    found = disproportion(standing, steps.views)
+    found = disproportion(object_bounds, steps.views)
     if found is None:
         return []
     small, ratio = work.scene.object_names()[found.small], float(f"{found.ratio:.1g}")
@@ -368,7 +368,7 @@ def _render_view(
     """Write one view's files band by band; how many values were beyond half's range."""
     from illumcli.images.writer import ImageWriter
 
-    frame = shared["frame"]
+    frame = shared["render_space"]
     done, pixels = 0, view.width * view.height
 
     def advance(count: int) -> None:

@@ -19,7 +19,7 @@ class ObjectBounds(Record):
     low: NDArray[np.float64]  # (O, 3) lowest corner of what its polygons use [scene units]; inf without any
     high: NDArray[np.float64]  # (O, 3) highest corner; -inf without polygons
     polygons: NDArray[np.int64]  # (O,) number of polygons
-    frame: RenderSpace
+    render_space: RenderSpace
 
 
 def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> ObjectBounds:
@@ -39,9 +39,9 @@ def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]
         lowest, highest = np.zeros(3), np.zeros(3)
     centre = (lowest + highest) / 2
     radius = float(np.linalg.norm((highest - lowest) / 2)) or 1.0
-    frame = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+    render_space = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
     polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
-    return ObjectBounds(tuple(matrices), low, high, polygons, frame)
+    return ObjectBounds(tuple(matrices), low, high, polygons, render_space)
 
 
 def box_corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

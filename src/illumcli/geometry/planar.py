@@ -61,7 +61,7 @@ class PlanarPolygons(Record):
         return len(self.first_corner)
 
 
-def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
+def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of a World; None where all is triangles.
 
     Corners are taken in double precision as the meshes have them, before they are rounded for the ray core.
@@ -73,7 +73,7 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
         Given where nothing but these is interpolated: polygons whose corners all have the polygon's own
         normal, as those of a box, are left out too.
     """
-    first, size, points, vertices = _candidates(world)
+    first, size, points, vertices = _candidates(geometry)
     if not len(first):
         return None
 
@@ -95,10 +95,10 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
     # Which of them are flat, and covered once by their triangles.
     off = np.maximum.reduceat(np.abs(dot(away, take_rows(normal, owner))), starts[:-1])
     is_planar = (area > 0) & (off <= FLATNESS * area / 2)
-    triangle_row = _rows_of_triangles(world, first, size)
+    triangle_row = _rows_of_triangles(geometry, first, size)
     mine = np.flatnonzero(triangle_row >= 0)
     own = triangle_row[mine]
-    a, b, c = (flat[world.corners[mine, k] - first[own] + starts[own]] for k in range(3))
+    a, b, c = (flat[geometry.corners[mine, k] - first[own] + starts[own]] for k in range(3))
     covered = np.bincount(own, np.abs(_turn(b - a, c - a)) / 2, len(size))
     is_planar &= np.abs(covered - area) <= SAME_AREA * area
     if normals is not None:
@@ -118,15 +118,15 @@ def planar_polygons(world: SceneGeometry, normals: CornerVectors | None = None) 
         0,
         2 ** np.ceil(np.log2(size)).astype(np.int64),
     )
-    triangle, u, v = _places(world, row, first, starts, flat)
+    triangle, u, v = _places(geometry, row, first, starts, flat)
     normal = column_major(normal[is_planar], F)
     return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
 
 
-def _candidates(world: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
+def _candidates(geometry: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
     """First corner and size of polygons that may be planar; place, in radii, and vertex of their corners."""
     firsts, sizes, places, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
-    for placed in world.placed:
+    for placed in geometry.placed:
         mesh = placed.mesh
         if len(mesh.corners) == 3 * mesh.polygon_count:  # none has fewer
             continue
@@ -137,7 +137,9 @@ def _candidates(world: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vecto
         vertex = mesh.corners[corner]
         firsts.append(first + placed.first_corner)
         sizes.append(size)
-        places.append(world.frame.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex)))
+        places.append(
+            geometry.render_space.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex))
+        )
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), places[0], vertices[0]
@@ -175,9 +177,9 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     return product
 
 
-def _rows_of_triangles(world: SceneGeometry, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
+def _rows_of_triangles(geometry: SceneGeometry, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
     """(T,) which of the polygons with these ascending first corners each triangle belongs to, -1 none."""
-    corner = world.corners[:, 0]
+    corner = geometry.corners[:, 0]
     row = np.searchsorted(first, corner, side="right") - 1
     inside = (row >= 0) & (corner < (first + size)[row])
     return np.where(inside, row, -1)
@@ -193,7 +195,7 @@ def _smallest_corner(
 
 
 def _places(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     row: NDArray[np.int32],
     first: NDArray[np.int32],
     starts: NDArray[np.int32],
@@ -209,12 +211,12 @@ def _places(
     triangle = np.repeat(lowest, np.diff(starts))
     named = np.full(len(flat), -1, np.int8)
     for k in range(3):
-        at = world.corners[mine, k] - first[row[mine]] + starts[row[mine]]
+        at = geometry.corners[mine, k] - first[row[mine]] + starts[row[mine]]
         triangle[at], named[at] = mine, k
     u, v = (named == 1).astype(np.float32), (named == 2).astype(np.float32)
     if (lost := np.flatnonzero(named < 0)).size:
         of, own = triangle[lost], row[triangle[lost]]
-        a, b, c = (flat[world.corners[of, k] - first[own] + starts[own]] for k in range(3))
+        a, b, c = (flat[geometry.corners[of, k] - first[own] + starts[own]] for k in range(3))
         whole = _turn(b - a, c - a)
         whole = np.where(whole == 0, 1, whole)
         u[lost] = _turn(flat[lost] - a, c - a) / whole

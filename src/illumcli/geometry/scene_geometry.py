@@ -35,7 +35,7 @@ class PlacedMesh(Record):
 class SceneGeometry(Record):
     """All triangles of the scene, in radii from its centre. Arrays are read-only."""
 
-    frame: RenderSpace
+    render_space: RenderSpace
     placed: tuple[PlacedMesh, ...]
     vertices: NDArray[np.float32]  # (V, 3), exactly what the ray core sees
     triangles: NDArray[np.int32]  # (T, 3) vertex numbers
@@ -101,7 +101,7 @@ def without_polygons(mesh: Mesh) -> Mesh:
 def place_meshes(
     meshes: Sequence[Mesh],
     matrices: Sequence[NDArray[np.float64]],
-    frame: RenderSpace | None = None,
+    render_space: RenderSpace | None = None,
     by_file: Sequence[bool] | None = None,
 ) -> SceneGeometry:
     """The triangles of mesh i under matrix i, in render space.
@@ -112,12 +112,12 @@ def place_meshes(
 
     Parameters
     ----------
-    frame : RenderSpace, optional
+    render_space : RenderSpace, optional
         By default that of these meshes alone.
     by_file : sequence of bool, optional
         Of which objects the file's normals are used; by default of all.
     """
-    frame = frame or object_bounds(meshes, matrices).frame
+    render_space = render_space or object_bounds(meshes, matrices).render_space
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
     first_vertex = first_corner = first_polygon = first_triangle = 0
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
@@ -145,9 +145,11 @@ def place_meshes(
         first_polygon += mesh.polygon_count
         first_triangle += len(oriented)
     return SceneGeometry(
-        frame=frame,
+        render_space=render_space,
         placed=tuple(placed),
-        vertices=column_major(_concatenated([frame.from_world(v) for v in vertices], np.zeros((0, 3))), F),
+        vertices=column_major(
+            _concatenated([render_space.from_world(v) for v in vertices], np.zeros((0, 3))), F
+        ),
         triangles=column_major(_concatenated(triangles, np.zeros((0, 3), np.int32))),
         corners=column_major(_concatenated(corners, np.zeros((0, 3), np.int32))),
         polygons=_concatenated(polygons, np.zeros(0, np.int32)),
@@ -155,10 +157,10 @@ def place_meshes(
     )
 
 
-def scene_normals(world: SceneGeometry, normals: Sequence[CornerNormals]) -> CornerVectors:
+def scene_normals(geometry: SceneGeometry, normals: Sequence[CornerNormals]) -> CornerVectors:
     """Unit shading normals of every corner in scene directions, from those of each object's mesh."""
     values, index, first = [], [], 0
-    for placed, own in zip(world.placed, normals, strict=True):
+    for placed, own in zip(geometry.placed, normals, strict=True):
         # Normals transform by the inverse transpose, up to a factor the cofactors; scaled against overflow.
         linear = placed.matrix[:3, :3]
         scale = np.abs(linear).max() or 1.0
@@ -174,10 +176,10 @@ def scene_normals(world: SceneGeometry, normals: Sequence[CornerNormals]) -> Cor
     )
 
 
-def scene_uvs(world: SceneGeometry) -> CornerVectors:
+def scene_uvs(geometry: SceneGeometry) -> CornerVectors:
     """Texture coordinates of every corner; -1 where a mesh has none."""
     values, index, first = [], [], 0
-    for placed in world.placed:
+    for placed in geometry.placed:
         mesh = placed.mesh
         if mesh.uvs is None or mesh.corner_uvs is None:
             index.append(np.full(len(mesh.corners), -1, np.int32))
@@ -190,16 +192,16 @@ def scene_uvs(world: SceneGeometry) -> CornerVectors:
     )
 
 
-def polygon_centres(world: SceneGeometry) -> PolygonCentres:
+def polygon_centres(geometry: SceneGeometry) -> PolygonCentres:
     """Centres and corners of all polygons."""
     centres, vertices, starts = [], [np.zeros(0, np.int32)], [np.zeros(1, np.int32)]
-    for placed in world.placed:
+    for placed in geometry.placed:
         mesh = placed.mesh
         if not mesh.polygon_count:
             continue
         vertices.append(mesh.corners + np.int32(placed.first_vertex))
         starts.append(mesh.starts[1:] + np.int32(placed.first_corner))
-        points = world.vertices[vertices[-1]].astype(np.float64)
+        points = geometry.vertices[vertices[-1]].astype(np.float64)
         sums = np.add.reduceat(points, mesh.starts[:-1], axis=0)
         centres.append(sums / np.diff(mesh.starts)[:, None])
     position = column_major(_concatenated(centres, np.zeros((0, 3))), F)

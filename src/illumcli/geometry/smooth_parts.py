@@ -23,13 +23,13 @@ vertex that they split several times, with different last digits."""
 class SmoothParts:
     """Which triangles belong to one smooth part; the parts are looked for when a question needs them."""
 
-    def __init__(self, world: SceneGeometry, normals: CornerVectors) -> None:
-        self._world = world
+    def __init__(self, geometry: SceneGeometry, normals: CornerVectors) -> None:
+        self._geometry = geometry
         self._normals = normals
 
     def joined(self, a: Ids, b: Ids) -> NDArray[np.bool_]:
         """(N,) True where triangles `a` and `b`, both (N,), belong to one smooth part."""
-        objects = self._world.objects
+        objects = self._geometry.objects
         out: NDArray[np.bool_] = objects.take(a) == objects.take(b)
         # Neighbours, which most pairs are, need no search for parts.
         apart = np.flatnonzero(out & ~self._share_corner(a, b))
@@ -38,11 +38,11 @@ class SmoothParts:
         return out
 
     def _share_corner(self, a: Ids, b: Ids) -> NDArray[np.bool_]:
-        world, out = self._world, np.zeros(len(a), np.bool_)
+        geometry, out = self._geometry, np.zeros(len(a), np.bool_)
         for i in range(3):
             for j in range(3):
-                first, second = world.corners[:, i].take(a), world.corners[:, j].take(b)
-                place = world.triangles[:, i].take(a) == world.triangles[:, j].take(b)
+                first, second = geometry.corners[:, i].take(a), geometry.corners[:, j].take(b)
+                place = geometry.triangles[:, i].take(a) == geometry.triangles[:, j].take(b)
                 out |= place & (self._normals.index.take(first) == self._normals.index.take(second))
         return out
 
@@ -55,18 +55,18 @@ class SmoothParts:
 
     def _corner_points(self) -> NDArray[np.int64]:
         """(T, 3) a number for the object, place and normal of each corner; equal ones share it."""
-        world = self._world
-        of_vertex = np.zeros(len(world.vertices), np.int64)
-        of_vertex[world.triangles] = world.objects[:, None]
+        geometry = self._geometry
+        of_vertex = np.zeros(len(geometry.vertices), np.int64)
+        of_vertex[geometry.triangles] = geometry.objects[:, None]
         # + 0.0 makes zeros of both signs the same bits
-        x, y, z = ((column + F(0)).view(np.uint32).astype(np.int64) for column in world.vertices.T)
+        x, y, z = ((column + F(0)).view(np.uint32).astype(np.int64) for column in geometry.vertices.T)
         place = _number(x << 32 | y, of_vertex << 32 | z)
         a, b, c = (np.rint(self._normals.values.T * NORMAL_STEPS) + NORMAL_STEPS).astype(np.int64)
         direction = _number(a << 32 | b << 16 | c)
-        corner = direction.take(self._normals.index.take(world.corners))
-        return _number((place.take(world.triangles) * (corner.max(initial=0) + 1) + corner).ravel()).reshape(
-            -1, 3
-        )
+        corner = direction.take(self._normals.index.take(geometry.corners))
+        return _number(
+            (place.take(geometry.triangles) * (corner.max(initial=0) + 1) + corner).ravel()
+        ).reshape(-1, 3)
 
 
 def _number(*keys: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -21,7 +21,7 @@ class LightSample(Record):
 
     l: Vectors  # (N, 3) unit, from the point to the light
     distance: Floats  # (N,) to the light in radii of the scene, inf for a light at infinity
-    strength: Floats  # (N,) irradiance facing the light, per unit of the light's colour
+    irradiance_scale: Floats  # (N,) irradiance facing the light, per unit of the light's colour
 
 
 class Light(Description):
@@ -32,18 +32,18 @@ class Light(Description):
     shadows: bool = True
     """False: the light passes through everything and no shadow ray is cast for it."""
 
-    power: ClassVar[str]
+    emission_field: ClassVar[str]
     """Name of the field that holds the light's colour and strength."""
 
     def color(self) -> tuple[float, float, float]:
         """Colour times strength: intensity [W/sr] or irradiance [W/m^2]."""
-        return getattr(self, self.power)
+        return getattr(self, self.emission_field)
 
-    def placed(self) -> Self:
-        """This light with neither colour nor name: all that `arriving` depends on."""
-        return self.replaced(**{self.power: (1.0, 1.0, 1.0), "name": None, "shadows": True})
+    def without_color(self) -> Self:
+        """This light with neither colour nor name: all that `sample_at` depends on."""
+        return self.replaced(**{self.emission_field: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
-    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
+    def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
         """Light at `position` [(N, 3), radii from the scene's centre]."""
         raise NotImplementedError
 

@@ -19,10 +19,10 @@ class Directional(Light):
     irradiance: Color = (1.0, 1.0, 1.0)
     """[W/m^2] on a surface that faces the light."""
 
-    power: ClassVar[str] = "irradiance"
+    emission_field: ClassVar[str] = "irradiance"
 
-    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
-        """Light at `position`: the same everywhere, strength 1, distance inf."""
+    def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
+        """Light at `position`: the same everywhere, scale 1, distance inf."""
         lanes = len(position)
         way = -np.asarray(self.direction) / np.abs(self.direction).max()
         l = (way / np.linalg.norm(way)).astype(position.dtype)

@@ -23,10 +23,10 @@ class Point(Light):
     attenuation: Law = written({"law": "inverse_square"})
     """Distance law."""
 
-    power: ClassVar[str] = "intensity"
+    emission_field: ClassVar[str] = "intensity"
 
-    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
-        """Light at `position`; strength f(d)."""
-        l, distance = towards(frame.from_world(self.position), position)
-        scene_units = distance.astype(np.float64) * frame.radius
+    def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
+        """Light at `position`; scale f(d)."""
+        l, distance = towards(render_space.from_world(self.position), position)
+        scene_units = distance.astype(np.float64) * render_space.radius
         return LightSample(l, distance, self.attenuation.factor(scene_units).astype(position.dtype))

@@ -30,16 +30,16 @@ class Spot(Light):
     attenuation: Law = written({"law": "inverse_square"})
     """Distance law."""
 
-    power: ClassVar[str] = "intensity"
+    emission_field: ClassVar[str] = "intensity"
 
     def check(self) -> None:
         """The axis must have a direction."""
         if self.position == self.target:
             raise ValueError("position and target must differ")
 
-    def arriving(self, position: Vectors, frame: RenderSpace) -> LightSample:
-        """Light at `position`; strength f(d) times the cone's smooth step in the cosine to the axis."""
-        light = frame.from_world(self.position)
+    def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
+        """Light at `position`; scale f(d) times the cone's smooth step in the cosine to the axis."""
+        light = render_space.from_world(self.position)
         l, distance = towards(light, position)
         # the cone in double precision and by 1 - cos: a narrow one has no digits in a rounded cosine
         gap = gap_to_axis(position - light, np.subtract(self.target, self.position))
@@ -50,7 +50,7 @@ class Spot(Light):
             cone = x * x * (3 - 2 * x)
         else:
             cone = gap <= rim_gap
-        strength = self.attenuation.factor(distance.astype(np.float64) * frame.radius) * cone
+        strength = self.attenuation.factor(distance.astype(np.float64) * render_space.radius) * cone
         return LightSample(l, distance, strength.astype(position.dtype))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major
+from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
 PARALLEL = 1e-9
@@ -94,9 +95,17 @@ def _tuple(vector: NDArray[np.float64]) -> tuple[float, float, float]:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
+class Rays(Record):
+    """Primary rays."""
+
+    origins: Vectors
+    directions: Vectors
+    start_distance: Floats  # (N,) float64 from the eye to the origin, in radii
+
+
 def camera_rays(
-    camera: Any, frame: RenderSpace, width: int, height: int, points: NDArray[np.float64]
-) -> tuple[Vectors, Vectors, Floats]:
+    camera: Any, render_space: RenderSpace, width: int, height: int, points: NDArray[np.float64]
+) -> Rays:
     """Rays through film positions, in radii from the scene's centre.
 
     Parameters
@@ -109,13 +118,13 @@ def camera_rays(
     origins, directions : (N, 3) float32
         Each ray starts where it enters the scene's sphere, found in float64, so that a camera a million
         radii away loses nothing. Directions have unit length.
-    skipped : (N,) float64
+    start_distance : (N,) float64
         How far each origin lies from the eye or the view plane, in radii.
     """
     right, up, forward = axes(camera)
     x = (2 * points[:, 0] - width) / height
     y = 1 - 2 * points[:, 1] / height
-    eye = frame.from_world(camera.position)
+    eye = render_space.from_world(camera.position)
     if camera.projection == "perspective":
         slope = np.tan(np.radians(camera.fov) / 2)
         x, y = slope * x, slope * y
@@ -125,19 +134,19 @@ def camera_rays(
         y *= scale
         d = _combined((scale, forward), (x, right), (y, up))
         along = -(scale * (forward @ eye) + x * (right @ eye) + y * (up @ eye))
-        skipped = np.maximum(along - CLEAR, 0)
+        start_distance = np.maximum(along - CLEAR, 0)
         start = (
             _combined((np.broadcast_to(1.0, len(x)), eye))
-            if not skipped.any()
-            else eye + skipped[:, None] * d
+            if not start_distance.any()
+            else eye + start_distance[:, None] * d
         )
     else:
-        half = camera.extent / 2 / frame.radius
+        half = camera.extent / 2 / render_space.radius
         d = np.broadcast_to(forward, (len(x), 3))
         plane = _combined((half * x, right), (half * y, up))
-        skipped = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
-        start = eye + skipped[0] * forward + plane if len(x) else plane
-    return column_major(start, F), column_major(d, F), skipped
+        start_distance = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
+        start = eye + start_distance[0] * forward + plane if len(x) else plane
+    return Rays(column_major(start, F), column_major(d, F), start_distance)
 
 
 CLEAR = 1.25

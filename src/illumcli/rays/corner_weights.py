@@ -53,11 +53,11 @@ class Corners(Record):
         """(m,) weight of corner k as an end of an edge."""
         return self.weight(k)
 
-    def corner(self, world: SceneGeometry, k: int) -> Ids:
+    def corner(self, geometry: SceneGeometry, k: int) -> Ids:
         """(m,) number of corner k among the World's corners."""
         raise NotImplementedError
 
-    def vertex(self, world: SceneGeometry, k: int) -> Ids:
+    def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
         """(m,) number of its vertex."""
         raise NotImplementedError
 
@@ -96,11 +96,11 @@ class TriangleCorners(Corners):
     def weight(self, k: int) -> Floats:
         return (self.u, self.v)[k - 1] if k else 1 - self.u - self.v
 
-    def corner(self, world: SceneGeometry, k: int) -> Ids:
-        return world.corners[:, k].take(self.triangle)
+    def corner(self, geometry: SceneGeometry, k: int) -> Ids:
+        return geometry.corners[:, k].take(self.triangle)
 
-    def vertex(self, world: SceneGeometry, k: int) -> Ids:
-        return world.triangles[:, k].take(self.triangle)
+    def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
+        return geometry.triangles[:, k].take(self.triangle)
 
     @property
     def shape(self) -> Ids:
@@ -141,10 +141,10 @@ class PolygonCorners(Corners):
         """(m,) number of corner k, where those of polygon q have the numbers from ``first[q]`` on."""
         return first.take(self.polygon) + np.where(self.last < k, np.int32(0), np.int32(k))
 
-    def corner(self, world: SceneGeometry, k: int) -> Ids:
+    def corner(self, geometry: SceneGeometry, k: int) -> Ids:
         return self.number(self.planar.first_corner, k)
 
-    def vertex(self, world: SceneGeometry, k: int) -> Ids:
+    def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
         return self.planar.vertex.take(self.number(self.planar.starts, k))
 
     @property
@@ -197,11 +197,11 @@ class MeanCorners(Corners):
         last = self._last()
         return np.where(k <= last, 1 / (last + 1), 0).astype(F)
 
-    def corner(self, world: SceneGeometry, k: int) -> Ids:
+    def corner(self, geometry: SceneGeometry, k: int) -> Ids:
         return np.asarray(self.centres.starts.take(self.polygon) + np.minimum(self._last(), np.int32(k)))
 
-    def vertex(self, world: SceneGeometry, k: int) -> Ids:
-        return self.centres.vertex.take(self.corner(world, k))
+    def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
+        return self.centres.vertex.take(self.corner(geometry, k))
 
     def of(self, hits: NDArray[Any], place: Ids) -> MeanCorners:
         own = hits if self.lane is None else np.flatnonzero(place.take(self.lane) >= 0)
@@ -225,13 +225,15 @@ class CornerWeights(Record):
     def __len__(self) -> int:
         return len(self.hits.triangle)
 
-    def interpolate(self, world: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
+    def interpolate(self, geometry: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
         """(M, j) the vectors that `table` has at corners, interpolated; not made unit."""
-        return self.joined(lambda group, k: take_rows(table.values, table.index.take(group.corner(world, k))))
+        return self.joined(
+            lambda group, k: take_rows(table.values, table.index.take(group.corner(geometry, k)))
+        )
 
-    def interpolate_vertices(self, world: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
+    def interpolate_vertices(self, geometry: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
         """(M, j) of (V, j) values at the World's vertices."""
-        return self.joined(lambda group, k: take_rows(values, group.vertex(world, k)))
+        return self.joined(lambda group, k: take_rows(values, group.vertex(geometry, k)))
 
     def joined(self, values: Callable[[Any, int], NDArray[Any]]) -> NDArray[Any]:
         """(M, j) means by weight; `values` gives the (m, j) values at corner k of a group's hits."""
@@ -268,7 +270,7 @@ def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
 
 
 def corner_weights(
-    world: SceneGeometry, planar: PlanarPolygons | None, triangle: Ids, u: Floats, v: Floats
+    geometry: SceneGeometry, planar: PlanarPolygons | None, triangle: Ids, u: Floats, v: Floats
 ) -> CornerWeights:
     """The weights at M hits.
 
@@ -293,7 +295,7 @@ def corner_weights(
         polygon = row.take(lane)
         start = planar.starts.take(polygon)
         last = planar.starts.take(polygon + 1) - start - 1
-        x, y = _in_plane(world, planar, triangle.take(lane), u.take(lane), v.take(lane))
+        x, y = _in_plane(geometry, planar, triangle.take(lane), u.take(lane), v.take(lane))
         if size:
             weights: NDArray[Any] = _mean_value(planar.flat, start, last, int(size), x, y)
         else:
@@ -305,13 +307,13 @@ def corner_weights(
 
 
 def _in_plane(
-    world: SceneGeometry, planar: PlanarPolygons, triangle: Ids, u: Floats, v: Floats
+    geometry: SceneGeometry, planar: PlanarPolygons, triangle: Ids, u: Floats, v: Floats
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m,) coordinates of hits in the planes of their polygons, in double precision."""
     polygon = planar.row.take(triangle)
     shift = planar.starts.take(polygon) - planar.first_corner.take(polygon)
     x, y = planar.flat.T
-    at = [world.corners[:, k].take(triangle) + shift for k in range(3)]
+    at = [geometry.corners[:, k].take(triangle) + shift for k in range(3)]
     second, third = u.astype(np.float64), v.astype(np.float64)
     weights = (1 - second - third, second, third)
     return (

@@ -21,7 +21,7 @@ from illumcli.records import Record
 class Hits(Record):
     """The samples of a tile that see a surface; every surface buffer has these M lanes."""
 
-    lane: Ids  # (M,) which sample of the tile
+    sample: Ids  # (M,) which sample of the tile, ascending
     triangle: Ids  # (M,)
     u: Floats  # (M,) float32 weight of corner 1
     v: Floats  # (M,) float32 weight of corner 2
@@ -29,11 +29,8 @@ class Hits(Record):
 
 def seen(closest: Closest) -> Hits:
     """The hits among `closest`, packed."""
-    lane = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
-    return Hits(
-        lane,
-        *(getattr(closest, name).take(lane) for name in ("triangle", "u", "v")),
-    )
+    sample = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
+    return Hits(sample, *(getattr(closest, name).take(sample) for name in ("triangle", "u", "v")))
 
 
 class SurfaceInteraction(Record):
@@ -42,15 +39,15 @@ class SurfaceInteraction(Record):
     position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees
     ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
     edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
-    behind: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
+    back_facing: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
 
 
-def facets(
-    world: SceneGeometry, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
+def interact(
+    geometry: SceneGeometry, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
 ) -> SurfaceInteraction:
     """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
     v0, e1, e2 = (
-        column_major(take_rows(world.vertices, world.triangles[:, k].take(triangle)), np.float64)
+        column_major(take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)), np.float64)
         for k in range(3)
     )
     e1 -= v0
@@ -59,27 +56,27 @@ def facets(
     edge = np.sqrt(np.maximum(np.maximum(*(dot(side, side) for side in sides[:2])), dot(sides[2], sides[2])))
     normal = cross(e1, e2)
     area = length(normal)
-    behind = dot(normal, towards_eye) < 0
-    scale = np.divide(1 - 2 * behind.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
+    back_facing = dot(normal, towards_eye) < 0
+    scale = np.divide(1 - 2 * back_facing.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
     normal *= scale[:, None]
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
-    return SurfaceInteraction(position, column_major(normal, F), effective_edge(edge, area), behind)
+    return SurfaceInteraction(position, column_major(normal, F), effective_edge(edge, area), back_facing)
 
 
-def facing(n: Vectors, behind: NDArray[np.bool_]) -> Vectors:
+def facing(n: Vectors, back_facing: NDArray[np.bool_]) -> Vectors:
     """`n`, turned over where the eye sees the back."""
-    return n * (1 - 2 * behind.astype(n.dtype))[:, None]
+    return n * (1 - 2 * back_facing.astype(n.dtype))[:, None]
 
 
-def corner_rows(world: SceneGeometry, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:
+def corner_rows(geometry: SceneGeometry, triangle: Ids, table: CornerVectors) -> tuple[Ids, Ids, Ids]:
     """Rows of `table` at the three corners of each hit triangle."""
-    a, b, c = (table.index.take(world.corners[:, k].take(triangle)) for k in range(3))
+    a, b, c = (table.index.take(geometry.corners[:, k].take(triangle)) for k in range(3))
     return a, b, c
 
 
-def polygon_facing(triangle: Ids, facet: SurfaceInteraction, planar: PlanarPolygons | None) -> Vectors:
+def polygon_facing(triangle: Ids, interaction: SurfaceInteraction, planar: PlanarPolygons | None) -> Vectors:
     """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
 
     Of a planar polygon Newell's, of others the triangle's. Rays keep to the triangle's, which they leave.
@@ -87,23 +84,23 @@ def polygon_facing(triangle: Ids, facet: SurfaceInteraction, planar: PlanarPolyg
     row = np.zeros(0, np.int32) if planar is None else planar.row.take(triangle)
     own = np.flatnonzero(row >= 0)
     if planar is None or not own.size:
-        return facet.ng
-    normal, ng = take_rows(planar.normal, row.take(own)), take_rows(facet.ng, own)
-    out = facet.ng.copy(order="F")
+        return interaction.ng
+    normal, ng = take_rows(planar.normal, row.take(own)), take_rows(interaction.ng, own)
+    out = interaction.ng.copy(order="F")
     out[own] = facing(normal, dot(normal, ng) < 0)
     return out
 
 
 def interpolated(
-    world: SceneGeometry, normals: CornerVectors, weights: CornerWeights, facet: SurfaceInteraction
+    geometry: SceneGeometry, normals: CornerVectors, weights: CornerWeights, interaction: SurfaceInteraction
 ) -> Vectors:
     """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
 
     The facet's own where the interpolated one vanishes. On the side the eye sees.
     """
-    n = unit(weights.interpolate(world, normals))
-    n = facing(n, facet.behind)
-    return with_facet(n, facet.ng)
+    n = unit(weights.interpolate(geometry, normals))
+    n = facing(n, interaction.back_facing)
+    return with_facet(n, interaction.ng)
 
 
 def with_facet(n: Vectors, ng: Vectors) -> Vectors:
@@ -115,7 +112,7 @@ def with_facet(n: Vectors, ng: Vectors) -> Vectors:
 
 
 def quadratic(
-    world: SceneGeometry, normals: CornerVectors, weights: CornerWeights, facet: SurfaceInteraction
+    geometry: SceneGeometry, normals: CornerVectors, weights: CornerWeights, interaction: SurfaceInteraction
 ) -> Vectors:
     """(M, 3) unit normal, quadratic along every edge.
 
@@ -130,12 +127,12 @@ def quadratic(
     ----------
     van Overveld, C. W. A. M. and Wyvill, B. (1997). Phong normal interpolation revisited. ACM TOG 16(4).
     """
-    n = column_major(weights.interpolate(world, normals))
+    n = column_major(weights.interpolate(geometry, normals))
     for group in weights.groups:
 
         def corner(k: int, group: Corners = group) -> Corner:
-            end = take_rows(normals.values, normals.index.take(group.corner(world, k)))
-            return take_rows(world.vertices, group.vertex(world, k)), end, group.end_weight(k)
+            end = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
+            return take_rows(geometry.vertices, group.vertex(geometry, k)), end, group.end_weight(k)
 
         share = np.multiply if isinstance(group, TriangleCorners) else between
         if group.lane is None:
@@ -144,7 +141,7 @@ def quadratic(
             part = take_rows(n, group.lane)
             bend(part, group.count, corner, share)
             n[group.lane] = part
-    return with_facet(facing(unit(n), facet.behind), facet.ng)
+    return with_facet(facing(unit(n), interaction.back_facing), interaction.ng)
 
 
 Corner: TypeAlias = tuple[Vectors, Vectors, Floats]
@@ -179,22 +176,22 @@ def bend(
         last = following
 
 
-def uv(world: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
+def uv(geometry: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
     """(M, 2) texture coordinates; 0 where a mesh has none.
 
     Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
     """
-    out = _with_all(world, uvs, weights.hits)
+    out = _with_all(geometry, uvs, weights.hits)
     for group in weights.groups:
         if isinstance(group, MeanCorners):
             lane = slice(None) if group.lane is None else group.lane
-            out[lane] = _with_all(world, uvs, group)
+            out[lane] = _with_all(geometry, uvs, group)
     return out
 
 
-def _with_all(world: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
+def _with_all(geometry: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
     """(m, 2) means by weight; 0 where a corner has none."""
-    index = [uvs.index.take(corners.corner(world, k)) for k in range(corners.count)]
+    index = [uvs.index.take(corners.corner(geometry, k)) for k in range(corners.count)]
     has = np.minimum.reduce(index) >= 0
     if not has.any():
         return np.zeros((len(has), 2), F, order="F")
@@ -202,18 +199,18 @@ def _with_all(world: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDA
     return np.asarray(np.where(has[:, None], found, F(0)))
 
 
-def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
+def uv_tangents(geometry: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     """Where u grows, at every corner.
 
     The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
     the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
     """
-    points = [take_rows(world.vertices, corner).astype(np.float64) for corner in world.triangles.T]
-    at = corner_rows(world, np.arange(len(world.triangles), dtype=np.int32), uvs)
+    points = [take_rows(geometry.vertices, corner).astype(np.float64) for corner in geometry.triangles.T]
+    at = corner_rows(geometry, np.arange(len(geometry.triangles), dtype=np.int32), uvs)
     along, hand = _along_u(points, at, uvs)
     groups, parts = [], []
     for k in range(3):
-        groups.append((world.triangles[:, k] * (len(uvs.values) + np.int64(1)) + at[k] + 1) * 3 + hand)
+        groups.append((geometry.triangles[:, k] * (len(uvs.values) + np.int64(1)) + at[k] + 1) * 3 + hand)
         e1, e2 = points[k - 2] - points[k], points[k - 1] - points[k]
         parts.append(along * np.arctan2(length(cross(e1, e2)), dot(e1, e2))[:, None])
     _, index = np.unique(np.stack(groups, axis=1), return_inverse=True)
@@ -223,7 +220,7 @@ def uv_tangents(world: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     )
     none = np.zeros((1, 3))  # of corners that the cut skipped
     corner = np.full(len(uvs.index), len(sums), np.int32)
-    corner[world.corners.ravel()] = index.ravel()
+    corner[geometry.corners.ravel()] = index.ravel()
     return CornerVectors(column_major(np.concatenate([unit(sums), none]), F), corner)
 
 

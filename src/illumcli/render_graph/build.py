@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
+from illumcli.film.view import View, depth, rays, samples, view_vectors
 from illumcli.graph import Node
 from illumcli.layers import FIXED, PER_LIGHT, Layer
+from illumcli.lights import incident as light_at
 from illumcli.lights._base import Light
 from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
-from illumcli.records import Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.replicates import error_recipes
 from illumcli.scene.load import resolve
@@ -31,33 +31,6 @@ GIVEN = ("view", "tile")
 PURPOSES = ("lobes", "ambient", "emission")
 """What parameters that vary over a surface may serve."""
 SMOOTH = ("gouraud", "phong", "quadratic")
-
-
-class View(Value):
-    """One picture: a camera and the size and sampling of its film."""
-
-    name: str
-    camera: Any
-    width: int
-    height: int
-    samples: int
-    adaptive: Any = None
-    first: int | None = None
-    """Number of the first sample, where these are part of a pixel's samples."""
-
-    @property
-    def is_adaptive(self) -> bool:
-        """Are pixels sampled to different counts?"""
-        return self.adaptive is not None and self.adaptive.first < self.samples
-
-    def coarse(self) -> View:
-        """The view with the samples that every pixel gets."""
-        return replace(self, samples=self.adaptive.first, adaptive=None, first=0)
-
-    def rest(self) -> View:
-        """The view with all the other samples."""
-        few = self.adaptive.first
-        return replace(self, samples=self.samples - few, adaptive=None, first=few)
 
 
 def views(scene: Scene) -> list[View]:
@@ -190,16 +163,16 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Node.of(stages.polygon_centres),
         Node.of(stages.planar_polygons),
         Node.of(stages.planar_polygons, "curved_polygons", normals="corner_normals"),
-        Node.of(partial(stages.samples, scene.seed), "samples"),
-        Node.of(partial(stages.rays, scene.film.filter), "rays"),
+        Node.of(partial(samples, scene.seed), "samples"),
+        Node.of(partial(rays, scene.film.filter), "rays"),
         Node.of(stages.hits),
-        Node.of(stages.facets),
+        Node.of(stages.interaction),
         Node.of(stages.corner_weights, **whole),
         Node.of(stages.corner_weights, "normal_weights", planar_polygons="curved_polygons"),
         Node.of(partial(stages.points, rate), "points", **of_normals, **smooth, **flat),
         Node.of(stages.point_weights),
         Node.of(stages.material),
-        Node.of(stages.view_vectors, "v"),
+        Node.of(view_vectors, "v"),
         Node.of(stages.uv_tangents),
         Node.of(partial(stages.tangents, grains), "t", **by_uv),
         Node.of(stages.ray_origins),
@@ -215,7 +188,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         Node.of(stages.ambient_color, **_varying(scene, "ambient")),
         Node.of(stages.emission, **_varying(scene, "emission")),
         Node.of(stages.alpha),
-        Node.of(stages.depth),
+        Node.of(depth),
         Node.of(stages.world_position),
         Node.of(stages.normal),
         Node.of(stages.geometric_normal, planar_polygons="planar_polygons"),
@@ -260,11 +233,11 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Node
         for number, (name, file) in enumerate(baked_files(scene, loaded))
     )
     settings = scene.obscurance or Obscurance()
-    more = {"open_facets": "open_facets"}
+    more = {"open_triangles": "open_triangles"}
     if any(file for _, file in files):
         more |= {"baked": "baked", "corner_weights": "corner_weights"}
     if settings.faces != "count":
-        more["facet_normals"] = "facet_normals"
+        more["triangle_normals"] = "triangle_normals"
     if settings.about == "shading" and set(rates(scene)) & set(SMOOTH):
         more["obscurance_normals"] = "obscurance_normals"
     if all_baked(scene) or (scene.obscurance is None and "baked" in more):
@@ -272,8 +245,8 @@ def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Node
     else:
         w = Node.of(partial(stages.obscurance, settings), "obscurance", **more)
     return [
-        Node.of(stages.open_facets),
-        Node.of(stages.facet_normals),
+        Node.of(stages.open_triangles),
+        Node.of(stages.triangle_normals),
         Node.of(partial(stages.baked, files), "baked"),
         w,
     ]
@@ -334,13 +307,13 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         Node(every, partial(stages.meshes, which), parts),
         *left,
         Node.of(
-            partial(stages.standing, tuple(thing.transform for thing in scene.objects)),
-            "standing",
+            partial(stages.object_bounds, tuple(thing.transform for thing in scene.objects)),
+            "object_bounds",
             meshes=every,
         ),
         Node.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
-        Node.of(partial(stages.world, by_file), "world"),
-        Node.of(stages.frame),
+        Node.of(partial(stages.geometry, by_file), "geometry"),
+        Node.of(stages.render_space),
         Node.of(partial(stages.repairs, called, computes), "repairs"),
         *([Node.of(partial(stages.undirected, called, wants), "undirected")] if any(wants) else []),
         *([Node.of(partial(stages.unnamed, called, selects), "unnamed")] if any(selects) else []),
@@ -453,33 +426,31 @@ def _light(
 
     `implied` names the smooth surface that shadow rays may start from, if there is one.
     """
-    lit, reach, shadow = f"lit:{name}", f"reach:{name}", f"shadow:{name}"
+    incident, candidates, shadow = f"incident:{name}", f"shadow_candidates:{name}", f"shadow:{name}"
     if not sends(light):
         dark = partial(stages.black)
         return [Node.of(dark, f"light:{name}"), Node.of(partial(stages.no_shadow), shadow)]
-    place = light.placed()
+    place = light.without_color()
     color = light.color()
     way = {"shadow": shadow} if light.shadows else {}
-    arriving = lit
+    arriving = incident
     opened = []
     if at_samples and light.shadows:  # what lies in shadow is not evaluated at all
-        arriving, way = f"free:{name}", {}
-        opened = [Node.of(partial(stages.free, place), arriving, shadow=shadow)]
+        arriving, way = f"unshadowed:{name}", {}
+        opened = [Node.of(partial(light_at.unshadowed, place), arriving, shadow=shadow)]
     return [
         *opened,
-        Node.of(partial(stages.lit, place), lit),
-        # where every model is evaluated at the samples, its lit points are those that want shadow rays
-        Node.of(partial(stages.reach, place), reach)
-        if not at_samples
-        else Node.of(stages.same, reach, lit=lit),
-        Node.of(stages.shadow, shadow, reach=reach, **implied)
+        Node.of(partial(light_at.incident, place), incident),
+        # where every model is evaluated at the samples, the lit ones are those that want shadow rays
+        *([] if at_samples else [Node.of(partial(light_at.shadow_candidates, place), candidates)]),
+        Node.of(stages.shadow, shadow, shadow_candidates=incident if at_samples else candidates, **implied)
         if light.shadows
         else Node.of(stages.no_shadow, shadow),
-        Node.of(partial(stages.direct, color), f"direct:{name}", lit=arriving, **eye),
-        Node.of(stages.lobe_sum, f"light:{name}", direct=f"direct:{name}", **way),
+        Node.of(partial(stages.direct, color), f"direct:{name}", incident=arriving, **eye),
+        Node.of(stages.sum_lobes, f"light:{name}", direct=f"direct:{name}", **way),
         Node.of(partial(stages.one_lobe, "diffuse"), f"diffuse:{name}", direct=f"direct:{name}", **way),
         Node.of(partial(stages.one_lobe, "specular"), f"specular:{name}", direct=f"direct:{name}", **way),
-        Node.of(partial(stages.arriving_light, color), f"unlit:{name}", lit=arriving, **way),
+        Node.of(partial(stages.irradiance, color), f"irradiance:{name}", incident=arriving, **way),
     ]
 
 
@@ -495,7 +466,7 @@ def _sums(scene: Scene) -> list[Node]:
     glow = ["emission"] if is_emissive(scene) else []
     if scene.ambient.form == "coupled":
         both = ["coupled"]
-        needs = {"ambient_color": "ambient_color", "direct": "direct", "unlit": "unlit", **open_way}
+        needs = {"ambient_color": "ambient_color", "direct": "direct", "irradiance": "irradiance", **open_way}
         coupled = [Node("coupled", partial(stages.coupled, scene.ambient.color), needs)]
     else:
         both, coupled = (
@@ -510,7 +481,7 @@ def _sums(scene: Scene) -> list[Node]:
         ambient,
         *coupled,
         total("direct", *(f"light:{name}" for name in lights)),
-        total("unlit", *(f"unlit:{name}" for name in lights)),
+        total("irradiance", *(f"irradiance:{name}" for name in lights)),
         total("diffuse", *(f"diffuse:{name}" for name in lights)),
         total("specular", *(f"specular:{name}" for name in lights)),
         total("uncued" if cued else "beauty", *glow, *both),

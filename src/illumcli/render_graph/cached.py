@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, take_or_all
 from illumcli.cache.store import Store, Stored
+from illumcli.film.tiles import Tile
+from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
@@ -27,7 +29,7 @@ from illumcli.graph import Node
 from illumcli.rays.interaction import Hits
 from illumcli.records import Record, Value
 from illumcli.render_graph.keys import Keys, code
-from illumcli.render_graph.stages import MeshRepairs, Tile
+from illumcli.render_graph.stages import MeshRepairs
 from illumcli.render_space import RenderSpace
 from illumcli.shading.materials import Numbering
 from illumcli.shading.rates import Points, as_they_are
@@ -41,12 +43,12 @@ MEMORY = 1 << 30
 
 ONCE: Mapping[str, type | tuple[type, ...]] = {
     "mesh": Mesh,
-    "standing": ObjectBounds,
+    "object_bounds": ObjectBounds,
     "planar_polygons": (PlanarPolygons, type(None)),
     "curved_polygons": (PlanarPolygons, type(None)),
     "camera": tuple,
     "implied_widths": np.ndarray,
-    "world": SceneGeometry,
+    "geometry": SceneGeometry,
     "repairs": MeshRepairs,
     "undirected": MeshRepairs,
     "unnamed": MeshRepairs,
@@ -145,7 +147,7 @@ class Picture(Record):
     per_pixel: int
 
     @classmethod
-    def shape(cls, kind: Kind, view: Any) -> tuple[tuple[int, ...], Any]:
+    def shape(cls, kind: Kind, view: View) -> tuple[tuple[int, ...], Any]:
         """Shape and type of what is stored for a view."""
         row = view.width * view.samples
         if kind.dtype is np.bool_:
@@ -174,14 +176,14 @@ def load_hits(picture: Picture, tile: Tile) -> Hits:
 
 def load_tile(picture: Picture, tile: Tile, hits: Hits) -> Any:
     """A buffer of a tile as it was kept, at the samples seen."""
-    return picture.kind.unpack(take_or_all(picture.tile(tile).T, hits.lane).T, hits)
+    return picture.kind.unpack(take_or_all(picture.tile(tile).T, hits.sample).T, hits)
 
 
 def spread_out(kind: Kind, packed: NDArray[Any], hits: Hits, tile: Tile, per_pixel: int) -> NDArray[Any]:
     """(height, planes, samples of a row) of a tile from (planes, M) at the samples seen; -1, 0 elsewhere."""
     row = tile.width * per_pixel
     out = np.full((kind.planes, tile.height * row), -1 if kind.dtype is np.int32 else 0, kind.dtype)
-    out[:, hits.lane] = packed
+    out[:, hits.sample] = packed
     return out.reshape(kind.planes, tile.height, row).transpose(1, 0, 2)
 
 
@@ -259,7 +261,7 @@ class Artifacts:
     made: dict[str, Any] = field(default_factory=dict)
     """By key, what this run made of the whole scene before it knew its plan."""
 
-    def recipe(self, name: str, key: str, view: Any) -> Node | None:
+    def recipe(self, name: str, key: str, view: View) -> Node | None:
         """A recipe that loads the buffer; None where it must be made."""
         if key in self.made:
             return Node(name, partial(_known, self.made[key]), {})
@@ -278,7 +280,7 @@ class Artifacts:
         self.reused[name] = "memory"
         return Node(name, partial(_of_tile, tiles), {"tile": "tile"})
 
-    def _in_store(self, name: str, key: str, view: Any) -> Node | None:
+    def _in_store(self, name: str, key: str, view: View) -> Node | None:
         if self.store is None or not is_kept(name):
             return None
         if self.look:
@@ -344,7 +346,7 @@ def kept_whole(name: str, stored: Stored) -> Any:
     return value
 
 
-def kept_picture(kind: Kind, stored: Stored, view: Any) -> Picture:
+def kept_picture(kind: Kind, stored: Stored, view: View) -> Picture:
     """A buffer of a view, from its entry.
 
     Raises
@@ -373,7 +375,7 @@ def _of_tile(tiles: Mapping[Tile, Any], tile: Tile) -> Any:
 class Book(Mapping[str, Node]):
     """A book in which every recipe that is asked for is first looked up among the artifacts."""
 
-    def __init__(self, book: Mapping[str, Node], view: Any, artifacts: Artifacts) -> None:
+    def __init__(self, book: Mapping[str, Node], view: View, artifacts: Artifacts) -> None:
         self._book, self._view, self._artifacts = book, view, artifacts
         self.keys_of = Keys(book, view, code())
 
@@ -393,7 +395,7 @@ class Book(Mapping[str, Node]):
 class Keeper:
     """Keeps the tile buffers of one view while it is rendered: in memory, and in the store if worth it."""
 
-    def __init__(self, artifacts: Artifacts, keys: Mapping[str, str], view: Any) -> None:
+    def __init__(self, artifacts: Artifacts, keys: Mapping[str, str], view: View) -> None:
         self._view = view
         self._keys = keys
         self._memory = artifacts.memory

@@ -53,28 +53,33 @@ def unseen_objects(
     scene = made.scene
     if scene is None or why_all(made) is not None or any(view.camera.fit for view in made.views):
         return ()
-    standing: ObjectBounds | None = asked(made, "standing", artifacts, tally, threads, at_hand)
-    if standing is None:
+    object_bounds: ObjectBounds | None = asked(made, "object_bounds", artifacts, tally, threads, at_hand)
+    if object_bounds is None:
         return ()
-    frame, film = standing.frame, scene.film
-    boxes = Boxes(*((corner - frame.centre) / frame.radius for corner in (standing.low, standing.high)))
+    render_space, film = object_bounds.render_space, scene.film
+    boxes = Boxes(
+        *(
+            (corner - render_space.centre) / render_space.radius
+            for corner in (object_bounds.low, object_bounds.high)
+        )
+    )
     views = [
-        frustum(view.camera, frame, view.width, view.height, film.filter if view.samples > 1 else None)
+        frustum(view.camera, render_space, view.width, view.height, film.filter if view.samples > 1 else None)
         for view in made.views
     ]
     steps = {step.output for step in made.tile}
     lights = [
         light for name, light in active_lights(scene).items() if light.shadows and f"shadow:{name}" in steps
     ]
-    rays = SecondaryRays(lights, _reach(made, frame.radius) / frame.radius)
-    found = culled_objects(boxes, np.zeros(len(boxes.low)), views, rays, frame)
+    rays = SecondaryRays(lights, _reach(made, render_space.radius) / render_space.radius)
+    found = culled_objects(boxes, np.zeros(len(boxes.low)), views, rays, render_space)
     if found.any() and lights and scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH):
         widths = asked(made, "implied_widths", artifacts, tally, threads, at_hand)
         if widths is None:
             return ()
-        found = culled_objects(boxes, widths / frame.radius, views, rays, frame)
+        found = culled_objects(boxes, widths / render_space.radius, views, rays, render_space)
     if found.any():
-        tally.add({}, {}, {"polygons": int(standing.polygons[found].sum())})
+        tally.add({}, {}, {"polygons": int(object_bounds.polygons[found].sum())})
     return tuple(int(number) for number in np.flatnonzero(found))
 
 

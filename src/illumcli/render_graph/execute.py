@@ -16,16 +16,17 @@ from numpy.typing import NDArray
 from illumcli.arrays import column_major
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
+from illumcli.film.tiles import MOST, Scattered, Tile
+from illumcli.film.tiles import tiles as cut
+from illumcli.film.view import View
 from illumcli.graph import Node
+from illumcli.lights.incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record
-from illumcli.render_graph.build import SHAPE, View
+from illumcli.render_graph.build import SHAPE
 from illumcli.render_graph.cached import Artifacts, Keeper
 from illumcli.render_graph.schedule import Plan
-from illumcli.render_graph.stages import MOST, Scattered, Tile
-from illumcli.render_graph.stages import tiles as cut
-from illumcli.visibility.incident import LitPoints
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32 or, ids, uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
@@ -232,7 +233,7 @@ def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept
         if tracer and tracer.rays > before:
             rays[step.output] = tracer.rays - before
         if isinstance(made, LitPoints):
-            lanes[step.output] = made.count - len(made.lane)
+            lanes[step.output] = made.count - len(made.index)
         if step.output in common.keeper.names:
             kept[step.output] = common.keeper.take(step.output, buffers, tile)
         for name in step.inputs.values():
@@ -295,9 +296,9 @@ def _joined(
     count = first.per_pixel + last.per_pixel
     place = np.full(len(first.x), -1)
     place[pixel] = np.arange(len(pixel))
-    own, sample = np.divmod(few["hits"].lane, first.per_pixel)
+    own, sample = np.divmod(few["hits"].sample, first.per_pixel)
     among = np.flatnonzero(place[own] >= 0)
-    pixel_of, other = np.divmod(others["hits"].lane, last.per_pixel)
+    pixel_of, other = np.divmod(others["hits"].sample, last.per_pixel)
     lane = np.concatenate(
         [place[own[among]] * count + sample[among], pixel_of * count + first.per_pixel + other]
     ).astype(np.int32)
@@ -307,7 +308,7 @@ def _joined(
         axis=1,
     )
     joined = {
-        "hits": replace(others["hits"], lane=lane[order]),
+        "hits": replace(others["hits"], sample=lane[order]),
         "samples": replace(last, points=points.reshape(-1, 2), per_pixel=count, first=None),
     }
     for name in {"alpha", *(layer.buffer for layer in plan.layers)}:
@@ -320,7 +321,7 @@ def _differing(
     plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile, difference: float
 ) -> dict[str, NDArray[np.bool_]]:
     """(rows, columns) by layer: where its pixels want more samples than the view has."""
-    lane, shape = buffers["hits"].lane, (tile.height, tile.width)
+    lane, shape = buffers["hits"].sample, (tile.height, tile.width)
     objects, normals = (buffers[name] for name in SHAPE)
     forms = differs_in_shape(objects, normals, lane, shape, view.samples)
     out = {}
@@ -335,7 +336,7 @@ def _differing(
 
 
 def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> Planes:
-    lane = buffers["hits"].lane
+    lane = buffers["hits"].sample
     pixels = tile.width * tile.height
     out = {}
     for layer in plan.layers:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from illumcli.render_graph.build import View
+from illumcli.film.view import View
 from illumcli.render_graph.cached import Artifacts
 from illumcli.render_graph.culling import asked
 from illumcli.render_graph.execute import RenderStats

@@ -37,18 +37,18 @@ class Disproportion(Value):
     """Of the small object's radius."""
 
 
-def disproportion(standing: ObjectBounds, views: Sequence[View]) -> Disproportion | None:
+def disproportion(object_bounds: ObjectBounds, views: Sequence[View]) -> Disproportion | None:
     """The object for which it is worst; None where all is well."""
-    size = (standing.high - standing.low) / 2
-    centre = standing.low + size
+    size = (object_bounds.high - object_bounds.low) / 2
+    centre = object_bounds.low + size
     radius = np.linalg.norm(size, axis=1)
     known = np.flatnonzero(np.isfinite(radius) & (radius > 0))
     found: list[Disproportion] = []
-    for i in known[_looked_at(standing, views)[known]]:
+    for i in known[_looked_at(object_bounds, views)[known]]:
         apart = np.abs(centre - centre[i]) - size
         near = known[(apart[known] <= size[i] + radius[i]).all(axis=1)]
-        place = float(np.linalg.norm(centre[i] - standing.frame.centre))
-        offset = SHARE * (place + float(_edges(radius, standing.polygons)[near].max()))
+        place = float(np.linalg.norm(centre[i] - object_bounds.render_space.centre))
+        offset = SHARE * (place + float(_edges(radius, object_bounds.polygons)[near].max()))
         if offset > VISIBLE * radius[i]:
             reach = np.linalg.norm(centre - centre[i], axis=1) + radius
             large = int(known[np.argmax(reach[known])])
@@ -62,19 +62,22 @@ def _edges(radius: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[
     return 2 * radius * np.minimum(1, 4 / np.sqrt(np.maximum(polygons, 1)))
 
 
-def _looked_at(standing: ObjectBounds, views: Sequence[View]) -> NDArray[np.bool_]:
+def _looked_at(object_bounds: ObjectBounds, views: Sequence[View]) -> NDArray[np.bool_]:
     """(O,) Is the object in some view, and not small there?"""
-    frame = standing.frame
+    render_space = object_bounds.render_space
     with np.errstate(invalid="ignore"):
-        low, high = ((corner - frame.centre) / frame.radius for corner in (standing.low, standing.high))
+        low, high = (
+            (corner - render_space.centre) / render_space.radius
+            for corner in (object_bounds.low, object_bounds.high)
+        )
         centre, radius = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
         seen = np.zeros(len(low), np.bool_)
         for view in views:
-            planes = frustum(view.camera, frame, view.width, view.height, None)
+            planes = frustum(view.camera, render_space, view.width, view.height, None)
             if view.camera.projection == "perspective":
-                distance = np.linalg.norm(centre - frame.from_world(view.camera.position), axis=1)
+                distance = np.linalg.norm(centre - render_space.from_world(view.camera.position), axis=1)
                 half = distance * np.tan(np.radians(view.camera.fov) / 2)
             else:
-                half = np.full(len(low), view.camera.extent / 2 / frame.radius)
+                half = np.full(len(low), view.camera.extent / 2 / render_space.radius)
             seen |= ~outside_frustum(planes, Boxes(low, high)) & (radius >= SMALLEST * half)
     return seen

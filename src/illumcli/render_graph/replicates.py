@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,11 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.color import LUMINANCE
 from illumcli.film.reconstruct import pixel_means
+from illumcli.film.tiles import Samples, Tile
+from illumcli.film.view import View
 from illumcli.graph import Node, topological_order
 from illumcli.rays import sampling
 from illumcli.rays.interaction import Hits
-from illumcli.render_graph.stages import Samples, Tile
 
 AGAIN = "again."
 """Before the name of every buffer of the second pictures."""
@@ -74,7 +74,7 @@ def doubled_count(width: int, height: int) -> int:
     return -(-width // CELL) * -(-height // CELL)
 
 
-def doubled_samples(seed: int, view: Any, tile: Tile) -> Samples:
+def doubled_samples(seed: int, view: View, tile: Tile) -> Samples:
     """Where the second samples of the tile's doubled pixels lie: one pixel of each cell, drawn at random."""
     cells = [
         np.arange(first, first + size, CELL)
@@ -91,7 +91,7 @@ def doubled_samples(seed: int, view: Any, tile: Tile) -> Samples:
     return Samples(x, y, points, view.samples)
 
 
-def _cell(view: Any, x: NDArray[np.int64], y: NDArray[np.int64]) -> tuple[Ids, Ids]:
+def _cell(view: View, x: NDArray[np.int64], y: NDArray[np.int64]) -> tuple[Ids, Ids]:
     """Width and height of the cells of some pixels, which the film's right and lower edges may cut."""
     return (
         np.minimum(CELL, view.width - x // CELL * CELL),
@@ -106,7 +106,7 @@ def doubled_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64
     the film the first picture's draws are one pattern that the seed only shifts.
     """
     key = sampling.stream(seed, "obscurance again")
-    pixel, sample = np.divmod(hits.lane, samples.per_pixel)
+    pixel, sample = np.divmod(hits.sample, samples.per_pixel)
     zero = np.zeros_like(sample)
     within = sampling.dither(key, zero, zero, sample)
     number = (samples.y * (1 << 16) + samples.x).astype(np.uint32)
@@ -121,7 +121,7 @@ def no_error(tile: Tile) -> Floats:
 
 def standard_error(
     background: tuple[float, float, float],
-    view: Any,
+    view: View,
     tile: Tile,
     first_samples: Samples,
     first_hits: Hits,
@@ -155,4 +155,4 @@ def luminance(
     """(P,) luminance of pixels above that of the background."""
     weights = np.array(LUMINANCE)
     seen = (beauty @ weights.astype(F)) - F(weights @ background)
-    return pixel_means(seen, hits.lane, len(samples.x), samples.per_pixel)[:, 0].astype(np.float64)
+    return pixel_means(seen, hits.sample, len(samples.x), samples.per_pixel)[:, 0].astype(np.float64)

@@ -12,13 +12,14 @@ import numpy as np
 from illumcli import __version__
 from illumcli.cache.fingerprint import digest
 from illumcli.errors import InputError, LimitError
+from illumcli.film.tiles import tile_side
+from illumcli.film.view import View
 from illumcli.graph import Node, topological_order
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import (
     GIVEN,
     SHAPE,
-    View,
     active_lights,
     is_ambient,
     is_baked,
@@ -30,7 +31,6 @@ from illumcli.render_graph.build import (
 from illumcli.render_graph.cached import Artifacts, Book, Picture, kind_of
 from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.replicates import AGAIN, BLOCK, doubled_count
-from illumcli.render_graph.stages import tile_side
 from illumcli.scene.spec import Scene
 
 LARGEST_SIDE = 1 << 16
@@ -208,7 +208,7 @@ def _steps(
         filled |= dict.fromkeys(SHAPE)
         coverage = ["alpha"]
     told = [name for name in ("repairs", "undirected", "unnamed") if name in book]
-    steps = topological_order(book, [*filled, *coverage, *nearest, "hits", "frame", *told], GIVEN)
+    steps = topological_order(book, [*filled, *coverage, *nearest, "hits", "render_space", *told], GIVEN)
     in_tile = set(GIVEN)
     once, tile = [], []
     for step in steps:
@@ -265,7 +265,7 @@ def _why_not(scene: Scene, book: Mapping[str, Node], made: set[str]) -> dict[str
             continue
         if light and light not in active:
             reasons[name] = "the light's intensity is 0"
-        elif kind in ("shadow", "reach") and light and not active[light].shadows:
+        elif kind in ("shadow", "shadow_candidates") and light and not active[light].shadows:
             reasons[name] = "the light casts no shadows"
         elif name == "obscurance_draws" and any(is_baked(scene)):
             reasons[name] = "the obscurance is baked"

@@ -16,11 +16,11 @@ def ambient_light(
 
 
 def coupled(
-    ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, unlit: Vectors, w: Floats
+    ambient_color: Vectors, light: tuple[float, float, float], direct: Vectors, irradiance: Vectors, w: Floats
 ) -> Vectors:
     """(M, 3) (k_a I_a + direct) w + I_d, as one text prints it (Theoharis et al. 2008, eq. 12.75).
 
-    `direct` is the material's response to all lights, `unlit` (I_d) the light that arrives, its cosine
+    `direct` is the material's response to all lights, `irradiance` (I_d) the light that arrives, its cosine
     included; direct light counts twice, once with and once without the material.
     """
-    return (ambient_color * np.asarray(light, F) + direct) * w[:, None] + unlit
+    return (ambient_color * np.asarray(light, F) + direct) * w[:, None] + irradiance

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, take_or_all, take_rows
+from illumcli.lights.incident import LitPoints
 from illumcli.models._base import IlluminationModel
 from illumcli.shading.terms import evaluate, words
 from illumcli.shading.textures import Parameters
-from illumcli.visibility.incident import LitPoints
 
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
@@ -34,7 +34,7 @@ def response(
     models: Sequence[IlluminationModel],
     lobes: Sequence[Mapping[str, Any]],
     material: Ids,
-    lit: LitPoints,
+    incident: LitPoints,
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
     parameters: Parameters | None = None,
@@ -47,7 +47,7 @@ def response(
         By material number; a material without lobes is not evaluated.
     material : (E,) int32
         Of each point.
-    lit : Lit
+    incident : Lit
         The points the light reaches.
     color : (3,)
         Intensity or irradiance of the light.
@@ -62,28 +62,28 @@ def response(
         `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
     """
     names = sorted({name for each in lobes for name in each})
-    count = len(lit.lane)
+    count = len(incident.index)
     made = {name: np.zeros((3, count + 1), F) for name in names}  # by material; the last is of unlit points
-    place = np.full(lit.count, count, np.intp)  # where each point's light is among them
+    place = np.full(incident.count, count, np.intp)  # where each point's light is among them
     power = np.asarray(color, F)
     first = 0
-    for number, lanes in groups(take_or_all(material, lit.lane), len(models)):
+    for number, lanes in groups(take_or_all(material, incident.index), len(models)):
         if not lobes[number]:
             continue
-        at = pick(lit.lane, lanes)
+        at = pick(incident.index, lanes)
         own = dict(lobes[number])
         if parameters is not None and parameters.of_material[number]:
             own = parameters.model(models[number], number, at).lobes()
         wanted = words(own)
         here = {word: take_or_all(given[word], at) for word in wanted if word in given}
-        here["l"] = pick(lit.l, lanes)
+        here["l"] = pick(incident.l, lanes)
         if "light" in wanted:
             here["light"] = power / max(power.max(), np.finfo(F).tiny)
-        arriving = power[:, None] * pick(lit.strength, lanes)
+        arriving = power[:, None] * pick(incident.irradiance_scale, lanes)
         last = first + len(at)
         for name, value in evaluate(own, here).items():
             np.multiply(value.T, arriving, out=made[name][:, first:last])
-        if len(at) == lit.count:
+        if len(at) == incident.count:
             return {name: columns[:, :count].T for name, columns in made.items()}
         place[at] = np.arange(first, last)
         first = last

@@ -33,11 +33,11 @@ class Numbering(Record):
     of_object: NDArray[np.int32]  # (O,) material number
     of_triangle: NDArray[np.int32] | None = None  # (T,) where it differs within objects
 
-    def number(self, world: SceneGeometry, triangle: Ids) -> Ids:
+    def number(self, geometry: SceneGeometry, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
         if self.of_triangle is not None:
             return self.of_triangle.take(triangle)
-        return self.of_object.take(world.objects.take(triangle))
+        return self.of_object.take(geometry.objects.take(triangle))
 
 
 class Choice(Value):
@@ -67,7 +67,7 @@ class Choice(Value):
         return "colors", *token
 
 
-def numbering(world: SceneGeometry, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
+def numbering(geometry: SceneGeometry, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
     """Numbers the materials of all objects.
 
     Parameters
@@ -79,9 +79,9 @@ def numbering(world: SceneGeometry, choices: Sequence[Choice], named: Collection
     """
     tokens: dict[Token, int] = {}
     of_object = np.zeros(len(choices), np.int32)
-    of_triangle = np.zeros(len(world.triangles), np.int32)
+    of_triangle = np.zeros(len(geometry.triangles), np.int32)
     several = False
-    for i, (placed, choice) in enumerate(zip(world.placed, choices, strict=True)):
+    for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
         mesh = placed.mesh
         names = (None, *mesh.material_names) if choice.own is None else (None,)
         found = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
@@ -92,13 +92,13 @@ def numbering(world: SceneGeometry, choices: Sequence[Choice], named: Collection
         selected = (
             mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
         )
-        mine = world.objects == i
-        polygon = world.polygons[mine] - placed.first_polygon
+        mine = geometry.objects == i
+        polygon = geometry.polygons[mine] - placed.first_polygon
         of_triangle[mine] = np.asarray(found, np.int32).take(selected.take(polygon) + 1)
     if several:
-        for i, (placed, choice) in enumerate(zip(world.placed, choices, strict=True)):
+        for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
             if choice.own is not None or not placed.mesh.material_names:
-                of_triangle[world.objects == i] = of_object[i]
+                of_triangle[geometry.objects == i] = of_object[i]
     return Numbering(tuple(tokens), of_object, of_triangle if several else None)
 
 
@@ -119,9 +119,9 @@ class Materials(Record):
         own = self.substitutes[number] if self.substitutes else None
         return None if own is None else own.get(path, Substitute((1.0, 1.0, 1.0)))
 
-    def number(self, world: SceneGeometry, triangle: Ids) -> Ids:
+    def number(self, geometry: SceneGeometry, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
-        return self.numbering.number(world, triangle)
+        return self.numbering.number(geometry, triangle)
 
 
 def materials(

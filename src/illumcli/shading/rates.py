@@ -49,9 +49,9 @@ class Points(Record):
 
 
 def sample_normals(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     weights: CornerWeights,
-    facet: SurfaceInteraction,
+    interaction: SurfaceInteraction,
     rates: Sequence[str],
     normals: CornerVectors,
 ) -> Vectors:
@@ -59,14 +59,14 @@ def sample_normals(
     `gouraud` the linear one, of `constant` the facet's own."""
     rate = np.array([RATES.index(name) for name in rates], np.int8)
     return _sample_normals(
-        world, weights, facet, rate.take(world.objects.take(weights.hits.triangle)), normals
+        geometry, weights, interaction, rate.take(geometry.objects.take(weights.hits.triangle)), normals
     )
 
 
 def points(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     weights: CornerWeights,
-    facet: SurfaceInteraction,
+    interaction: SurfaceInteraction,
     rates: Sequence[str],
     normals: CornerVectors | None = None,
     centres: PolygonCentres | None = None,
@@ -77,11 +77,13 @@ def points(
     Where every object is shaded at the samples, point i is sample i, whatever the mixture of rates.
     """
     if len(set(rates)) == 1 and rates[0] in _POINTS:
-        return _POINTS[rates[0]](world, weights, facet, normals, centres, polygon_normals)
+        return _POINTS[rates[0]](geometry, weights, interaction, normals, centres, polygon_normals)
     rate = np.array([RATES.index(name) for name in rates], np.int8)
-    of_sample = rate.take(world.objects.take(weights.hits.triangle))
+    of_sample = rate.take(geometry.objects.take(weights.hits.triangle))
     if AT_SAMPLES.issuperset(rates):
-        return _samples(weights, facet, _sample_normals(world, weights, facet, of_sample, normals))
+        return _samples(
+            weights, interaction, _sample_normals(geometry, weights, interaction, of_sample, normals)
+        )
 
     # Split the samples: one group per rate with points of its own, and one for all that are shaded in place.
     groups, parts = [], []
@@ -91,15 +93,15 @@ def points(
         if not group.size:
             continue
         some = weights.take(group)
-        own = SurfaceInteraction(*(take_rows(values, group) for values in vars(facet).values()))
+        own = SurfaceInteraction(*(take_rows(values, group) for values in vars(interaction).values()))
         groups.append(group)
         if name is None:
-            n = _sample_normals(world, some, own, of_sample.take(group), normals)
+            n = _sample_normals(geometry, some, own, of_sample.take(group), normals)
             parts.append(_samples(some, own, n))
         else:
-            parts.append(_POINTS[name](world, some, own, normals, centres, polygon_normals))
+            parts.append(_POINTS[name](geometry, some, own, normals, centres, polygon_normals))
     if not parts:
-        return _samples(weights, facet, facet.ng)
+        return _samples(weights, interaction, interaction.ng)
 
     # Join the groups' points; a value returns to its samples through its own group.
     def spread(values: NDArray[Any]) -> NDArray[Any]:
@@ -121,9 +123,9 @@ def points(
     return Points(**joined, spread=spread, weights=concatenated(own_weights))
 
 
-def _samples(weights: CornerWeights, facet: SurfaceInteraction, n: Vectors) -> Points:
+def _samples(weights: CornerWeights, interaction: SurfaceInteraction, n: Vectors) -> Points:
     hits = weights.hits
-    return Points(hits.triangle, hits.u, hits.v, column_major(facet.position, F), n, as_they_are)
+    return Points(hits.triangle, hits.u, hits.v, column_major(interaction.position, F), n, as_they_are)
 
 
 def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
@@ -132,43 +134,45 @@ def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sample_normals(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     weights: CornerWeights,
-    facet: SurfaceInteraction,
+    interaction: SurfaceInteraction,
     of_sample: NDArray[np.int8],
     normals: CornerVectors | None,
 ) -> Vectors:
     """(M, 3) shading normal of every sample, by the rate of its object; see `sample_normals`."""
     if normals is None:
-        return facet.ng
+        return interaction.ng
     bent = of_sample == RATES.index("quadratic")
     flat = of_sample == RATES.index("constant")
     parts = [(np.flatnonzero(bent), quadratic), (np.flatnonzero(~bent & ~flat), interpolated)]
-    out = facet.ng.copy(order="F")
+    out = interaction.ng.copy(order="F")
     for group, normal in parts:
         if group.size == len(of_sample):
-            return normal(world, normals, weights, facet)
+            return normal(geometry, normals, weights, interaction)
         if group.size:
-            own = SurfaceInteraction(*(take_rows(values, group) for values in vars(facet).values()))
-            out[group] = normal(world, normals, weights.take(group), own)
+            own = SurfaceInteraction(*(take_rows(values, group) for values in vars(interaction).values()))
+            out[group] = normal(geometry, normals, weights.take(group), own)
     return out
 
 
 def _constant(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     weights: CornerWeights,
-    facet: SurfaceInteraction,
+    interaction: SurfaceInteraction,
     normals: Any,
     centres: PolygonCentres,
     polygon_normals: Any,
 ) -> Points:
     """One point per polygon and side seen: its centre, its normal, and the mean of what its corners have."""
-    polygon = world.polygons.take(weights.hits.triangle)
-    key, first, back = np.unique(polygon * 2 + facet.behind, return_index=True, return_inverse=True)
+    polygon = geometry.polygons.take(weights.hits.triangle)
+    key, first, back = np.unique(
+        polygon * 2 + interaction.back_facing, return_index=True, return_inverse=True
+    )
     own = key // 2
     third = np.full(len(key), 1 / 3, F)
-    n = facing(take_rows(polygon_normals, own), facet.behind.take(first))
-    triangle = np.searchsorted(world.polygons, own).astype(np.int32)
+    n = facing(take_rows(polygon_normals, own), interaction.back_facing.take(first))
+    triangle = np.searchsorted(geometry.polygons, own).astype(np.int32)
     first_triangle = TriangleCorners(None, triangle, third, third)
     mean = CornerWeights(first_triangle, (MeanCorners(None, centres, own),))
     return Points(
@@ -183,9 +187,9 @@ def _constant(
 
 
 def _gouraud(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     weights: CornerWeights,
-    facet: SurfaceInteraction,
+    interaction: SurfaceInteraction,
     normals: Any,
     centres: Any,
     polygon_normals: Any,
@@ -196,14 +200,20 @@ def _gouraud(
     steps: dict[Corners, int] = {}  # how far the next corner's point is away
     count = 0
     for group in weights.groups:
-        behind = facet.behind if group.lane is None else facet.behind.take(group.lane)
-        _, first, back = np.unique(group.shape * np.int64(2) + behind, return_index=True, return_inverse=True)
+        back_facing = (
+            interaction.back_facing if group.lane is None else interaction.back_facing.take(group.lane)
+        )
+        _, first, back = np.unique(
+            group.shape * np.int64(2) + back_facing, return_index=True, return_inverse=True
+        )
         numbers[group], steps[group] = back.ravel() + count, len(first)
         for k in range(group.count):
-            corner, vertex = (take_rows(number(world, k), first) for number in (group.corner, group.vertex))
-            n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(behind, first))
+            corner, vertex = (
+                take_rows(number(geometry, k), first) for number in (group.corner, group.vertex)
+            )
+            n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(back_facing, first))
             at = (take_rows(part, first) for part in group.place(k))
-            found.append((*at, take_rows(world.vertices, vertex), n))
+            found.append((*at, take_rows(geometry.vertices, vertex), n))
             count += len(first)
 
     def spread(values: NDArray[Any]) -> NDArray[Any]:

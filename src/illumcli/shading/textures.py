@@ -151,7 +151,7 @@ def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexV
 
 
 def varying(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     materials: Materials,
     object_names: Sequence[str],
     purpose: str,
@@ -169,19 +169,19 @@ def varying(
     InputError
         Images that cannot be read, attributes or uv that a mesh does not have; all at once.
     """
-    used_by = _objects_of(world, materials)
+    used_by = _objects_of(geometry, materials)
     problems: list[str] = []
     repairs: dict[str, Repair] = {}
 
     def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute:
         within = parameter_range(materials.models[number], path)
         where = f"material {materials.names[number]}: {path}"
-        found = [_lacks(world, value, i, object_names[i], where, within.width) for i in used_by[number]]
+        found = [_lacks(geometry, value, i, object_names[i], where, within.width) for i in used_by[number]]
         if any(found):
             raise InputError(filter(None, found))
         factor = None if value.factor == (1.0, 1.0, 1.0) else np.array(value.factor, F)[: within.width]
         table, uv = (
-            None if name is None else _table(world, name, used_by[number], width)
+            None if name is None else _table(geometry, name, used_by[number], width)
             for name, width in ((value.vertex, within.width), (getattr(value, "uv", None), 2))
         )
         if table is not None:
@@ -222,21 +222,21 @@ def _uniform(value: Sequence[float], within: Range) -> Map:
     return Map(texel.reshape(1, 1, -1), "nearest", "repeat", within)
 
 
-def _objects_of(world: SceneGeometry, materials: Materials) -> list[list[int]]:
+def _objects_of(geometry: SceneGeometry, materials: Materials) -> list[list[int]]:
     """By material number, the objects that have it."""
-    material = materials.number(world, np.arange(len(world.triangles), dtype=np.int32))
-    pairs = np.unique(material.astype(np.int64) * len(world.placed) + world.objects)
+    material = materials.number(geometry, np.arange(len(geometry.triangles), dtype=np.int32))
+    pairs = np.unique(material.astype(np.int64) * len(geometry.placed) + geometry.objects)
     found: list[list[int]] = [[] for _ in materials.models]
-    for number, thing in zip(*divmod(pairs, max(len(world.placed), 1)), strict=True):
+    for number, thing in zip(*divmod(pairs, max(len(geometry.placed), 1)), strict=True):
         found[number].append(int(thing))
     return found
 
 
 def _lacks(
-    world: SceneGeometry, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
+    geometry: SceneGeometry, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
 ) -> str | None:
     """What object number `thing` lacks for a parameter to vary by `value`."""
-    mesh = world.placed[thing].mesh
+    mesh = geometry.placed[thing].mesh
     if isinstance(value, Texture) and value.uv is None and (mesh.uvs is None or mesh.corner_uvs is None):
         return (
             f"object {name}: {where} is a texture and the mesh has no uv; export it with uv, or give a value"
@@ -260,11 +260,11 @@ def _lacks(
     return None
 
 
-def _table(world: SceneGeometry, attribute: str, things: Sequence[int], width: int) -> Floats:
+def _table(geometry: SceneGeometry, attribute: str, things: Sequence[int], width: int) -> Floats:
     """(V, C) an attribute at the World's vertices, 0 where another object is."""
-    out = np.zeros((len(world.vertices), width), F)
+    out = np.zeros((len(geometry.vertices), width), F)
     for thing in things:
-        placed = world.placed[thing]
+        placed = geometry.placed[thing]
         values = placed.mesh.attributes[attribute].reshape(len(placed.mesh.vertices), -1)
         out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :width]
     return out
@@ -318,7 +318,7 @@ class Parameters(Record):
 
 
 def parameters(
-    world: SceneGeometry,
+    geometry: SceneGeometry,
     varying: Varying,
     material: Ids,
     weights: CornerWeights,
@@ -344,16 +344,16 @@ def parameters(
         uv = None
         for path, each in mine.items():
             if isinstance(each, Attribute):
-                found = at.interpolate_vertices(world, each.values)
+                found = at.interpolate_vertices(geometry, each.values)
             else:
                 if each.uv is not None:
-                    place = at.interpolate_vertices(world, each.uv)
+                    place = at.interpolate_vertices(geometry, each.uv)
                 else:
                     assert uvs is not None
-                    place = uv = surface.uv(world, uvs, at) if uv is None else uv
+                    place = uv = surface.uv(geometry, uvs, at) if uv is None else uv
                 found = FILTERS[each.filter](each.image, place, each.wrap)
                 if each.vertex is not None:
-                    found = found * at.interpolate_vertices(world, each.vertex)
+                    found = found * at.interpolate_vertices(geometry, each.vertex)
             if each.factor is not None:
                 found = found * each.factor
             key = path, each.within.width

@@ -13,7 +13,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import SceneGeometry, place_meshes
 from illumcli.geometry.transforms import rotation
 from illumcli.rays.embree import Tracer
-from illumcli.rays.interaction import SurfaceInteraction, facets
+from illumcli.rays.interaction import SurfaceInteraction, interact
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.stress.outcome import Row, Sandbox
 from illumcli.stress.scenes import scene
@@ -99,20 +99,22 @@ def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
 
 
 def surface_points(
-    world: SceneGeometry, count: int, seed: int
+    geometry: SceneGeometry, count: int, seed: int
 ) -> tuple[NDArray[np.float64], SurfaceInteraction]:
     """Points of object 0, one in four on an edge or vertex, and their facets seen from outside."""
     random = np.random.default_rng(seed)
-    mine = np.flatnonzero(world.objects == 0).astype(np.int32)
+    mine = np.flatnonzero(geometry.objects == 0).astype(np.int32)
     triangle = mine[random.integers(len(mine), size=count)]
     u, v = random.random((2, count)).astype(F)
     over = u + v > 1
     u[over], v[over] = 1 - u[over], 1 - v[over]
     u[: count // 4] = 0
     v[: count // 8] = random.integers(0, 2, count // 8)
-    corners = [take_rows(world.vertices, world.triangles[triangle, k]).astype(np.float64) for k in range(3)]
+    corners = [
+        take_rows(geometry.vertices, geometry.triangles[triangle, k]).astype(np.float64) for k in range(3)
+    ]
     outward = unit(column_major(cross(corners[1] - corners[0], corners[2] - corners[0])))
-    found = facets(world, triangle, u, v, outward)
+    found = interact(geometry, triangle, u, v, outward)
     return found.position, found
 
 
@@ -127,17 +129,17 @@ def grazing(n: NDArray[Any], seed: int) -> NDArray[np.float32]:
 
 def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
     """A convex body never hides anything from its own surface."""
-    world = world_of(mesh, away)
-    tracer = Tracer(world.vertices, world.triangles)
+    geometry = world_of(mesh, away)
+    tracer = Tracer(geometry.vertices, geometry.triangles)
     limit = 0.5 if away else np.inf  # the speck is no part of the body
     hits, done = np.zeros(2, np.int64), np.zeros(2, np.int64)
     for seed, first in enumerate(range(0, count, 1 << 18)):
         part = min(1 << 18, count - first)
-        position, facet = surface_points(world, part, seed)
-        way = grazing(facet.ng.astype(np.float64), seed)
+        position, interaction = surface_points(geometry, part, seed)
+        way = grazing(interaction.ng.astype(np.float64), seed)
         # rounding brings a ray of 1e-6 rad below the horizon now and then; such a one asks about the inside
-        up = dot(way.astype(np.float64), facet.ng.astype(np.float64)) > 1e-7
-        origins = offset_ray_origins(position, facet.ng, facet.edge)
+        up = dot(way.astype(np.float64), interaction.ng.astype(np.float64)) > 1e-7
+        origins = offset_ray_origins(position, interaction.ng, interaction.edge)
         hidden = tracer.occluded(column_major(origins[up]), column_major(way[up]), limit)
         rim = np.flatnonzero(up) < part // 4
         for k, where in enumerate((~rim, rim)):
@@ -170,12 +172,12 @@ def _gaps(count: int) -> Row:
     for gap in GAPS:
         floor = Mesh.of_triangles(square + np.array([0.2, 0.7, 0.1]), quads)
         plate = Mesh.of_triangles(square * 0.5 + [0.2, 0.7 + gap * 2**0.5, 0.1], quads)
-        world = world_of(Mesh.of_triangles(
+        geometry = world_of(Mesh.of_triangles(
             np.concatenate([floor.vertices, plate.vertices]), [*quads, *(np.array(quads) + 4)]
         ))  # fmt: skip
-        tracer = Tracer(world.vertices, world.triangles)
+        tracer = Tracer(geometry.vertices, geometry.triangles)
         weight = random.uniform(0.3, 0.7, (count, 2))  # of the floor's square, under the plate
-        corner = [world.vertices[k].astype(np.float64) for k in range(4)]
+        corner = [geometry.vertices[k].astype(np.float64) for k in range(4)]
         position = column_major(
             corner[0] + weight[:, :1] * (corner[1] - corner[0]) + weight[:, 1:] * (corner[3] - corner[0])
         )
@@ -195,8 +197,8 @@ def _gaps(count: int) -> Row:
 
 def _leaks(divisions: int, count: int) -> list[Row]:
     """No ray leaves a closed mesh: through faces, edges or vertices."""
-    world = world_of(icosphere(divisions))
-    tracer = Tracer(world.vertices, world.triangles)
+    geometry = world_of(icosphere(divisions))
+    tracer = Tracer(geometry.vertices, geometry.triangles)
     random = np.random.default_rng(9)
     found = []
     for aim in ("faces", "edges", "vertices"):
@@ -204,15 +206,17 @@ def _leaks(divisions: int, count: int) -> list[Row]:
         for first in range(0, count, 1 << 18):
             part = min(1 << 18, count - first)
             inside = column_major(random.uniform(-0.3, 0.3, (part, 3)), F)
-            triangle = random.integers(len(world.triangles), size=part)
-            a, b, c = (world.vertices[world.triangles[triangle, k]].astype(np.float64) for k in range(3))
+            triangle = random.integers(len(geometry.triangles), size=part)
+            a, b, c = (
+                geometry.vertices[geometry.triangles[triangle, k]].astype(np.float64) for k in range(3)
+            )
             u, v = random.random((2, part, 1)) / 2
             target = {"faces": a + u * (b - a) + v * (c - a), "edges": a + u * 2 * (b - a), "vertices": a}[
                 aim
             ]
             closest = tracer.closest(inside, column_major(unit(column_major(target - inside)), F))
             missed, done = missed + int(np.count_nonzero(closest.triangle < 0)), done + part
-        check = f"from inside a closed ball of {len(world.triangles):,} faces"
+        check = f"from inside a closed ball of {len(geometry.triangles):,} faces"
         found.append(Row(f"leaks at {aim}", check, f"{missed} of {done:,} rays", not missed))
     return found
 

@@ -60,18 +60,18 @@ def obscured(inputs: Inputs) -> Estimate:
 
 def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
-    world = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
+    geometry = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     ng = column_major(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
-    here = np.tile(world.frame.from_world(np.zeros(3)), (PATTERNS, 1))
+    here = np.tile(geometry.render_space.from_world(np.zeros(3)), (PATTERNS, 1))
     corners = around.vertices[around.triangles[0]]
-    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / world.frame.radius
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / geometry.render_space.radius
     origins = offset_ray_origins(here, ng, np.full(PATTERNS, edge))
     number = np.arange(PATTERNS, dtype=np.uint32)
     draws = np.stack(
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
     )
-    core = tracer(world.vertices, world.triangles)
-    method = Method(RAYS, falloff, world.frame.radius)
+    core = tracer(geometry.vertices, geometry.triangles)
+    method = Method(RAYS, falloff, geometry.render_space.radius)
     w = estimates(core, Hemispheres(ng, origins), draws, method, errors=False).w.astype(np.float64)
     spread = float(w.std(ddof=1)) / np.sqrt(PATTERNS)
     return Estimate(float(w.mean()), float(np.hypot(spread, RESOLUTION)))

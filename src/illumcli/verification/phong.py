@@ -52,9 +52,9 @@ def phong_rgb_positional(inputs: Inputs) -> NDArray[np.floating]:
     for light in inputs.parts("lights"):
         x, y, z = (float(c) for c in light.vectors("position")[0])
         lamp = Point(light="point", position=(x, y, z), attenuation=polynomial(inputs))
-        arriving = lamp.arriving(point, HERE)
+        arriving = lamp.sample_at(point, HERE)
         lit = response(model, n=n, l=arriving.l, v=v)
-        total += lit * arriving.strength * np.asarray(light.color("intensity"), total.dtype)
+        total += lit * arriving.irradiance_scale * np.asarray(light.color("intensity"), total.dtype)
     return total[0]
 
 

@@ -36,11 +36,11 @@ def attenuation(inputs: Inputs) -> Floats:
 def photometry_law(inputs: Inputs) -> Floats:
     """E = I <n.l> / d^2."""
     x, y, z = inputs.vectors("light_position")[0]
-    arriving = Point(light="point", position=(float(x), float(y), float(z))).arriving(
+    arriving = Point(light="point", position=(float(x), float(y), float(z))).sample_at(
         inputs.vectors("point"), HERE
     )
     cosine = np.maximum(dot(inputs.unit("n"), arriving.l), 0)
-    return inputs.lanes("intensity") * arriving.strength * cosine
+    return inputs.lanes("intensity") * arriving.irradiance_scale * cosine
 
 
 def lambert_brdf(inputs: Inputs) -> Floats:

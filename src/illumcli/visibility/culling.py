@@ -74,7 +74,9 @@ class SecondaryRays(NamedTuple):
     obscurance_reach: float  # of obscurance rays [radii]; 0 where none are cast
 
 
-def frustum(camera: Any, frame: RenderSpace, width: int, height: int, film_filter: Any | None) -> Planes:
+def frustum(
+    camera: Any, render_space: RenderSpace, width: int, height: int, film_filter: Any | None
+) -> Planes:
     """Five planes around all rays of a view: four sides, and the eye's own; in radii.
 
     Parameters
@@ -84,7 +86,7 @@ def frustum(camera: Any, frame: RenderSpace, width: int, height: int, film_filte
     """
     # Half of the image plane, as wide as samples reach under the filter.
     right, up, forward = axes(camera)
-    eye = frame.from_world(camera.position)
+    eye = render_space.from_world(camera.position)
     ends = np.array([0.0, 0.5, 1 - 2.0**-32])
     u, v = (each.ravel() for each in np.meshgrid(ends, np.arange(65) / 64))
     spread = max(float(np.abs(part).max()) for part in offsets(u, v, film_filter))
@@ -97,7 +99,7 @@ def frustum(camera: Any, frame: RenderSpace, width: int, height: int, film_filte
                       *(side * up - y * forward for side in (1, -1)), -forward])  # fmt: skip
         n /= np.linalg.norm(n, axis=1, keepdims=True)
         return Planes(n, n @ eye)
-    half = camera.extent / 2 / frame.radius
+    half = camera.extent / 2 / render_space.radius
     n = np.stack([right, -right, up, -up, -forward])
     return Planes(n, n @ eye + half * np.array([x, x, y, y, 0]))
 
@@ -125,13 +127,13 @@ def clip_boxes(planes: Planes, boxes: Boxes) -> Positions:
     return corners[inside]
 
 
-def shadow_hull(points: Positions, light: Light, frame: RenderSpace) -> Positions:
+def shadow_hull(points: Positions, light: Light, render_space: RenderSpace) -> Positions:
     """The points and the ends of their shadow rays, whose hull holds all shadow rays from the points' hull.
 
     A light is a point or infinitely far away. Long rays are cut beyond the scene, all at the same
     share of their length.
     """
-    arriving = light.arriving(column_major(points), frame)
+    arriving = light.sample_at(column_major(points), render_space)
     nearest = float(arriving.distance.min())
     if np.isinf(nearest):
         ends = points + SHADOW_REACH * arriving.l
@@ -195,7 +197,7 @@ def culled_objects(
     widths: NDArray[np.float64],
     views: Sequence[Planes],
     rays: SecondaryRays,
-    frame: RenderSpace,
+    render_space: RenderSpace,
 ) -> NDArray[np.bool_]:
     """(O,) True for objects that cannot change any image.
 
@@ -230,7 +232,7 @@ def culled_objects(
     # Keep those that its obscurance rays, its search for nearby objects, or its shadow rays can reach.
     nearby = NEARBY * widths[real & ~outside.all(axis=0)].max(initial=0)
     hulls = [(visible, BOX_MARGIN + max(rays.obscurance_reach, nearby))]
-    hulls += [(shadow_hull(visible, light, frame), BOX_MARGIN) for light in rays.lights]
+    hulls += [(shadow_hull(visible, light, render_space), BOX_MARGIN) for light in rays.lights]
     for points, gap in hulls:
         candidates = np.flatnonzero(out)
         out[candidates] = separated(points, boxes.take(candidates), gap)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, column_major, dot, take_rows
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
-from illumcli.rays.interaction import facets, facing
+from illumcli.rays.interaction import facing, interact
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Record
 
@@ -234,10 +234,10 @@ class OpenTriangles:
     groups spread over the scene is open, as on a scanned mesh, no other group is tested.
     """
 
-    def __init__(self, world: SceneGeometry) -> None:
-        self._world = world
-        self._tree = ClusterTree(world.vertices, world.triangles)
-        self._groups = -(-len(world.triangles) // GROUP)  # of each side
+    def __init__(self, geometry: SceneGeometry) -> None:
+        self._geometry = geometry
+        self._tree = ClusterTree(geometry.vertices, geometry.triangles)
+        self._groups = -(-len(geometry.triangles) // GROUP)  # of each side
         self._tested = np.zeros(2 * self._groups, bool)
         self._open = np.zeros(2 * self._groups * GROUP, bool)
         trial = np.arange(0, 2 * self._groups, max(1, self._groups // TRIAL_GROUPS))
@@ -265,26 +265,26 @@ class OpenTriangles:
     def _planes(self, groups: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Origins and unit normals of the planes of these groups, (64 K, 3) each."""
         side, triangle = np.divmod(_members(groups), self._groups * GROUP)
-        triangle = np.minimum(triangle, len(self._world.triangles) - 1).astype(np.int32)
-        return triangle_planes(self._world, triangle, side > 0)
+        triangle = np.minimum(triangle, len(self._geometry.triangles) - 1).astype(np.int32)
+        return triangle_planes(self._geometry, triangle, side > 0)
 
 
 def triangle_planes(
-    world: SceneGeometry, triangle: Ids, back_facing: NDArray[np.bool_]
+    geometry: SceneGeometry, triangle: Ids, back_facing: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Origins and unit normals of the planes of N triangles on the side that is seen, (N, 3) float64 each.
 
     A plane is offset from its triangle no farther than any ray origin on that triangle.
     """
     zero = np.zeros(len(triangle), F)
-    facet = facets(world, triangle, zero, zero, np.zeros((len(triangle), 3), F))
-    n = facing(facet.ng, back_facing).astype(np.float64)
-    v0 = facet.position
-    others = (take_rows(world.vertices, world.triangles[:, k].take(triangle)) for k in (1, 2))
+    interaction = interact(geometry, triangle, zero, zero, np.zeros((len(triangle), 3), F))
+    n = facing(interaction.ng, back_facing).astype(np.float64)
+    v0 = interaction.position
+    others = (take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
     # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre: no ray starts
     # lower than this
-    step = lowest + SHARE * (np.abs(dot(n, v0)) + facet.edge)
+    step = lowest + SHARE * (np.abs(dot(n, v0)) + interaction.edge)
     o = v0 + step[:, None] * n
     return np.ascontiguousarray(o), np.ascontiguousarray(n)
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, length, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
+from illumcli.lights.incident import LitPoints
 from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import SurfaceInteraction, facing
 from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.records import Record
-from illumcli.visibility.incident import LitPoints
 
 TERMINATOR_SHARE = 1 / 3
 """Of the diagonal of a polygon's bounding box: how far off it a shadow ray may start at most; normals may say
@@ -34,33 +34,33 @@ NEARBY = 2.0
 class SmoothSurface(Record):
     """The samples of a tile on the smooth surfaces that their normals imply."""
 
-    world: SceneGeometry
+    geometry: SceneGeometry
     normals: CornerVectors
     parts: SmoothParts
     weights: CornerWeights
-    facets: SurfaceInteraction
+    interaction: SurfaceInteraction
     flat: NDArray[np.bool_]  # (O,) objects whose shadow rays start on their polygons
 
 
-def ray_origins(facets: SurfaceInteraction) -> Vectors:
+def ray_origins(interaction: SurfaceInteraction) -> Vectors:
     """(M, 3) float32 where shadow and obscurance rays start: on the facet, off it by rounding alone."""
-    return offset_ray_origins(facets.position, facets.ng, facets.edge)
+    return offset_ray_origins(interaction.position, interaction.ng, interaction.edge)
 
 
 def shadow(
-    tracer: Tracer, origins: Vectors, lit: LitPoints, smooth: SmoothSurface | None = None
+    tracer: Tracer, origins: Vectors, incident: LitPoints, smooth: SmoothSurface | None = None
 ) -> NDArray[np.float32]:
     """(M,) delta: 1 where the light arrives, 0 in shadow and on samples that the light does not reach.
 
     With `smooth` a false terminator is taken away; the samples are then those of its tile.
     """
-    delta = np.zeros(lit.count, F)
-    hidden = tracer.occluded(column_major(take_rows(origins, lit.lane)), lit.l, lit.distance)
+    delta = np.zeros(incident.count, F)
+    hidden = tracer.occluded(column_major(take_rows(origins, incident.index)), incident.l, incident.distance)
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
-        sample = lit.lane.take(blocked)
-        l, distance = column_major(take_rows(lit.l, blocked)), lit.distance.take(blocked)
+        sample = incident.index.take(blocked)
+        l, distance = column_major(take_rows(incident.l, blocked)), incident.distance.take(blocked)
         hidden[blocked] = ~_implied_reached(tracer, smooth, origins, sample, l, distance)
-    delta[lit.lane] = ~hidden
+    delta[incident.index] = ~hidden
     return delta
 
 
@@ -69,17 +69,19 @@ def _implied_reached(
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
     # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
-    facets = smooth.facets
+    interaction = smooth.interaction
     weights = smooth.weights.take(sample)
-    position = take_rows(facets.position, sample)
-    width = _box_diagonals(smooth.world, weights)
-    offset = _terminator_offset(smooth, weights, column_major(position, F), facets.behind.take(sample))
+    position = take_rows(interaction.position, sample)
+    width = _box_diagonals(smooth.geometry, weights)
+    offset = _terminator_offset(
+        smooth, weights, column_major(position, F), interaction.back_facing.take(sample)
+    )
     offset = bounded(offset, TERMINATOR_SHARE * width)
-    flat = smooth.flat.take(smooth.world.objects.take(weights.hits.triangle))
+    flat = smooth.flat.take(smooth.geometry.objects.take(weights.hits.triangle))
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
-    ng, edge = take_rows(facets.ng, sample.take(curved)), facets.edge.take(sample.take(curved))
+    ng, edge = take_rows(interaction.ng, sample.take(curved)), interaction.edge.take(sample.take(curved))
     starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
     curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
     height = length(_at(offset, curved))
@@ -87,7 +89,10 @@ def _implied_reached(
     curved = curved[~tracer.occluded(own, column_major(_at(offset, curved) / height[:, None]), height)]
 
     # What stands nearby in the light's direction shadows the sample, unless it is the surface itself.
-    own, ng = column_major(take_rows(origins, sample.take(curved))), take_rows(facets.ng, sample.take(curved))
+    own, ng = (
+        column_major(take_rows(origins, sample.take(curved))),
+        take_rows(interaction.ng, sample.take(curved)),
+    )
     hit = tracer.closest(own, _above(_at(l, curved), ng))
     near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
     same = smooth.parts.joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
@@ -97,28 +102,28 @@ def _implied_reached(
 
 
 def _terminator_offset(
-    smooth: SmoothSurface, weights: CornerWeights, position: Vectors, behind: NDArray[np.bool_]
+    smooth: SmoothSurface, weights: CornerWeights, position: Vectors, back_facing: NDArray[np.bool_]
 ) -> Vectors:
     """(B, 3) the way from samples on polygons to the surface that the normals at their corners imply."""
-    world, normals = smooth.world, smooth.normals
+    geometry, normals = smooth.geometry, smooth.normals
 
     def way(group: Corners, k: int) -> Vectors:
-        normal = take_rows(normals.values, normals.index.take(group.corner(world, k)))
-        corner = take_rows(world.vertices, group.vertex(world, k))
+        normal = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
+        corner = take_rows(geometry.vertices, group.vertex(geometry, k))
         if group.lane is None:
-            return to_tangent_plane(position, corner, facing(normal, behind))
+            return to_tangent_plane(position, corner, facing(normal, back_facing))
         return to_tangent_plane(
-            take_rows(position, group.lane), corner, facing(normal, behind.take(group.lane))
+            take_rows(position, group.lane), corner, facing(normal, back_facing.take(group.lane))
         )
 
     return weights.joined(way)
 
 
-def _box_diagonals(world: SceneGeometry, weights: CornerWeights) -> Floats:
+def _box_diagonals(geometry: SceneGeometry, weights: CornerWeights) -> Floats:
     """(B,) the diagonal of the bounding box of the polygon under each sample, in radii."""
     out = np.empty(len(weights), F)
     for group in weights.groups:
-        corners = [take_rows(world.vertices, group.vertex(world, k)) for k in range(group.count)]
+        corners = [take_rows(geometry.vertices, group.vertex(geometry, k)) for k in range(group.count)]
         size = length(np.maximum.reduce(corners) - np.minimum.reduce(corners))
         out[slice(None) if group.lane is None else group.lane] = size
     return out

@@ -1,0 +1,69 @@
+"""Incident light at shading points, occlusion left out: which points a light can reach, and what arrives."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, take_or_all
+from illumcli.lights._base import Light, LightSample
+from illumcli.records import Record
+from illumcli.render_space import RenderSpace
+
+
+class LitPoints(Record):
+    """The points that a light reaches if nothing stands between, and what arrives there."""
+
+    index: Ids  # (K,) which of the points, ascending: those with n.l > 0 and some light
+    count: int  # of all points
+    l: Vectors  # (K, 3) unit, to the light
+    distance: Floats  # (K,) to the light, in radii
+    irradiance_scale: Floats  # (K,) irradiance facing the light, per unit of the light's colour
+
+
+class Placed(Protocol):
+    """Anything with positions: shading points, surface interactions."""
+
+    @property
+    def position(self) -> Vectors:
+        """(N, 3) in radii."""
+
+
+class Oriented(Placed, Protocol):
+    """Anything with positions and shading normals."""
+
+    @property
+    def n(self) -> Vectors:
+        """(N, 3) unit."""
+
+
+def incident(light: Light, render_space: RenderSpace, points: Oriented) -> LitPoints:
+    """The points in the light's range that face it; neither shadow rays nor models see the others."""
+    sample = light.sample_at(points.position, render_space)
+    reached = (sample.irradiance_scale > 0) & (dot(points.n, sample.l) > 0)
+    return _lit(sample, np.flatnonzero(reached))
+
+
+def shadow_candidates(light: Light, render_space: RenderSpace, interaction: Placed) -> LitPoints:
+    """The samples in the light's range, whichever way they face: a vertex that a sample interpolates may
+    face the light where the sample itself does not."""
+    sample = light.sample_at(column_major(interaction.position, F), render_space)
+    return _lit(sample, np.flatnonzero(sample.irradiance_scale > 0))
+
+
+def unshadowed(light: Light, render_space: RenderSpace, points: Oriented, shadow: Floats) -> LitPoints:
+    """The points that the light reaches and that are not in shadow, where points are samples.
+
+    `shadow` alone decides: it is 0 where the light does not reach.
+    """
+    index = np.flatnonzero(shadow != 0)
+    sample = light.sample_at(take_or_all(points.position, index), render_space)
+    parts = sample.l, sample.distance, sample.irradiance_scale
+    return LitPoints(index.astype(np.int32), len(points.position), *parts)
+
+
+def _lit(sample: LightSample, index: NDArray[np.intp]) -> LitPoints:
+    parts = (take_or_all(part, index) for part in (sample.l, sample.distance, sample.irradiance_scale))
+    return LitPoints(index.astype(np.int32), len(sample.l), *parts)

@@ -7,15 +7,14 @@ import json
 import numpy as np
 import pytest
 
-from illumcli import stress
 from illumcli.errors import ThresholdError
 from illumcli.models.lambert import Lambert
-from illumcli.stress import models, outcome, rays, scenes
+from illumcli.stress import models, rays, sandbox, scenes, suite
 
 
 @pytest.fixture(scope="module")
 def quick():
-    return stress.run(quick=True)
+    return suite.run_suite(quick=True)
 
 
 def test_every_case_passes(quick):
@@ -26,7 +25,7 @@ def test_every_case_passes(quick):
 
 @pytest.mark.slow
 def test_the_whole_suite_passes():
-    result = stress.run()
+    result = suite.run_suite()
     assert result.failed == [], [row for row in result.rows if not row.passed]
     assert result.values > 1e8
 
@@ -45,25 +44,25 @@ def test_every_scene_of_the_list_is_there(quick):
 
 
 def test_the_table_has_a_line_per_case_and_totals(quick):
-    lines = stress.as_table(quick).splitlines()
+    lines = suite.suite_table(quick).splitlines()
     assert len(lines) == len(quick.rows) + 3
     assert lines[-1].startswith(f"{len(quick.rows)} of {len(quick.rows)} cases passed")
-    assert json.loads(json.dumps(stress.as_data(quick)))["failed"] == []
+    assert json.loads(json.dumps(quick.as_data()))["failed"] == []
 
 
 def test_a_failed_case_is_a_threshold_exceeded(quick):
-    bad = outcome.Row("a case", "what", "1 pixel", False)
-    result = stress.Result((bad,), 1, 1, 1, 0, 0, 0.0)
-    assert "FAILED" in stress.as_table(result)
+    bad = sandbox.CheckResult("a case", "what", "1 pixel", False)
+    result = suite.SuiteResult((bad,), 1, 1, 1, 0, 0, 0.0)
+    assert "FAILED" in suite.suite_table(result)
     with pytest.raises(ThresholdError, match="a case"):
-        stress.check(result)
+        suite.refuse_failures(result)
 
 
 def test_faults_name_what_no_picture_may_have():
     good = {"R": np.ones((2, 2)), "N.X": -np.ones((2, 2)), "obscurance.Y": np.ones((2, 2))}
-    assert outcome.faults(good) == []
+    assert sandbox.faults(good) == []
     bad = {"R": np.array([[np.nan, -1]]), "obscurance.Y": np.array([[1.5]]), "N.X": np.array([[np.inf]])}
-    assert outcome.faults(bad) == [
+    assert sandbox.faults(bad) == [
         "R not finite in 1 pixels",
         "R below 0 in 1 pixels",
         "obscurance.Y above 1 in 1 pixels",
@@ -72,10 +71,10 @@ def test_faults_name_what_no_picture_may_have():
 
 
 def test_a_scene_that_fails_is_a_row_and_not_the_end(tmp_path, monkeypatch):
-    room = outcome.Sandbox(tmp_path)
-    monkeypatch.setattr(scenes, "MUST_RENDER", {"broken": lambda room: {"film": {"width": -1}}})
-    monkeypatch.setattr(scenes, "MUST_REFUSE", {"fine": lambda room: {"film": {"width": 4, "height": 4}}})
-    broken, fine = scenes.rows(room, quick=True)
+    folder = sandbox.Sandbox(tmp_path)
+    monkeypatch.setattr(scenes, "MUST_RENDER", {"broken": lambda sandbox: {"film": {"width": -1}}})
+    monkeypatch.setattr(scenes, "MUST_REFUSE", {"fine": lambda sandbox: {"film": {"width": 4, "height": 4}}})
+    broken, fine = scenes.check_scenes(folder, quick=True)
     assert not broken.passed
     assert "film.width" in broken.worst
     assert (fine.passed, fine.worst) == (False, "rendered")
@@ -86,7 +85,7 @@ def test_a_model_that_goes_wrong_is_seen(monkeypatch):
         return -np.ones((len(n_l), 3), n_l.dtype)
 
     monkeypatch.setattr(Lambert, "diffuse_lobe", wrong)
-    (row,) = [row for row in models.rows(quick=True) if row.case == "model: lambert"]
+    (row,) = [row for row in models.check_models(quick=True) if row.case == "model: lambert"]
     assert not row.passed
 
 

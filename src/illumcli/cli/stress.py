@@ -21,9 +21,9 @@ def stress(quick: bool, as_json: bool, quiet: bool) -> None:
     """
     import json
 
-    from illumcli import stress as job
     from illumcli.cli._progress import reporter
+    from illumcli.stress.suite import refuse_failures, run_suite, suite_table
 
-    result = job.run(quick, reporter(quiet))
-    click.echo(json.dumps(job.as_data(result), indent=2) if as_json else job.as_table(result))
-    job.check(result)
+    result = run_suite(quick, reporter(quiet))
+    click.echo(json.dumps(result.as_data(), indent=2) if as_json else suite_table(result))
+    refuse_failures(result)

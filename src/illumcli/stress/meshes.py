@@ -1,24 +1,24 @@
-"""One surface written in several ways, one picture made in several ways: the same w, the same bytes."""
+"""One surface written in several ways has the same w; one image rendered on any threads the same bytes."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.stress.outcome import Row, Sandbox
 from illumcli.stress.rays import icosphere
+from illumcli.stress.sandbox import CheckResult, Sandbox
 from illumcli.stress.scenes import BALL, FLOOR, scene
 
 Faces = NDArray[np.int64]
 RAYS = 32
-"""Per pixel. Where a face runs the other way round the ray core rounds a hit differently, by 1e-8
-radii, and now and then a ray passes an edge on the other side."""
+"""Per pixel. Embree rounds a hit on a reversed face differently, by 1e-8 radii, and now and then a ray passes
+an edge on the other side."""
 
 
-def rows(room: Sandbox, quick: bool) -> list[Row]:
-    """Meshes written differently, and threads."""
+def check_meshes(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
+    """Meshes written in several ways, and threads."""
     film = {"width": 40, "height": 30, "samples": 1} if quick else {"width": 320, "height": 240, "samples": 1}
-    return [*_written(room, film), _threads(room, film, quick)]
+    return [*_written(sandbox, film), _threads(sandbox, film, quick)]
 
 
 def variants(vertices: NDArray[np.float64], faces: Faces) -> dict[str, tuple[NDArray[np.float64], Faces]]:
@@ -40,7 +40,7 @@ def variants(vertices: NDArray[np.float64], faces: Faces) -> dict[str, tuple[NDA
     }
 
 
-def _written(room: Sandbox, film: dict[str, int]) -> list[Row]:
+def _written(sandbox: Sandbox, film: dict[str, int]) -> list[CheckResult]:
     ball = icosphere(3)
     vertices, faces = (
         ball.vertices * [1, 0.7, 0.4] + [0.1, 0.2, 0.3],
@@ -48,10 +48,10 @@ def _written(room: Sandbox, film: dict[str, int]) -> list[Row]:
     )
     inner = vertices[:, [1, 2, 0]] * 0.6 + [0.9, 0.1, 0.2]  # a second body close by, so that w varies
     vertices, faces = np.concatenate([vertices, inner]), np.concatenate([faces, faces + len(vertices)])
-    reference = _w(room, vertices, faces, film)
-    found = []
+    reference = _w(sandbox, vertices, faces, film)
+    results = []
     for name, (v, f) in variants(vertices, faces).items():
-        other = _w(room, v, f, film)
+        other = _w(sandbox, v, f, film)
         different = int(np.count_nonzero(other != reference))
         apart = float(np.abs(other - reference).max())
         worst = f"{different} of {reference.size} pixels, by {apart:.2g}"
@@ -60,24 +60,24 @@ def _written(room: Sandbox, film: dict[str, int]) -> list[Row]:
             passed = different <= 1e-3 * reference.size and apart <= 2.01 / RAYS
         else:
             check, passed = "w is the same bits", different == 0
-        found.append(Row(f"mesh: {name}", check, worst, passed))
-    return found
+        results.append(CheckResult(f"mesh: {name}", check, worst, passed))
+    return results
 
 
 def _w(
-    room: Sandbox, vertices: NDArray[np.float64], faces: Faces, film: dict[str, int]
+    sandbox: Sandbox, vertices: NDArray[np.float64], faces: Faces, film: dict[str, int]
 ) -> NDArray[np.float32]:
     text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
     text += "".join(f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist())
-    thing = {"mesh": room.file(f"mesh{room.pictures}.obj", text.encode())}
-    said = scene(thing, lights=[], film=film, obscurance={"samples": RAYS}, shading="constant")
-    return room.picture(said, ("obscurance",))[0]["obscurance.Y"]
+    thing = {"mesh": sandbox.file(f"mesh{sandbox.pictures}.obj", text.encode())}
+    description = scene(thing, lights=[], film=film, obscurance={"samples": RAYS}, shading="constant")
+    return sandbox.render(description, ("obscurance",))[0]["obscurance.Y"]
 
 
-def _threads(room: Sandbox, film: dict[str, int], quick: bool) -> Row:
-    said = {**scene(BALL, FLOOR), "film": film}
-    reference = room.picture(said)[1]
+def _threads(sandbox: Sandbox, film: dict[str, int], quick: bool) -> CheckResult:
+    description = {**scene(BALL, FLOOR), "film": film}
+    reference = sandbox.render(description)[1]
     counts = (2, 3) if quick else (1, 2, 3, 4, 8, 8, 8)
-    different = sum(room.picture(said, threads=threads)[1] != reference for threads in counts)
+    different = sum(sandbox.render(description, threads=threads)[1] != reference for threads in counts)
     check = f"threads {', '.join(map(str, sorted(set(counts))))}: the files are the same bytes"
-    return Row("threads", check, f"{different} of {len(counts)} files differ", different == 0)
+    return CheckResult("threads", check, f"{different} of {len(counts)} files differ", different == 0)

@@ -13,42 +13,42 @@ from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema import schema_of
 from illumcli.schema.families import members
 from illumcli.shading.terms import evaluate
-from illumcli.stress.outcome import Row
+from illumcli.stress.sandbox import CheckResult
 
 MEASURED = "file"
 """A model with this field is a measurement; there is none to stress."""
 
 
-def rows(quick: bool) -> list[Row]:
-    """One row per model."""
+def check_models(quick: bool) -> list[CheckResult]:
+    """A result per model."""
     lanes, draws = (256, 20) if quick else (4096, 400)
     models = [Model for Model in members("illumcli.models") if MEASURED not in Model.fields()]
     return [_row(Model, lanes, draws) for Model in models]
 
 
-def _row(Model: type[Any], lanes: int, draws: int) -> Row:
+def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
     random = np.random.default_rng(1)
     wrong: list[str] = []
     values = sets = 0
-    for said in parameters(Model, random, draws):
-        model = Model.validated(said)
+    for description in parameters(Model, random, draws):
+        model = Model.validated(description)
         sets += 1
         for dtype in (np.float32, np.float64):
             given = directions(sets, lanes, dtype)
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 try:
-                    found = evaluate(model.lobes(), given)
+                    lobes = evaluate(model.lobes(), given)
                 except (ArithmeticError, RuntimeWarning) as error:
-                    wrong.append(f"{said}: {error}")
+                    wrong.append(f"{description}: {error}")
                     continue
-            for name, lobe in found.items():
+            for name, lobe in lobes.items():
                 values += lobe.size
                 if lobe.dtype != dtype or not np.isfinite(lobe).all() or lobe.min() < 0:
                     bad = np.count_nonzero(~np.isfinite(lobe) | (lobe < 0))
-                    wrong.append(f"{said}: {name} wrong in {bad} values of {dtype.__name__}")
+                    wrong.append(f"{description}: {name} wrong in {bad} values of {dtype.__name__}")
     check = f"{sets} sets of parameters, {values:,} values: finite, not negative"
-    return Row(f"model: {Model.model}", check, wrong[0] if wrong else "-", not wrong)
+    return CheckResult(f"model: {Model.model}", check, wrong[0] if wrong else "-", not wrong)
 
 
 def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Iterator[dict[str, Any]]:
@@ -57,17 +57,17 @@ def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Ite
     schema = schema_of(Model)
     defs = schema.get("$defs", {})
     tag = {"model": Model.model}
-    own = {
+    fields = {
         name: field
         for name, field in schema["properties"].items()
         if name not in ("model", "emission", "ambient")
     }
     yield tag
-    for name, field in own.items():
+    for name, field in fields.items():
         for value in _ends(field, defs):
             yield {**tag, name: value}
     for _ in range(draws):
-        yield {**tag, **{name: _drawn(field, defs, random) for name, field in own.items()}}
+        yield {**tag, **{name: _drawn(field, defs, random) for name, field in fields.items()}}
 
 
 def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:

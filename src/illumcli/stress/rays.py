@@ -15,7 +15,7 @@ from illumcli.geometry.transforms import rotation
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import SurfaceInteraction, interact
 from illumcli.rays.offsets import offset_ray_origins
-from illumcli.stress.outcome import Row, Sandbox
+from illumcli.stress.sandbox import CheckResult, Sandbox
 from illumcli.stress.scenes import scene
 
 GAPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -27,15 +27,15 @@ EDGES_PPM = 1000
 tolerance, which then takes the face beyond for hit. A longer offset would lose contact gaps of 1e-6 radii."""
 
 
-def check_rows(room: Sandbox, quick: bool) -> list[Row]:
-    """Every check of the ray core and of where rays start."""
+def check_rays(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
+    """Every check of the tracer and of ray origins."""
     count = 20_000 if quick else 2_000_000
     return [
         *(row for name, mesh, away in _bodies() for row in _self_hits(name, mesh, away, count)),
         _gaps(2_000 if quick else 100_000),
         *_leaks(3 if quick else 6, 20_000 if quick else 1_000_000),
-        *_terminators(room, quick),
-        _near_lights(room),
+        *_terminators(sandbox, quick),
+        _near_lights(sandbox),
     ]
 
 
@@ -101,10 +101,10 @@ def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
 def surface_points(
     geometry: SceneGeometry, count: int, seed: int
 ) -> tuple[NDArray[np.float64], SurfaceInteraction]:
-    """Points of object 0, one in four on an edge or vertex, and their facets seen from outside."""
+    """Points of object 0, one in four on an edge or vertex, and their interactions seen from outside."""
     random = np.random.default_rng(seed)
-    mine = np.flatnonzero(geometry.objects == 0).astype(np.int32)
-    triangle = mine[random.integers(len(mine), size=count)]
+    of_object = np.flatnonzero(geometry.objects == 0).astype(np.int32)
+    triangle = of_object[random.integers(len(of_object), size=count)]
     u, v = random.random((2, count)).astype(F)
     over = u + v > 1
     u[over], v[over] = 1 - u[over], 1 - v[over]
@@ -114,8 +114,8 @@ def surface_points(
         take_rows(geometry.vertices, geometry.triangles[triangle, k]).astype(np.float64) for k in range(3)
     ]
     outward = unit(column_major(cross(corners[1] - corners[0], corners[2] - corners[0])))
-    found = interact(geometry, triangle, u, v, outward)
-    return found.position, found
+    interaction = interact(geometry, triangle, u, v, outward)
+    return interaction.position, interaction
 
 
 def grazing(n: NDArray[Any], seed: int) -> NDArray[np.float32]:
@@ -127,8 +127,8 @@ def grazing(n: NDArray[Any], seed: int) -> NDArray[np.float32]:
     return column_major(np.sqrt(1 - height * height)[:, None] * tangent + height[:, None] * n, F)
 
 
-def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
-    """A convex body never hides anything from its own surface."""
+def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[CheckResult]:
+    """A convex body never occludes rays from its own surface."""
     geometry = world_of(mesh, away)
     tracer = Tracer(geometry.vertices, geometry.triangles)
     limit = 0.5 if away else np.inf  # the speck is no part of the body
@@ -136,25 +136,25 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
     for seed, first in enumerate(range(0, count, 1 << 18)):
         part = min(1 << 18, count - first)
         position, interaction = surface_points(geometry, part, seed)
-        way = grazing(interaction.ng.astype(np.float64), seed)
+        direction = grazing(interaction.ng.astype(np.float64), seed)
         # rounding brings a ray of 1e-6 rad below the horizon now and then; such a one asks about the inside
-        up = dot(way.astype(np.float64), interaction.ng.astype(np.float64)) > 1e-7
+        up = dot(direction.astype(np.float64), interaction.ng.astype(np.float64)) > 1e-7
         origins = offset_ray_origins(position, interaction.ng, interaction.edge)
-        hidden = tracer.occluded(column_major(origins[up]), column_major(way[up]), limit)
+        hidden = tracer.occluded(column_major(origins[up]), column_major(direction[up]), limit)
         rim = np.flatnonzero(up) < part // 4
         for k, where in enumerate((~rim, rim)):
             hits[k] += np.count_nonzero(hidden & where)
             done[k] += np.count_nonzero(where)
     ppm = 1e6 * hits[1] / done[1]
     return [
-        Row(
+        CheckResult(
             f"self-hits: {name}",
             "rays from faces, down to 1e-6 rad"
             + (f": at most {SLIVERS_PPM} ppm" if "needle" in name else ""),
             f"{hits[0]} of {done[0]:,} rays",
             bool(1e6 * hits[0] <= done[0] * SLIVERS_PPM) if "needle" in name else not hits[0],
         ),
-        Row(
+        CheckResult(
             f"self-hits at edges: {name}",
             f"rays from edges and vertices: at most {EDGES_PPM} ppm",
             f"{ppm:.0f} ppm of {done[1]:,} rays",
@@ -163,7 +163,7 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[Row]:
     ]
 
 
-def _gaps(count: int) -> Row:
+def _gaps(count: int) -> CheckResult:
     """A plate over a floor shades all of what lies under it."""
     random = np.random.default_rng(5)
     lit: dict[float, float] = {}
@@ -187,7 +187,7 @@ def _gaps(count: int) -> Row:
         hidden = tracer.occluded(origins, n)
         lit[gap] = float(np.mean(~hidden))
     worst = max(lit, key=lambda gap: lit[gap])
-    return Row(
+    return CheckResult(
         "contact gaps",
         f"a plate {GAPS[0]:g} to {GAPS[-1]:g} radii over a floor shades it",
         f"{lit[worst]:.2%} of rays pass, gap {worst:g}",
@@ -195,12 +195,12 @@ def _gaps(count: int) -> Row:
     )
 
 
-def _leaks(divisions: int, count: int) -> list[Row]:
+def _leaks(divisions: int, count: int) -> list[CheckResult]:
     """No ray leaves a closed mesh: through faces, edges or vertices."""
     geometry = world_of(icosphere(divisions))
     tracer = Tracer(geometry.vertices, geometry.triangles)
     random = np.random.default_rng(9)
-    found = []
+    results = []
     for aim in ("faces", "edges", "vertices"):
         missed = done = 0
         for first in range(0, count, 1 << 18):
@@ -217,13 +217,13 @@ def _leaks(divisions: int, count: int) -> list[Row]:
             closest = tracer.closest(inside, column_major(unit(column_major(target - inside)), F))
             missed, done = missed + int(np.count_nonzero(closest.triangle < 0)), done + part
         check = f"from inside a closed ball of {len(geometry.triangles):,} faces"
-        found.append(Row(f"leaks at {aim}", check, f"{missed} of {done:,} rays", not missed))
-    return found
+        results.append(CheckResult(f"leaks at {aim}", check, f"{missed} of {done:,} rays", not missed))
+    return results
 
 
-def _terminators(room: Sandbox, quick: bool) -> list[Row]:
+def _terminators(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
     """A lone smooth ball has no shadow on its lit side, however coarse it is."""
-    found = []
+    results = []
     film = {"width": 48, "height": 48, "samples": 1} if quick else {"width": 256, "height": 256, "samples": 1}
     for divisions in (1, 3) if quick else (1, 2, 3, 5):
         mesh = icosphere(divisions)
@@ -231,10 +231,10 @@ def _terminators(room: Sandbox, quick: bool) -> list[Row]:
         text += "".join(
             f"f {a}//{a} {b}//{b} {c}//{c}\n" for a, b, c in (mesh.corners.reshape(-1, 3) + 1).tolist()
         )
-        ball = {"mesh": room.file(f"ball{divisions}.obj", text.encode())}
+        ball = {"mesh": sandbox.file(f"ball{divisions}.obj", text.encode())}
         to_light = np.array([2.0, 1.0, 0.5]) / np.sqrt(5.25)
         sun = {"light": "directional", "name": "sun", "direction": (-to_light).tolist()}
-        channels, _ = room.picture(
+        channels, _ = sandbox.render(
             scene(ball, lights=[sun], film=film, camera={"position": [0, 0.5, 4], "target": [0, 0, 0]}),
             ("shadows", "normal", "obscurance", "alpha"),
         )
@@ -242,18 +242,20 @@ def _terminators(room: Sandbox, quick: bool) -> list[Row]:
         lit = (channels["A"] == 1) & (n_l > 1e-5)
         false = int(np.count_nonzero(channels["shadow.sun.Y"][lit] != 1))
         closed = int(np.count_nonzero(channels["obscurance.Y"][channels["A"] == 1] != 1))
-        found.append(
-            Row(
+        results.append(
+            CheckResult(
                 f"terminator: ball of {20 * 4**divisions:,} faces",
                 "no false shadow on the lit side, w = 1",
                 f"{false} of {np.count_nonzero(lit)} lit pixels, {closed} with w < 1",
                 not false and not closed,
             )
         )
-    return found
+    return results
 
 
-def _near_lights(room: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2)) -> Row:
+def _near_lights(
+    sandbox: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2)
+) -> CheckResult:
     """A light however near to a plane, on its lit side, casts no shadow there."""
     plane = {"mesh": {"shape": "plane", "size": [2, 2]}}
     lamps = [
@@ -262,7 +264,7 @@ def _near_lights(room: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7
     ]
     film = {"width": 64, "height": 64, "samples": 1}
     camera = {"position": [0, 2, 0.5], "target": [0, 0, 0]}
-    channels, _ = room.picture(
+    channels, _ = sandbox.render(
         scene(plane, lights=lamps, film=film, camera=camera), ("shadows", "lights", "alpha")
     )
     wrong = 0
@@ -270,7 +272,7 @@ def _near_lights(room: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7
         lit = (channels["A"] == 1) & (channels[f"shadow.h{i}.Y"] == 0)
         wrong += int(np.count_nonzero(lit & (heights[i] > 1e-6)))
     brightest = max(float(values.max()) for name, values in channels.items() if name.startswith("h"))
-    return Row(
+    return CheckResult(
         "light near a plane",
         f"{len(heights)} heights of {heights[0]:g} to {heights[-1]:g} radii: no false shadow, finite",
         f"{wrong} pixels in shadow, brightest {brightest:.2g}",

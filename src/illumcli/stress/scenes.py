@@ -1,4 +1,4 @@
-"""The scenes at the limits of what can be described: every one must render without a fault, or be refused."""
+"""Scenes at the limits of what can be described: each must render without a fault, or be refused."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import IllumError
-from illumcli.stress.outcome import Row, Sandbox, faults, is_refusal, refusal
+from illumcli.stress.sandbox import CheckResult, Sandbox, faults, is_refusal, refusal
 
 Scene = dict[str, Any]
 RATES = ("phong", "gouraud", "constant", "quadratic")
@@ -85,72 +85,76 @@ def scaled(size: float, *away: float) -> Scene:
     )  # fmt: skip
 
 
-def obj(room: Sandbox, text: str, **more: Any) -> Scene:
+def obj(sandbox: Sandbox, text: str, **more: Any) -> Scene:
     """A scene around a mesh file of this text."""
-    return scene({"mesh": room.file(f"mesh{room.pictures}.obj", text.encode())}, FLOOR, **more)
+    return scene({"mesh": sandbox.file(f"mesh{sandbox.pictures}.obj", text.encode())}, FLOOR, **more)
 
 
 MUST_RENDER: dict[str, Callable[[Sandbox], Scene]] = {
-    "empty scene": lambda room: {},
-    "empty scene with lights and obscurance": lambda room: scene(),
-    "all vertices one point": lambda room: scene(polygons([[1, 2, 3]] * 3, [(0, 1, 2)])),
-    "one face without area": lambda room: scene(
+    "empty scene": lambda sandbox: {},
+    "empty scene with lights and obscurance": lambda sandbox: scene(),
+    "all vertices one point": lambda sandbox: scene(polygons([[1, 2, 3]] * 3, [(0, 1, 2)])),
+    "one face without area": lambda sandbox: scene(
         polygons([*SQUARE, [2, 2, 0]], [(0, 1, 2, 3), (0, 2, 4)]), FLOOR
     ),
-    "all faces without area": lambda room: scene(polygons([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [(0, 1, 2)])),
-    "a face that names one vertex thrice": lambda room: obj(room, TRIANGLE + "f 1 2 3\nf 2 2 2\n"),
-    "needle 1:1e6": lambda room: scene(polygons([[-1, 0, 0], [1, 0, 0], [0, 2e-6, 0]], [(0, 1, 2)]), FLOOR),
-    "needle seen along": lambda room: scene(
+    "all faces without area": lambda sandbox: scene(polygons([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [(0, 1, 2)])),
+    "a face that names one vertex thrice": lambda sandbox: obj(sandbox, TRIANGLE + "f 1 2 3\nf 2 2 2\n"),
+    "needle 1:1e6": lambda sandbox: scene(
+        polygons([[-1, 0, 0], [1, 0, 0], [0, 2e-6, 0]], [(0, 1, 2)]), FLOOR
+    ),
+    "needle seen along": lambda sandbox: scene(
         polygons([[-1, 0, 0], [1, 0, 0], [0, 2e-6, 0]], [(0, 1, 2)]),
         camera={"position": [3, 1e-6, 0], "target": [0, 1e-6, 0]},
     ),
-    "ball squeezed 1:1e6": lambda room: scene({**BALL, "transform": {"scale": [1, 1, 1e-6]}}, FLOOR),
-    "ball squeezed to nothing": lambda room: scene({**BALL, "transform": {"scale": [1, 1, 0]}}, FLOOR),
-    "object scaled to a point": lambda room: scene({**BALL, "transform": {"scale": 0}}, FLOOR),
-    "two sheets in one place": lambda room: scene(sheets(0), FLOOR),
-    "two sheets 1e-7 apart": lambda room: scene(sheets(1e-7), FLOOR),
-    "two balls in one place": lambda room: scene(BALL, {**BALL, "material": "grey"}, FLOOR),
-    "size 1e-9": lambda room: scaled(1e-9, 0, 0, 0),
-    "size 1e9": lambda room: scaled(1e9, 0, 0, 0),
-    "1e6 radii away": lambda room: scaled(1, 6e6, -6e6, 6e6),
-    "size 1e-9, 1e6 radii away": lambda room: scaled(1e-9, 6e-3, -6e-3, 6e-3),
-    "vertices at 1e18": lambda room: scene(polygons([[1e18, 0, 0], [0, 1e18, 0], [0, 0, 1e18]], [(0, 1, 2)])),
-    "a vertex at 1e18 beside a ball": lambda room: scene(
+    "ball squeezed 1:1e6": lambda sandbox: scene({**BALL, "transform": {"scale": [1, 1, 1e-6]}}, FLOOR),
+    "ball squeezed to nothing": lambda sandbox: scene({**BALL, "transform": {"scale": [1, 1, 0]}}, FLOOR),
+    "object scaled to a point": lambda sandbox: scene({**BALL, "transform": {"scale": 0}}, FLOOR),
+    "two sheets in one place": lambda sandbox: scene(sheets(0), FLOOR),
+    "two sheets 1e-7 apart": lambda sandbox: scene(sheets(1e-7), FLOOR),
+    "two balls in one place": lambda sandbox: scene(BALL, {**BALL, "material": "grey"}, FLOOR),
+    "size 1e-9": lambda sandbox: scaled(1e-9, 0, 0, 0),
+    "size 1e9": lambda sandbox: scaled(1e9, 0, 0, 0),
+    "1e6 radii away": lambda sandbox: scaled(1, 6e6, -6e6, 6e6),
+    "size 1e-9, 1e6 radii away": lambda sandbox: scaled(1e-9, 6e-3, -6e-3, 6e-3),
+    "vertices at 1e18": lambda sandbox: scene(
+        polygons([[1e18, 0, 0], [0, 1e18, 0], [0, 0, 1e18]], [(0, 1, 2)])
+    ),
+    "a vertex at 1e18 beside a ball": lambda sandbox: scene(
         BALL, polygons([[0, 0, 0], [1, 0, 0], [0, -1e18, 0]], [(0, 1, 2)])
     ),
-    "a triangle of 1e-8 in a scene of 1": lambda room: scene(
+    "a triangle of 1e-8 in a scene of 1": lambda sandbox: scene(
         polygons([[0, 0, 0], [1e-8, 0, 0], [0, 1e-8, 0]], [(0, 1, 2)]),
         FLOOR,
         camera={"position": [2e-9, 2e-9, 1e-7], "target": [2e-9, 2e-9, 0]},
     ),
-    "faces that name a vertex twice": lambda room: obj(room, TRIANGLE + "f 1 1 2\nf 1 2 3\n"),
-    "normals of length 0 and 1e-30": lambda room: obj(
-        room, TRIANGLE + "vn 0 0 0\nvn 0 0 1e-30\nf 1//1 2//2 3//1\n"
+    "faces that name a vertex twice": lambda sandbox: obj(sandbox, TRIANGLE + "f 1 1 2\nf 1 2 3\n"),
+    "normals of length 0 and 1e-30": lambda sandbox: obj(
+        sandbox, TRIANGLE + "vn 0 0 0\nvn 0 0 1e-30\nf 1//1 2//2 3//1\n"
     ),
-    "normals against their faces": lambda room: obj(room, TRIANGLE + "vn 0 0 -1\nf 1//1 2//1 3//1\n"),
-    "normals along their faces": lambda room: obj(room, TRIANGLE + "vn 1 0 0\nf 1//1 2//1 3//1\n"),
-    "normals that cancel within a face": lambda room: obj(
-        room, TRIANGLE + "vn 1 0 0\nvn -1 0 0\nf 1//1 2//2 3//1\n"
+    "normals against their faces": lambda sandbox: obj(sandbox, TRIANGLE + "vn 0 0 -1\nf 1//1 2//1 3//1\n"),
+    "normals along their faces": lambda sandbox: obj(sandbox, TRIANGLE + "vn 1 0 0\nf 1//1 2//1 3//1\n"),
+    "normals that cancel within a face": lambda sandbox: obj(
+        sandbox, TRIANGLE + "vn 1 0 0\nvn -1 0 0\nf 1//1 2//2 3//1\n"
     ),
-    "a mirrored matrix": lambda room: scene({**BALL, "transform": {"scale": [-1, 1, 1]}}, FLOOR),
-    "light on a vertex": lambda room: scene(BOX, FLOOR, lights=[lamp(1, 1, 1)]),
-    "light on a face": lambda room: scene(BOX, FLOOR, lights=[lamp(0.3, 1, 0.2)]),
-    "light on the floor": lambda room: scene(BOX, FLOOR, lights=[lamp(1.7, -1, 0.9)]),
-    "light 1e-12 above a face": lambda room: scene(BOX, FLOOR, lights=[lamp(0.3, 1 + 1e-12, 0.2)]),
-    "light inside a solid": lambda room: scene(BOX, FLOOR, lights=[lamp(0, 0, 0)]),
-    "light where the eye looks": lambda room: scene(
+    "a mirrored matrix": lambda sandbox: scene({**BALL, "transform": {"scale": [-1, 1, 1]}}, FLOOR),
+    "light on a vertex": lambda sandbox: scene(BOX, FLOOR, lights=[lamp(1, 1, 1)]),
+    "light on a face": lambda sandbox: scene(BOX, FLOOR, lights=[lamp(0.3, 1, 0.2)]),
+    "light on the floor": lambda sandbox: scene(BOX, FLOOR, lights=[lamp(1.7, -1, 0.9)]),
+    "light 1e-12 above a face": lambda sandbox: scene(BOX, FLOOR, lights=[lamp(0.3, 1 + 1e-12, 0.2)]),
+    "light inside a solid": lambda sandbox: scene(BOX, FLOOR, lights=[lamp(0, 0, 0)]),
+    "light where the eye looks": lambda sandbox: scene(
         polygons(SQUARE, [(0, 1, 2, 3)]),
         lights=[lamp(0.5, 0.5, 0)],
         camera={"position": [0.5, 0.5, 2], "target": [0.5, 0.5, 0]},
         film={"width": 3, "height": 3, "samples": 1},
     ),
-    "light in the eye": lambda room: scene(BALL, FLOOR, lights=[lamp(2.5, 2, 4)]),
-    "light 1e18 away": lambda room: scene(
+    "light in the eye": lambda sandbox: scene(BALL, FLOOR, lights=[lamp(2.5, 2, 4)]),
+    "light 1e18 away": lambda sandbox: scene(
         BALL,
         FLOOR,
         lights=[lamp(1e18, 1e18, 0, intensity=1e18), lamp(0, 1e18, 0, attenuation={"law": "none"})],
     ),
-    "lights of all laws at distance 0": lambda room: scene(
+    "lights of all laws at distance 0": lambda sandbox: scene(
         BOX,
         FLOOR,
         lights=[
@@ -164,14 +168,14 @@ MUST_RENDER: dict[str, Callable[[Sandbox], Scene]] = {
             )
         ],
     ),
-    "attenuation of 1e18": lambda room: scene(
+    "attenuation of 1e18": lambda sandbox: scene(
         BALL,
         FLOOR,
         lights=[lamp(3, 4, 5, attenuation={"law": "polynomial", "c1": 1e18, "c2": 1e18, "c3": 1e18})],
     ),
-    "light of 1e18": lambda room: scene(BALL, FLOOR, lights=[lamp(3, 4, 5, intensity=1e18)]),
-    "light of 1e-18": lambda room: scene(BALL, FLOOR, lights=[lamp(3, 4, 5, intensity=1e-18)]),
-    "spot of 1e-3 degrees": lambda room: scene(
+    "light of 1e18": lambda sandbox: scene(BALL, FLOOR, lights=[lamp(3, 4, 5, intensity=1e18)]),
+    "light of 1e-18": lambda sandbox: scene(BALL, FLOOR, lights=[lamp(3, 4, 5, intensity=1e-18)]),
+    "spot of 1e-3 degrees": lambda sandbox: scene(
         BALL,
         FLOOR,
         lights=[
@@ -179,144 +183,152 @@ MUST_RENDER: dict[str, Callable[[Sandbox], Scene]] = {
             for s in (0, 1)
         ],
     ),
-    "spot of 180 degrees": lambda room: scene(
+    "spot of 180 degrees": lambda sandbox: scene(
         BALL, FLOOR, lights=[{"light": "spot", "position": [0, 4, 0], "angle": 180, "intensity": 9}]
     ),
-    "spot inside a solid": lambda room: scene(
+    "spot inside a solid": lambda sandbox: scene(
         BALL, FLOOR, lights=[{"light": "spot", "position": [0, 0.1, 0], "intensity": 9}]
     ),
-    "shininess 0": lambda room: scene(
+    "shininess 0": lambda sandbox: scene(
         {**BALL, "material": shiny(0)}, {**FLOOR, "material": shiny(0, "blinn_phong")}
     ),
-    "shininess 1e6": lambda room: scene(
+    "shininess 1e6": lambda sandbox: scene(
         {**BALL, "material": shiny(1e6)}, {**FLOOR, "material": shiny(1e6, "blinn_phong")}
     ),
-    "shininess 1e18": lambda room: scene(
+    "shininess 1e18": lambda sandbox: scene(
         {**BALL, "material": shiny(1e18)}, {**FLOOR, "material": shiny(1e18, "blinn_phong")}
     ),
-    "albedo 1e18": lambda room: scene(
+    "albedo 1e18": lambda sandbox: scene(
         {**BALL, "material": {"model": "phong", "diffuse": 1e18, "specular": 1e18}}, FLOOR
     ),
-    "camera inside a solid": lambda room: scene(
+    "camera inside a solid": lambda sandbox: scene(
         BOX, FLOOR, camera={"position": [0.1, 0.2, 0.1], "target": [1, 0, 0]}, lights=[lamp(0, 0.5, 0)]
     ),
-    "camera on a face": lambda room: scene(BOX, FLOOR, camera={"position": [0, 0, 1], "target": [0.4, 0, 0]}),
-    "camera in a face, looking along it": lambda room: scene(
+    "camera on a face": lambda sandbox: scene(
+        BOX, FLOOR, camera={"position": [0, 0, 1], "target": [0.4, 0, 0]}
+    ),
+    "camera in a face, looking along it": lambda sandbox: scene(
         BOX, FLOOR, camera={"position": [-0.5, 0, 1], "target": [1, 0, 1]}
     ),
-    "camera on a vertex": lambda room: scene(BOX, FLOOR, camera={"position": [1, 1, 1], "target": [0, 0, 0]}),
-    "camera along an edge": lambda room: scene(
+    "camera on a vertex": lambda sandbox: scene(
+        BOX, FLOOR, camera={"position": [1, 1, 1], "target": [0, 0, 0]}
+    ),
+    "camera along an edge": lambda sandbox: scene(
         BOX, FLOOR, camera={"position": [3, 1, 1], "target": [-1, 1, 1]}
     ),
-    "camera along the floor": lambda room: scene(
+    "camera along the floor": lambda sandbox: scene(
         BOX, FLOOR, camera={"position": [5, -1, 0], "target": [0, -1, 0]}
     ),
-    "up along the line of sight": lambda room: scene(
+    "up along the line of sight": lambda sandbox: scene(
         BALL, FLOOR, camera={"position": [0, 5, 0], "target": [0, 0, 0], "up": [0, 1, 0]}
     ),
-    "up of length 1e-18": lambda room: scene(BALL, FLOOR, camera={**CAMERA, "up": [0, 1e-18, 0]}),
-    "up of length 1e18": lambda room: scene(BALL, FLOOR, camera={**CAMERA, "up": [1e18, 1e18, 0]}),
-    "target 1e-12 from the eye": lambda room: scene(
+    "up of length 1e-18": lambda sandbox: scene(BALL, FLOOR, camera={**CAMERA, "up": [0, 1e-18, 0]}),
+    "up of length 1e18": lambda sandbox: scene(BALL, FLOOR, camera={**CAMERA, "up": [1e18, 1e18, 0]}),
+    "target 1e-12 from the eye": lambda sandbox: scene(
         BALL, FLOOR, camera={"position": [2.5, 2, 4], "target": [2.5, 2, 4 - 1e-12]}
     ),
-    "camera 1e6 radii away": lambda room: scene(
+    "camera 1e6 radii away": lambda sandbox: scene(
         BALL, FLOOR, camera={"position": [0, 2e6, 6e6], "target": [0, 0, 0], "fov": 0.001}
     ),
-    "camera 1e18 away": lambda room: scene(
+    "camera 1e18 away": lambda sandbox: scene(
         BALL, FLOOR, camera={"position": [0, 0, 1e18], "target": [0, 0, 0]}
     ),
-    "field of view 0.001": lambda room: scene(BALL, FLOOR, camera={**CAMERA, "fov": 0.001}),
-    "field of view 179.9": lambda room: scene(BALL, FLOOR, camera={**CAMERA, "fov": 179.9}),
-    "field of view 180 - 1e-9": lambda room: scene(BALL, FLOOR, camera={**CAMERA, "fov": 180 - 1e-9}),
-    "parallel view of 1e-9 and of 1e9": lambda room: scene(
+    "field of view 0.001": lambda sandbox: scene(BALL, FLOOR, camera={**CAMERA, "fov": 0.001}),
+    "field of view 179.9": lambda sandbox: scene(BALL, FLOOR, camera={**CAMERA, "fov": 179.9}),
+    "field of view 180 - 1e-9": lambda sandbox: scene(BALL, FLOOR, camera={**CAMERA, "fov": 180 - 1e-9}),
+    "parallel view of 1e-9 and of 1e9": lambda sandbox: scene(
         BALL,
         FLOOR,
         cameras={f"c{e}": {**CAMERA, "projection": "orthographic", "extent": float(f"1e{e}")} for e in (9,)},
         camera=None,
     ),
-    "an image of 1 x 1": lambda room: scene(BALL, FLOOR, film={"width": 1, "height": 1, "samples": 16}),
-    "an image of 1 x 10,000": lambda room: scene(
+    "an image of 1 x 1": lambda sandbox: scene(BALL, FLOOR, film={"width": 1, "height": 1, "samples": 16}),
+    "an image of 1 x 10,000": lambda sandbox: scene(
         BALL, FLOOR, film={"width": 1, "height": 10000, "samples": 1}
     ),
-    "an image of 10,000 x 1": lambda room: scene(
+    "an image of 10,000 x 1": lambda sandbox: scene(
         BALL, FLOOR, film={"width": 10000, "height": 1, "samples": 1}
     ),
-    "one obscurance ray": lambda room: scene(BALL, FLOOR, obscurance={"samples": 1}),
-    "every falloff": lambda room: scene(
+    "one obscurance ray": lambda sandbox: scene(BALL, FLOOR, obscurance={"samples": 1}),
+    "every falloff": lambda sandbox: scene(
         BALL, FLOOR, obscurance={"samples": 3, "falloff": {"falloff": "exponential", "tau": 1e18}}
     ),
-    "falloff of 1e-18": lambda room: scene(
+    "falloff of 1e-18": lambda sandbox: scene(
         BALL,
         FLOOR,
         obscurance={"samples": 3, "falloff": {"falloff": "exponential", "tau": 1e-18, "max_distance": 1e-18}},
     ),
-    "power falloff of 1e18": lambda room: scene(
+    "power falloff of 1e18": lambda sandbox: scene(
         BALL,
         FLOOR,
         obscurance={"samples": 3, "falloff": {"falloff": "power", "exponent": 1e18, "max_distance": "1r"}},
     ),
-    "smooth falloff of 1e18 radii": lambda room: scene(
+    "smooth falloff of 1e18 radii": lambda sandbox: scene(
         BALL, FLOOR, obscurance={"samples": 3, "falloff": {"falloff": "smooth", "max_distance": "1e18r"}}
     ),
-    "coupled ambient light": lambda room: scene(BALL, FLOOR, ambient={"color": 1e18, "form": "coupled"}),
-    "emission of 1e18": lambda room: scene(
+    "coupled ambient light": lambda sandbox: scene(BALL, FLOOR, ambient={"color": 1e18, "form": "coupled"}),
+    "emission of 1e18": lambda sandbox: scene(
         {**BALL, "material": {"model": "lambert", "emission": 1e18}}, FLOOR
     ),
 }
 """Name -> scene, of what must render."""
 
 MUST_REFUSE: dict[str, Callable[[Sandbox], Scene]] = {
-    "a mesh without faces": lambda room: obj(room, TRIANGLE),
-    "a mesh file of 0 bytes": lambda room: obj(room, ""),
-    "a NaN vertex": lambda room: obj(room, "v nan 0 0\n" + TRIANGLE + "f 1 2 3\n"),
-    "an infinite vertex": lambda room: obj(room, "v inf 0 0\n" + TRIANGLE + "f 1 2 3\n"),
-    "a vertex at 1e300": lambda room: obj(room, "v 1e300 0 0\n" + TRIANGLE + "f 1 2 3\n"),
-    "a vertex at 1e19": lambda room: obj(room, "v 1e19 0 0\n" + TRIANGLE + "f 1 2 3\n"),
-    "attenuation of 0": lambda room: scene(
+    "a mesh without faces": lambda sandbox: obj(sandbox, TRIANGLE),
+    "a mesh file of 0 bytes": lambda sandbox: obj(sandbox, ""),
+    "a NaN vertex": lambda sandbox: obj(sandbox, "v nan 0 0\n" + TRIANGLE + "f 1 2 3\n"),
+    "an infinite vertex": lambda sandbox: obj(sandbox, "v inf 0 0\n" + TRIANGLE + "f 1 2 3\n"),
+    "a vertex at 1e300": lambda sandbox: obj(sandbox, "v 1e300 0 0\n" + TRIANGLE + "f 1 2 3\n"),
+    "a vertex at 1e19": lambda sandbox: obj(sandbox, "v 1e19 0 0\n" + TRIANGLE + "f 1 2 3\n"),
+    "attenuation of 0": lambda sandbox: scene(
         BALL, lights=[lamp(1, 2, 3, attenuation={"law": "polynomial", "c1": 0, "c2": 0, "c3": 0})]
     ),
-    "a film of 1e6 x 1e6": lambda room: scene(BALL, film={"width": 1000000, "height": 1000000}),
-    "1e12 rays": lambda room: scene(
+    "a film of 1e6 x 1e6": lambda sandbox: scene(BALL, film={"width": 1000000, "height": 1000000}),
+    "1e12 rays": lambda sandbox: scene(
         BALL, film={"width": 10000, "height": 10000, "samples": 1}, obscurance={"samples": 10000}
     ),
-    "a coordinate of 1e39": lambda room: scene(BALL, lights=[lamp(1e39, 0, 0)]),
-    "a field of view of 180": lambda room: scene(BALL, camera={**CAMERA, "fov": 180}),
+    "a coordinate of 1e39": lambda sandbox: scene(BALL, lights=[lamp(1e39, 0, 0)]),
+    "a field of view of 180": lambda sandbox: scene(BALL, camera={**CAMERA, "fov": 180}),
 }
 """Name -> scene, of what must be refused."""
 
 
-def rows(room: Sandbox, quick: bool) -> list[Row]:
-    """One row per scene: rendered at every shading rate, or refused."""
+def check_scenes(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
+    """A result per scene: rendered at every shading rate, or refused."""
     rates = RATES[:2] if quick else RATES
     size = {"width": 24, "height": 18, "samples": 1} if quick else {"width": 120, "height": 90, "samples": 2}
-    found = [_rendered(name, make, room, rates, size) for name, make in MUST_RENDER.items()]
-    return found + [_refused(name, make, room) for name, make in MUST_REFUSE.items()]
+    results = [_rendered(name, make, sandbox, rates, size) for name, make in MUST_RENDER.items()]
+    return results + [_refused(name, make, sandbox) for name, make in MUST_REFUSE.items()]
 
 
 def _rendered(
-    name: str, make: Callable[[Sandbox], Scene], room: Sandbox, rates: Sequence[str], size: Mapping[str, int]
-) -> Row:
+    name: str,
+    make: Callable[[Sandbox], Scene],
+    sandbox: Sandbox,
+    rates: Sequence[str],
+    size: Mapping[str, int],
+) -> CheckResult:
     check, wrong = "finite, nothing below 0, shares within 1", []
     for rate in rates:
-        said = {"film": dict(size), "shading": rate, **make(room)}
-        if said.get("camera", "") is None:
-            del said["camera"]
+        description = {"film": dict(size), "shading": rate, **make(sandbox)}
+        if description.get("camera", "") is None:
+            del description["camera"]
         try:
-            channels, _ = room.picture(said)
+            channels, _ = sandbox.render(description)
             wrong += [f"{rate}: {fault}" for fault in faults(channels)]
         except IllumError as error:
             wrong.append(f"{rate}: {refusal(error)}")
         except Exception as error:  # what would be a traceback is a finding, and the next case goes on
             wrong.append(f"{rate}: {type(error).__name__}: {error}")
-    return Row(name, check, wrong[0] if wrong else "-", not wrong)
+    return CheckResult(name, check, wrong[0] if wrong else "-", not wrong)
 
 
-def _refused(name: str, make: Callable[[Sandbox], Scene], room: Sandbox) -> Row:
+def _refused(name: str, make: Callable[[Sandbox], Scene], sandbox: Sandbox) -> CheckResult:
     try:
-        room.picture(make(room))
+        sandbox.render(make(sandbox))
         worst, passed = "rendered", False
     except IllumError as error:
         worst, passed = refusal(error), is_refusal(error)
     except Exception as error:
         worst, passed = f"{type(error).__name__}: {error}", False
-    return Row(name, "refused", worst if not passed else worst.partition(":")[0], passed)
+    return CheckResult(name, "refused", worst if not passed else worst.partition(":")[0], passed)

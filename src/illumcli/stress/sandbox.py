@@ -1,4 +1,4 @@
-"""What a stress case found, and where its pictures are made and counted."""
+"""The result of a check, and the folder in which its scenes are rendered and their values counted."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from illumcli.records import Value
 Channels = dict[str, NDArray[np.float32]]
 
 
-class Row(Value):
-    """One line of the table."""
+class CheckResult(Value):
+    """One line of the table of the suite."""
 
     case: str
     check: str
@@ -34,17 +34,17 @@ class Sandbox:
         self.pictures = self.pixels = self.values = self.not_finite = self.negative = 0
 
     def file(self, name: str, content: bytes) -> str:
-        """Name of a file with this content, as scenes of this room name it."""
+        """Write a file into the sandbox; its name, as scenes refer to it."""
         (self.folder / name).write_bytes(content)
         return name
 
-    def picture(
+    def render(
         self, scene: Mapping[str, Any], layers: Sequence[str] = NAMES, threads: int = 1
     ) -> tuple[Channels, bytes]:
         """Every channel of the scene's image, (H, W) float32 each, and the image file's bytes.
 
-        The scene goes the whole way of `illum render`: file, plan, tiles, an EXR in single precision, which
-        is read back.
+        The scene is rendered as `illum render` does it, from a file to an EXR in single precision, which is
+        read back.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Sandbox:
 
 def faults(channels: Channels) -> list[str]:
     """What no picture may have: values not finite, light, shares or distances below 0, shares above 1."""
-    found = []
+    results = []
     for name, values in channels.items():
         layer = layer_of_channel(name)
         for fact, wrong in (
@@ -105,8 +105,8 @@ def faults(channels: Channels) -> list[str]:
             ("above 1", values > 1 if layer.kind == "share" else np.zeros(1, bool)),
         ):
             if wrong.any():
-                found.append(f"{name} {fact} in {np.count_nonzero(wrong)} pixels")
-    return found
+                results.append(f"{name} {fact} in {np.count_nonzero(wrong)} pixels")
+    return results
 
 
 def refusal(error: IllumError) -> str:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
+if TYPE_CHECKING:
+    from illumcli.commands.render_all import Settings as RenderOptions
+    from illumcli.records import Value
+
 C = TypeVar("C", bound=Callable[..., Any])
+R = TypeVar("R", bound="Value")
 
 
 class _Names(click.Choice):
@@ -32,7 +38,8 @@ def _samplers() -> Iterable[str]:
 
 
 SAMPLER = _Names(_samplers)
-SCENE = click.Path(path_type=Path)
+FILE = click.Path(path_type=Path)
+SCENE = FILE
 """Whether it is there is found when it is read: one that is missing stops no other."""
 
 scene_argument = click.argument("scene", type=SCENE)
@@ -103,6 +110,31 @@ def studio_options(command: C) -> C:
     return cast(C, look(turn(arranged)))
 
 
+pattern_option = click.option(
+    "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."
+)
+
+only_option = click.option("--only", multiple=True, metavar="LAYER", help="Render these layers alone.")
+
+threads_option = click.option(
+    "-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core."
+)
+
+report_option = click.option("--report", type=FILE, metavar="FILE.json", help="Write what happened, as JSON.")
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+
+
+def seed_option(text: str, default: int | None = None) -> Callable[[C], C]:
+    """Adds `--seed` with a help text of its own."""
+    return click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=default, help=text)
+
+
+def force_option(text: str = "Replace files that differ, write those that do not anew.") -> Callable[[C], C]:
+    """Adds `--force`."""
+    return click.option("--force", is_flag=True, help=text)
+
+
 keep_going_option = click.option(
     "--keep-going/--stop-at-first",
     default=True,
@@ -143,11 +175,6 @@ strict_option = click.option(
 )
 
 
-def tell(text: str) -> None:
-    """Say something that is no result."""
-    click.echo(text, err=True)
-
-
 no_cache_option = click.option(
     "--no-cache",
     "cache",
@@ -155,3 +182,33 @@ no_cache_option = click.option(
     default=True,
     help="Neither use nor keep artifacts of other runs; see illum cache.",
 )
+
+
+def gathered(name: str, take: Callable[[dict[str, Any]], object]) -> Callable[[C], C]:
+    """Hands several options to a command as the one parameter `name`.
+
+    `take` removes them from the options by name, and returns a record of them.
+    """
+
+    def decorate(command: C) -> C:
+        @wraps(command)
+        def with_record(**options: Any) -> Any:
+            record = take(options)
+            return command(**options, **{name: record})
+
+        return cast(C, with_record)
+
+    return decorate
+
+
+def taken(record: type[R], options: dict[str, Any]) -> R:
+    """A record of those options that are its fields; they are removed."""
+    names = [field.name for field in fields(record) if field.name in options]
+    return record(**{name: options.pop(name) for name in names})
+
+
+def render_options(options: dict[str, Any]) -> RenderOptions:
+    """How scenes are rendered, of the options of a command."""
+    from illumcli.commands.render_all import Settings as RenderOptions
+
+    return taken(RenderOptions, options)

@@ -11,16 +11,23 @@ import click
 from illumcli.cli._options import (
     SAMPLER,
     SCENE,
+    force_option,
+    gathered,
     keep_going_option,
     overrides_option,
     quiet_option,
+    report_option,
+    seed_option,
     strict_option,
-    tell,
+    taken,
+    threads_option,
     verbose_option,
 )
+from illumcli.cli._printing import print_paths, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
+    from illumcli.baking.settings import BakeOptions, BakeSettings
 
 _EPILOG = """\b
 Examples:
@@ -44,6 +51,40 @@ class _Distance(click.ParamType):
             except ValueError:
                 pass
         return self.fail(f"'{text}' is no distance; write 0.2 for scene units, 0.5r for half the radius")
+
+
+def _settings(options: dict[str, Any]) -> BakeSettings:
+    """What values depend on, of the options of the command."""
+    from illumcli.baking.settings import BakeSettings
+
+    _refuse_contradictions(options)
+    falloff = {name: options.pop(name) for name in ("falloff", "max_distance", "tau", "exponent")}
+    options["samples"] = options["samples"] or 256
+    options["falloff"] = {name: value for name, value in falloff.items() if value is not None}
+    options["faces"] = options["faces"].replace("-", "_")
+    options["occluders"] = options["occluders"] or ("scene",)
+    return taken(BakeSettings, options)
+
+
+def _refuse_contradictions(options: dict[str, Any]) -> None:
+    falloff = options["falloff"]
+    if options["samples"] is not None and options["target_error"] is not None:
+        raise click.UsageError("--samples and --target-error exclude each other; give one")
+    if options["tau"] is not None and falloff != "exponential":
+        raise click.UsageError("--tau belongs to --falloff exponential")
+    if options["exponent"] is not None and falloff != "power":
+        raise click.UsageError("--exponent belongs to --falloff power")
+    if options["max_distance"] is None and falloff in ("linear", "smooth", "power"):
+        raise click.UsageError(f"--falloff {falloff} needs --max-distance, as in --max-distance 0.5r")
+    if options["target_error"] is not None and options["method"] == "fit":
+        raise click.UsageError("--target-error works with --method vertex; give --samples")
+
+
+def _options(options: dict[str, Any]) -> BakeOptions:
+    """How inputs are baked, of the options of the command."""
+    from illumcli.baking.settings import BakeOptions
+
+    return taken(BakeOptions, options)
 
 
 @click.command(name="ao-bake", epilog=_EPILOG)
@@ -112,37 +153,26 @@ class _Distance(click.ParamType):
     is_flag=True,
     help="Split vertices of .ply with several normals, uv or values, as .glb has them; copies come last.",
 )
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, help="Of every random number.")
-@click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
+@seed_option("Of every random number.", default=0)
+@threads_option
 @overrides_option
-@click.option(
-    "--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what happened, as JSON."
-)
-@click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
+@report_option
+@force_option()
 @keep_going_option
 @strict_option
 @quiet_option
 @verbose_option
+@gathered("settings", _settings)
+@gathered("options", _options)
 def ao_bake(
     inputs: tuple[Path, ...],
     patterns: tuple[str, ...],
-    samples: int | None,
-    target_error: float | None,
-    max_distance: float | str | None,
-    falloff: str,
-    tau: float | None,
-    exponent: float | None,
-    faces: str,
-    occluders: tuple[str, ...],
-    threads: int | None,
-    overrides: tuple[str, ...],
+    settings: BakeSettings,
+    options: BakeOptions,
     report: Path | None,
-    force: bool,
     keep_going: bool,
-    strict: bool,
     quiet: bool,
     verbose: bool,
-    **more: Any,
 ) -> None:
     """Bake obscurance at every vertex of each INPUT, a mesh file or a scene; print the path of every file.
 
@@ -150,51 +180,32 @@ def ao_bake(
     vertex with several normals has their mean, and one value for each where the file can hold it. An
     interrupted bake goes on where it stopped when the same command is given again.
     """
-    from illumcli.baking.settings import BakeOptions, BakeSettings
     from illumcli.cli._progress import reporter
     from illumcli.commands.bake import BakeRequest, bake_inputs
-    from illumcli.render_graph.repairs import repair_lines
-
-    if samples is not None and target_error is not None:
-        raise click.UsageError("--samples and --target-error exclude each other; give one")
-    if tau is not None and falloff != "exponential":
-        raise click.UsageError("--tau belongs to --falloff exponential")
-    if exponent is not None and falloff != "power":
-        raise click.UsageError("--exponent belongs to --falloff power")
-    if max_distance is None and falloff in ("linear", "smooth", "power"):
-        raise click.UsageError(f"--falloff {falloff} needs --max-distance, as in --max-distance 0.5r")
-    if target_error is not None and more["method"] == "fit":
-        raise click.UsageError("--target-error works with --method vertex; give --samples")
-    said = {"max_distance": max_distance, "tau": tau, "exponent": exponent}
-    settings = BakeSettings(
-        samples=samples or 256,
-        target_error=target_error,
-        falloff={"falloff": falloff, **{name: value for name, value in said.items() if value is not None}},
-        faces=faces.replace("-", "_"),
-        occluders=occluders or ("scene",),
-        **more,
-    )
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
-        for path in paths:
-            click.echo(path)
+        print_paths(paths)
         if not quiet:
-            for kept in done.kept:
-                click.echo(f"{kept}: kept, its content is the same", err=True)
-            for line in repair_lines(done.repairs, verbose):
-                click.echo(f"{source}: {line}", err=True)
-            for text in dict.fromkeys(done.left_out):
-                click.echo(f"left out: {text}", err=True)
-            for text in done.warnings:
-                click.echo(text, err=True)
-            if done.written:
-                click.echo(done.summary(), err=True)
+            _say_report(source, done, verbose)
         if verbose:
             for name, seconds in done.seconds.items():
-                click.echo(f"{seconds:8.3f} s  {name}", err=True)
+                say(f"{seconds:8.3f} s  {name}")
 
-    options = BakeOptions(overrides, threads, force, strict)
     request = BakeRequest(settings, patterns, options, keep_going)
-    is_kept = bake_inputs(inputs, request, report, reporter(quiet), written, tell)
+    is_kept = bake_inputs(inputs, request, report, reporter(quiet), written, say)
     if is_kept and not quiet:
-        click.echo(f"{report}: kept, its content is the same", err=True)
+        say_kept([report])
+
+
+def _say_report(source: Path, report: BakeReport, verbose: bool) -> None:
+    from illumcli.render_graph.repairs import repair_lines
+
+    say_kept(report.kept)
+    for line in repair_lines(report.repairs, verbose):
+        say(f"{source}: {line}")
+    for text in dict.fromkeys(report.left_out):
+        say(f"left out: {text}")
+    for text in report.warnings:
+        say(text)
+    if report.written:
+        say(report.summary())

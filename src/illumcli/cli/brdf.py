@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import quiet_option
+from illumcli.cli._options import FILE, force_option, quiet_option
+from illumcli.cli._printing import print_paths, say_kept
 
-_FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
   illum brdf lambert oren_nayar -D oren_nayar.sigma=0.5
@@ -28,9 +28,9 @@ Examples:
     help="A parameter of every model, or of one: oren_nayar.sigma=0.5, or 2.sigma=0.5 for the second.",
 )
 @click.option(
-    "-o", "--output", type=_FILE, help="The picture, .png or .svg; brdf.png unless --csv is given alone."
+    "-o", "--output", type=FILE, help="The picture, .png or .svg; brdf.png unless --csv is given alone."
 )
-@click.option("--csv", "table", type=_FILE, metavar="FILE", help="Write the polar slices as a table.")
+@click.option("--csv", "table", type=FILE, metavar="FILE", help="Write the polar slices as a table.")
 @click.option(
     "--view",
     "chosen",
@@ -52,7 +52,7 @@ Examples:
 )
 @click.option("--log", is_flag=True, help="Slices and lobes on a logarithmic scale, four decades.")
 @click.option("--times-cos", is_flag=True, help="The response, cosine included, instead of the BRDF.")
-@click.option("--force", is_flag=True, help="Replace files that differ.")
+@force_option("Replace files that differ.")
 @quiet_option
 def brdf(
     models: tuple[str, ...],
@@ -79,7 +79,6 @@ def brdf(
     views = VIEWS if "all" in chosen else [view for view in VIEWS if view in chosen]
     plot = Plot(views, angles, log, times_cos)
     paths, kept = draw_brdfs(models, overrides, output, table, plot, force)
-    for path in paths:
-        click.echo(path)
-    for path in [] if quiet else kept:
-        click.echo(f"{path}: kept, its content is the same", err=True)
+    print_paths(paths)
+    if not quiet:
+        say_kept(kept)

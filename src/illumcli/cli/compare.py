@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from illumcli.cli._options import quiet_option
+from illumcli.cli._options import FILE, force_option, json_option, quiet_option
+from illumcli.cli._printing import say_kept
 
 if TYPE_CHECKING:
     from illumcli.commands.compare import Comparison
     from illumcli.images.comparison import LayerDifference
 
-_FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
   illum compare reference.exr new.exr
@@ -24,16 +24,16 @@ Examples:
 
 
 @click.command(epilog=_EPILOG)
-@click.argument("reference", metavar="A", type=_FILE)
-@click.argument("test", metavar="B", type=_FILE)
+@click.argument("reference", metavar="A", type=FILE)
+@click.argument("test", metavar="B", type=FILE)
 @click.option("--layer", "names", multiple=True, metavar="NAME", help="Only this layer; may be repeated.")
 @click.option(
     "--heat",
-    type=_FILE,
+    type=FILE,
     metavar="FILE.png",
     help="Picture of |B - A|, largest over channels, in false colours.",
 )
-@click.option("--force", is_flag=True, help="Replace a picture of --heat that differs.")
+@force_option("Replace a picture of --heat that differs.")
 @click.option("--max-rmse", type=float, metavar="X", help="Root of the mean squared difference.")
 @click.option("--max-mae", type=float, metavar="X", help="Mean absolute difference.")
 @click.option("--max-relative", type=float, metavar="X", help="Mean of (B - A)^2 / (A^2 + 0.01).")
@@ -41,7 +41,7 @@ Examples:
 @click.option("--max-flip", type=float, metavar="X", help="Mean FLIP error, 0 to 1.")
 @click.option("--max-difference", type=float, metavar="X", help="Largest absolute difference.")
 @click.option("--no-flip", is_flag=True, help="Leave FLIP out, which takes most of the time.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@json_option
 @quiet_option
 def compare(
     reference: Path,
@@ -71,7 +71,7 @@ def compare(
         raise click.UsageError("--max-flip needs FLIP; leave --no-flip out")
     comparison = compare_images(reference, test, names, not no_flip, heat, force)
     if comparison.heat_is_kept and not quiet:
-        click.echo(f"{heat}: kept, its content is the same", err=True)
+        say_kept([heat])
     if as_json:
         click.echo(json.dumps(comparison.as_data(), indent=2))
     else:

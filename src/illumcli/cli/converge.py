@@ -3,29 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from illumcli.cli._options import (
+    FILE,
     SAMPLER,
+    force_option,
+    gathered,
+    json_option,
     no_cache_option,
     overrides_option,
     quiet_option,
     scene_argument,
+    seed_option,
     studio_options,
+    taken,
+    threads_option,
 )
+from illumcli.cli._printing import say_kept
 
 if TYPE_CHECKING:
-    from illumcli.accuracy.reference import Vary
+    from illumcli.accuracy.convergence import ConvergenceSettings
 
-_FILE = click.Path(path_type=Path)
 _EPILOG = """\b
 Examples:
   illum converge scenes/obscurance.yaml
   illum converge scenes/obscurance.yaml --from 8 --to 1024 --csv curve.csv -o curve.png
   illum converge scenes/teapot.yaml --vary pixels --layer beauty --sampler spiral
 """
+
+
+def _settings(options: dict[str, Any]) -> ConvergenceSettings:
+    from illumcli.accuracy.convergence import ConvergenceSettings
+
+    options["samplers"] = options["samplers"] or tuple(SAMPLER.choices)
+    return taken(ConvergenceSettings, options)
 
 
 @click.command(epilog=_EPILOG)
@@ -52,32 +66,22 @@ Examples:
     "--width", type=click.IntRange(1, 65536), default=320, show_default=True, help="Of the film, at most."
 )
 @click.option("--camera", metavar="NAME", help="By default the first.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="By default the scene's.")
-@click.option("-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core.")
-@click.option("--csv", "csv_file", type=_FILE, metavar="FILE.csv", help="A line per picture rendered.")
-@click.option("-o", "--output", type=_FILE, metavar="FILE.png", help="The curves as .png or .svg.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
-@click.option("--force", is_flag=True, help="Replace files that differ, write those that do not anew.")
+@seed_option("By default the scene's.")
+@threads_option
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE.csv", help="A line per picture rendered.")
+@click.option("-o", "--output", type=FILE, metavar="FILE.png", help="The curves as .png or .svg.")
+@json_option
+@force_option()
 @no_cache_option
 @quiet_option
+@gathered("settings", _settings)
 def converge(
     scene: Path,
-    overrides: tuple[str, ...],
-    vary: Vary | None,
-    first: int | None,
-    last: int | None,
-    layer: str | None,
-    samplers: tuple[str, ...],
-    repeats: int,
-    width: int,
-    camera: str | None,
-    seed: int | None,
-    threads: int | None,
+    settings: ConvergenceSettings,
     csv_file: Path | None,
     output: Path | None,
     as_json: bool,
     force: bool,
-    cache: bool,
     quiet: bool,
 ) -> None:
     """Measure run time against error of SCENE: seconds and rays beside the RMSE to a reference.
@@ -89,30 +93,16 @@ def converge(
     import json
     import sys
 
-    from illumcli.accuracy.convergence import ConvergenceSettings, measure_convergence
+    from illumcli.accuracy.convergence import measure_convergence
     from illumcli.accuracy.convergence_files import ConvergenceFiles
     from illumcli.accuracy.convergence_table import convergence_table, text_plot
     from illumcli.cli._progress import reporter
 
-    settings = ConvergenceSettings(
-        overrides,
-        vary,
-        first,
-        last,
-        layer,
-        samplers or tuple(SAMPLER.choices),
-        repeats,
-        width,
-        camera,
-        seed,
-        threads,
-        cache,
-    )
     files = ConvergenceFiles(csv_file, output, force)
     result = measure_convergence(scene, settings, reporter(quiet), files.look)
     files.write(result)
-    for kept in files.kept if not quiet else []:
-        click.echo(f"{kept}: kept, its content is the same", err=True)
+    if not quiet:
+        say_kept(files.kept)
     if as_json:
         click.echo(json.dumps(result.as_data(), indent=2))
         return

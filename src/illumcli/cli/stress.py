@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import click
 
-from illumcli.cli._options import quiet_option
+from illumcli.cli._options import json_option, quiet_option
 
 
 @click.command()
 @click.option("--quick", is_flag=True, help="Every case, small: some seconds instead of some minutes.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@json_option
 @quiet_option
 def stress(quick: bool, as_json: bool, quiet: bool) -> None:
     """Run the numerical stability suite: scenes, rays, models and meshes at the limits.

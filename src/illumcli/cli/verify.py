@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from illumcli.cli._options import FILE, json_option
+
 _EPILOG = """\b
 Examples:
   illum verify
@@ -16,7 +18,7 @@ Examples:
 
 
 @click.command(epilog=_EPILOG)
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.argument("file", required=False, type=FILE)
 @click.option(
     "--precision",
     type=click.Choice(["double", "single"]),
@@ -25,7 +27,7 @@ Examples:
     help="`single` runs the formulas in float32 and tells where digits are lost, and why.",
 )
 @click.option("--only", multiple=True, metavar="TYPE", help="Only cases of this type; may be repeated.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@json_option
 def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bool) -> None:
     """Check the renderer's formulas against the vectors in FILE (.json, .json.xz or .json.gz).
 

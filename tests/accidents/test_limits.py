@@ -249,7 +249,7 @@ OUTSIDE = [
 
 @pytest.mark.parametrize("pattern", OUTSIDE)
 def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pattern):
-    from illumcli.commands.check import run as check
+    from illumcli.commands.check import check_scenes
     from illumcli.commands.render import run
     from illumcli.scene.load import load
 
@@ -266,7 +266,7 @@ def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pat
         InputError, match=r"s\.yaml:6:11: outputs\.files\.0: .*lies outside .*--allow"
     ) as told:
         run(scene, cache=False, force=True)
-    assert check([scene])[2] == list(told.value.problems)
+    assert check_scenes([scene]).problems == list(told.value.problems)
     assert sorted(tmp_path.rglob("*")) == before
 
     # the user's own word leads anywhere, and opens a folder to scenes

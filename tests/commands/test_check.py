@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from illumcli.commands.check import run
+from illumcli.commands.check import check_scenes
 from illumcli.commands.schema import run as schema_text
 
 GOOD = "version: 1\nmeshes: {a: {shape: sphere}}\nobjects: [{mesh: a}]\n"
@@ -28,7 +28,8 @@ def scenes(tmp_path):
 
 
 def test_every_problem_of_every_file(scenes):
-    valid, _, problems = run(list(scenes.values()))
+    checks = check_scenes(list(scenes.values()))
+    valid, problems = checks.valid, checks.problems
     assert valid == [scenes["good"]]
     assert [line.replace(f"{scenes['bad'].parent}/", "") for line in problems] == [
         "bad.yaml:4:1: seed: must be at least 0, is -1",
@@ -40,7 +41,8 @@ def test_every_problem_of_every_file(scenes):
 
 
 def test_a_fault_of_an_override_is_said_once(scenes):
-    valid, _, problems = run([scenes["good"], scenes["good"]], ["film.width=0"])
+    checks = check_scenes([scenes["good"], scenes["good"]], ["film.width=0"])
+    valid, problems = checks.valid, checks.problems
     assert (valid, problems) == ([], ["-D film.width=0: must be at least 1, is 0"])
 
 
@@ -68,7 +70,8 @@ def test_allowed_folders_by_option(scenes, tmp_path):
 
 
 def test_what_has_no_effect_is_said_and_no_fault(scenes):
-    valid, unused, problems = run([scenes["good"]], ["film.samples=1", "film.filter={filter: tent}"])
+    checks = check_scenes([scenes["good"]], ["film.samples=1", "film.filter={filter: tent}"])
+    valid, unused, problems = checks.valid, checks.unused, checks.problems
     assert (valid, problems) == ([scenes["good"]], [])
     assert len(unused) == 1
     assert "a single sample looks through the pixel's centre" in unused[0]

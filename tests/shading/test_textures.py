@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from illumcli.color import from_srgb
-from illumcli.commands.check import run as check
+from illumcli.commands.check import check_scenes
 from illumcli.commands.render import run
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair
@@ -300,7 +300,7 @@ def test_a_missing_texture_is_named_with_its_place(scene, print_):
     loaded = load(path)
     with pytest.raises(InputError, match=r"scene.yaml:7:\d+: .*prnt.png; did you mean 'print.png'"):
         run_once(plan(loaded.scene, loaded), RenderStats())
-    assert check([path])[2]
+    assert check_scenes([path]).problems
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,8 @@ class ConvergenceFiles:
             try:
                 import matplotlib.figure  # noqa: F401
             except ImportError:
-                way = "install it: pip install 'illumcli[plot]', or use --csv"
-                raise InputError(f"pictures of curves need matplotlib; {way}") from None
+                advice = "install it: pip install 'illumcli[plot]', or use --csv"
+                raise InputError(f"pictures of curves need matplotlib; {advice}") from None
 
     def look(self, contents: Sequence[str]) -> None:
         """See which files hold what is made from `contents` already.

@@ -22,9 +22,9 @@ def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
 
     @cache
     def meshes(split: bool) -> OutputMeshes:
-        made = output_meshes(work.scene.object_names(), work.surfaces.geometry, baked, split)
-        left_out.extend(made.left_out)
-        return made
+        written = output_meshes(work.scene.object_names(), work.surfaces.geometry, baked, split)
+        left_out.extend(written.left_out)
+        return written
 
     for path in work.due:
         _write(path, work, baked, meshes)

@@ -120,7 +120,7 @@ class BakeSampler(Record):
         bent: bool = False,
         journal: Journal | None = None,
     ) -> PointEstimates:
-        """Estimates at some points, each of its own number of rays.
+        """Estimates at some points, each from its own number of rays.
 
         Parameters
         ----------
@@ -189,9 +189,9 @@ class BakeSampler(Record):
         rays = 0
         for number in range(rounds):
             for half in (0, 1):
-                made = self.estimate("errors", counts.at(few), replicate + 2 * number + half)
-                halves[half].append(made.values)
-                rays += made.rays
+                half_estimate = self.estimate("errors", counts.at(few), replicate + 2 * number + half)
+                halves[half].append(half_estimate.values)
+                rays += half_estimate.rays
         a, b = (
             Estimates(
                 np.concatenate([each.w for each in half]),

@@ -18,7 +18,7 @@ from illumcli.errors import LITTLE_MEMORY, IllumError, LimitError, OutputError, 
 from illumcli.memory import refuse_little
 
 _TO_LOAD = 160 << 20
-"""Bytes without which the linear algebra of numpy ends the process while it loads, by its own exit code."""
+"""Bytes that numpy's linear algebra needs to load; with less it ends the process by itself."""
 
 STOPS = (signal.SIGINT, signal.SIGTERM)
 
@@ -61,8 +61,8 @@ class Commands(click.Group):
             import difflib
 
             near = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            way = f"did you mean '{near[0]}'?" if near else "see illum --help"
-            raise click.UsageError(f"no command '{args[0]}'; {way}", ctx) from None
+            advice = f"did you mean '{near[0]}'?" if near else "see illum --help"
+            raise click.UsageError(f"no command '{args[0]}'; {advice}", ctx) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -86,9 +86,9 @@ def main() -> None:
     """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
     for number in STOPS:
         signal.signal(number, _unwind)
-    # a start makes many objects and no garbage: the default looks through them again and again, 5 % of it
+    # start-up allocates many live objects; the default thresholds rescan them, 5 % of start-up
     gc.set_threshold(100_000, 50, 50)
-    # threads are ours: those of numpy's linear algebra would only spin beside them
+    # tiles run on threads of ours; those of numpy's linear algebra would only compete with them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     status = 1
     try:
@@ -103,13 +103,13 @@ def main() -> None:
         _die_by(stop.number)
     except MemoryError:
         status = _told(LimitError(LITTLE_MEMORY))
-    # to take the interpreter apart costs an eighth of a small render, and after an error it may wait for
-    # threads of the ray core that could not start
+    # skip interpreter shutdown: it costs an eighth of a small render, and after an error it may wait for
+    # threads of Embree that could not start
     os._exit(status)
 
 
 def _status() -> int:
-    """Run the command and tell what goes wrong; the exit code: 1 is for faults of the program alone."""
+    """Run the command and print its error; the exit code: 1 is for faults of the program alone."""
     try:
         code = illum.main(standalone_mode=False)
         return code if isinstance(code, int) else 0
@@ -135,9 +135,9 @@ class _Stopped(BaseException):
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:
-    """The first signal leaves by way of all that is open; a second one ends at once.
+    """The first signal raises, so that open files are discarded; a second one ends at once.
 
-    So does one during an import: libraries do not all survive an exception while they start, some abort.
+    So does one during an import: some libraries abort where an exception interrupts their start.
     """
     for each in STOPS:
         signal.signal(each, _end)
@@ -153,10 +153,10 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _die_by(number: int) -> None:
-    """End by the signal itself, so that the caller sees what happened; no half file stays behind."""
+    """End by the signal itself, so that the caller sees it; no temporary file stays behind."""
     for each in STOPS:
-        signal.signal(each, signal.SIG_IGN)  # the tidying is short
-    # not there yet, or not whole where the signal falls into its own import: then nothing is open
+        signal.signal(each, signal.SIG_IGN)  # discarding is short
+    # not imported yet, or only partly, where the signal interrupts its import: then nothing is open
     if discard := getattr(sys.modules.get("illumcli.files.atomic"), "discard_open", None):
         discard()
     signal.signal(number, signal.SIG_DFL)

@@ -40,7 +40,7 @@ def _samplers() -> Iterable[str]:
 SAMPLER = _Names(_samplers)
 FILE = click.Path(path_type=Path)
 SCENE = FILE
-"""Whether it is there is found when it is read: one that is missing stops no other."""
+"""Existence is checked when it is read: a missing scene does not stop the others."""
 
 scene_argument = click.argument("scene", type=SCENE)
 scenes_argument = click.argument("scenes", metavar="SCENE...", type=SCENE, nargs=-1, required=True)
@@ -76,7 +76,7 @@ allow_option = click.option(
 
 
 def _view(ctx: click.Context, option: click.Parameter, text: str | None) -> str | None:
-    """`AZIMUTH,ELEVATION` as a list; both must be numbers, what they may be `load` knows."""
+    """`AZIMUTH,ELEVATION` as a list; both must be numbers, whose ranges `load` checks."""
     if text is None:
         return None
     try:
@@ -91,8 +91,8 @@ def studio_options(command: C) -> C:
 
     @wraps(command)
     def arranged(*args: Any, view: str | None, up: str | None, **named: Any) -> Any:
-        said = {"view": view, "up": up}
-        studio = tuple(f"studio.{key}={value}" for key, value in said.items() if value is not None)
+        given = {"view": view, "up": up}
+        studio = tuple(f"studio.{key}={value}" for key, value in given.items() if value is not None)
         return command(*args, **{**named, "overrides": (*studio, *named["overrides"])})
 
     look = click.option(

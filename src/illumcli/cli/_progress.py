@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+
+from illumcli.progress import Progress, no_progress
 
 
-def reporter(quiet: bool) -> Callable[[str, int, int], None]:
-    """What jobs call with (what, done, of): a line that rewrites itself on a terminal, else a plain line
-    every ten seconds."""
+def reporter(quiet: bool) -> Progress:
+    """A `Progress`: one line that rewrites itself on a terminal, else a plain line every ten seconds."""
     start, last = time.monotonic(), time.monotonic()
     terminal = sys.stderr.isatty()
     rewrite = getattr(sys.stderr, "obeyed", sys.stderr.write)
 
-    def report(what: str, done: int, of: int) -> None:
+    def report(what: str, done: int, total: int) -> None:
         nonlocal start, last
         now = time.monotonic()
-        if done >= of:
+        if done >= total:
             if terminal:
                 rewrite("\r\x1b[K")
                 sys.stderr.flush()
@@ -26,13 +26,13 @@ def reporter(quiet: bool) -> Callable[[str, int, int], None]:
         if now - last < (0.1 if terminal else 10):
             return
         last = now
-        left = (now - start) * (of - done) / max(done, 1)
-        text = f"{what}: {100 * done / of:.0f} %, {clock(left)} left"
+        left = (now - start) * (total - done) / max(done, 1)
+        text = f"{what}: {100 * done / total:.0f} %, {clock(left)} left"
         if terminal:
             rewrite("\r\x1b[K")
         print(text, end="" if terminal else "\n", file=sys.stderr, flush=True)
 
-    return (lambda what, done, of: None) if quiet else report
+    return no_progress if quiet else report
 
 
 def clock(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""The standard streams as they may be: closed, full, or read by nobody any more. None of it stops a run."""
+"""Standard streams that may be closed, full, or without a reader; none of that stops a run."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import sys
 from typing import TextIO
 
 _NOT_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
-"""What terminals obey: control characters but tabs and line ends, and what turns the direction of writing."""
+"""Characters that control terminals, but tabs and line ends, and those that change the writing direction."""
 
 
 def cleaned(text: str) -> str:
-    """`text` with every character that a terminal would obey written as `\\x1b`: names may hold any."""
-    return _NOT_TEXT.sub(lambda found: ascii(found[0])[1:-1], text)
+    """`text` with characters that control terminals written as `\\x1b`: names may hold any."""
+    return _NOT_TEXT.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 class StandardStream(io.TextIOWrapper):
-    """A standard stream that is discarded from the first write on that the system refuses.
+    """A standard stream whose output is discarded once the system refuses a write.
 
-    `fault` is that refusal. A reader that left (`illum schema | head -1`) has what it wanted: that is none.
-    What it is given is text, whatever a file calls its parts; `obeyed` takes what a terminal is to obey.
+    `fault` is that refusal; a reader that left (`illum schema | head -1`) is none. `write` escapes control
+    characters, since names in files may hold them; `obeyed` writes them.
     """
 
     def __init__(self, number: int, before: TextIO | None, errors: str) -> None:
@@ -71,8 +71,8 @@ def _as_bytes(error: UnicodeError) -> tuple[bytes, int]:
 
 
 def open_standard_streams() -> StandardStream:
-    """Make stdin, stdout and stderr usable whatever they are; stdout."""
-    # a closed one is the null device: else the next file to be opened takes its number, and what libraries
+    """Make stdin, stdout and stderr usable in any state; returns stdout."""
+    # closed ones become the null device: else the next file opened takes their number, and what libraries
     # print goes into that file
     for number in range(3):
         try:

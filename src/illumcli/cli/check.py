@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from illumcli.cli._options import overrides_option, scenes_argument, studio_options
+from illumcli.cli._printing import say
 
 
 @click.command()
@@ -15,13 +16,13 @@ from illumcli.cli._options import overrides_option, scenes_argument, studio_opti
 @studio_options
 def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
     """Validate each SCENE and say every problem at once; nothing is rendered and no mesh is read."""
-    from illumcli.commands.check import run
+    from illumcli.commands.check import check_scenes
     from illumcli.errors import InputError
 
-    valid, unused, problems = run(scenes, overrides)
-    for line in unused:
-        click.echo(line, err=True)
-    for path in valid:
+    checks = check_scenes(scenes, overrides)
+    for line in checks.unused:
+        say(line)
+    for path in checks.valid:
         click.echo(f"{path}: ok")
-    if problems:
-        raise InputError(problems)
+    if checks.problems:
+        raise InputError(checks.problems)

@@ -1,4 +1,4 @@
-"""Several pieces of work: one that fails is told, the others are done."""
+"""Several pieces of work: a failure of one is printed, and the others are done."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ Tell = Callable[[str], None]
 
 
 class Batch:
-    """What became of `count` pieces of work, which are `what`; `tell` is given the text of each failure.
+    """`count` pieces of work, called `what`, and their failures; `tell` gets the text of each failure.
 
-    With `keep_going` the pieces after one that failed are due as those before it are, else those before it
-    alone. What a lone piece raises goes on its way.
+    Without `keep_going` the pieces after one that failed are not done. The error of a lone piece is raised.
     """
 
     def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
@@ -29,7 +28,7 @@ class Batch:
         self._keep_going, self._tell = keep_going, tell
 
     def due(self) -> Iterator[int]:
-        """The numbers of the pieces that are still to be done."""
+        """The indices of the pieces that are still to be done."""
         for number in range(self._count):
             if self.failures and not self._keep_going and number > min(self.failures):
                 return
@@ -38,7 +37,7 @@ class Batch:
 
     @contextmanager
     def piece(self, number: int, label: str = "") -> Iterator[None]:
-        """What goes wrong within is a failure of this piece, told after its label."""
+        """An error inside is a failure of this piece; its text follows the label."""
         try:
             yield
         except Exception as error:
@@ -49,16 +48,16 @@ class Batch:
             self._tell(f"{label}: {failure}" if label else str(failure))
 
     def finish(self, *also: str) -> None:
-        """Raise how many pieces failed and what is `also` to be told, with the exit code of the first."""
+        """Raise how many pieces failed, and the lines of `also`, with the exit code of the first failure."""
         if self.failures:
             failed = f"{len(self.failures)} of {self._count} {self._what} failed"
-            whole = IllumError("\n".join([failed, *also]))
-            whole.exit_code = self.failures[min(self.failures)].exit_code
-            raise whole
+            error = IllumError("\n".join([failed, *also]))
+            error.exit_code = self.failures[min(self.failures)].exit_code
+            raise error
 
 
 class BatchReport:
-    """The report of a batch: an entry for each piece, which holds the content that the piece was to have.
+    """The report of a batch: an entry for each piece, with the content that the piece was planned to have.
 
     `path` is None where no report is asked for.
     """
@@ -83,7 +82,7 @@ class BatchReport:
         self._entries[number] = entry
 
     def finish(self, batch: Batch) -> bool:
-        """Write the report, or date the one that is kept, and end the batch; is it kept?"""
+        """Write the report, or refresh the date of the one that is kept, and end the batch; is it kept?"""
         for number, failure in batch.failures.items():
             self._contents[number] = INCOMPLETE
             self._entries[number] |= {"content": INCOMPLETE, "error": str(failure)}

@@ -1,4 +1,4 @@
-"""Validate scenes: every problem of every file, and what no render would begin with."""
+"""Validate scenes: every problem of every file, and everything that would stop a render from starting."""
 
 from __future__ import annotations
 
@@ -7,12 +7,23 @@ from pathlib import Path
 
 from illumcli.commands.render import prepared, refuse_too_large
 from illumcli.errors import InputError, LimitError
+from illumcli.records import Value
 from illumcli.scene.load import file_problems, load, unused_lines
 
 
-def run(paths: Sequence[Path], overrides: Sequence[str] = ()) -> tuple[list[Path], list[str], list[str]]:
-    """The scenes that are valid and whose files are there, what these say without effect, and the problems of
-    the others, one line each.
+class SceneChecks(Value):
+    """What is valid and what is not."""
+
+    valid: list[Path]
+    """Scenes without a problem, whose files are there."""
+    unused: list[str]
+    """A line for every value of theirs that has no effect."""
+    problems: list[str]
+    """A line for every problem of the others."""
+
+
+def check_scenes(paths: Sequence[Path], overrides: Sequence[str] = ()) -> SceneChecks:
+    """Every problem of the scenes; nothing is rendered and no mesh is read.
 
     Raises
     ------
@@ -26,21 +37,21 @@ def run(paths: Sequence[Path], overrides: Sequence[str] = ()) -> tuple[list[Path
     for path in paths:
         try:
             loaded = load(path, overrides)
-            found = file_problems(loaded)
-            if not found:
+            of_scene = file_problems(loaded)
+            if not of_scene:
                 work = prepared(loaded)
                 refuse_too_large(work, work.targets)
             outputs = loaded.scene.outputs
             unused += unused_lines(loaded, loaded.scene, outputs.layers, outputs.files)
         except InputError as error:
-            found = list(error.problems)
+            of_scene = list(error.problems)
         except LimitError as error:
             too_large.append(str(error) if str(path) in str(error) else f"{path}: {error}")
             continue
-        problems += found
-        if not found:
+        problems += of_scene
+        if not of_scene:
             valid.append(path)
     if too_large and not problems:
         raise LimitError("\n".join(dict.fromkeys(too_large)))
     problems += too_large
-    return valid, list(dict.fromkeys(unused)), list(dict.fromkeys(problems))
+    return SceneChecks(valid, list(dict.fromkeys(unused)), list(dict.fromkeys(problems)))

@@ -20,7 +20,7 @@ from illumcli.memory import refuse_beyond
 from illumcli.records import Value
 
 SHEET_BYTES = 9
-"""Of each pixel of a contact sheet: three colours, as cells, as rows and as a whole."""
+"""Of each pixel of a contact sheet: three colours, held as cells, as rows and as the sheet."""
 
 
 class SweepFiles(Value):

@@ -115,14 +115,14 @@ def layer_differences(
     """How each layer differs; `flips` says whether FLIP is computed for layers with R, G and B."""
     differences = []
     for name, channels in layers.items():
-        found = difference(
+        measures = difference(
             stacked(reference, channels), stacked(test, channels), peak=1.0 if reference.encoded else None
         )
         colors = color_channels(channels)
         error = None
         if flips and colors:
             error = _flip(stacked(reference, colors), stacked(test, colors), reference.encoded)
-        differences.append(LayerDifference(name, channels, found, error))
+        differences.append(LayerDifference(name, channels, measures, error))
     return tuple(differences)
 
 

@@ -14,6 +14,10 @@ from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 
+from illumcli.render_graph.build import build
+from illumcli.render_graph.schedule import Plan, outputs_of, schedule
+from illumcli.scene.load import SceneFile
+
 ROOT = Path(__file__).parents[1]
 MESHES = ROOT.parent / "shared" / "meshes"
 SMALL = "--small" in sys.argv
@@ -69,6 +73,12 @@ def interleaved(runs: Mapping[str, Callable[[], object]], repeats: int = REPEATS
         for name, run in runs.items():
             times[name].append(took(run))
     return times
+
+
+def planned(loaded: SceneFile, layers: Sequence[str]) -> Plan:
+    """The plan of a scene's first view."""
+    graph = build(loaded.scene, loaded)
+    return schedule(graph, outputs_of(loaded.scene, layers), graph.views[0])
 
 
 def table(times: Mapping[str, Sequence[Took]], over: str | None = None) -> None:

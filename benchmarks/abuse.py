@@ -27,10 +27,11 @@ lights: [{light: point, name: key, position: [3, 4, 5], intensity: 30}]
 WORKER = """
 import sys
 from pathlib import Path
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 for k in range(int(sys.argv[2])):
     change, name = f"materials.clay.exponent={4 + k % 5}", f"{sys.argv[1]}-{k % 5}.png"
-    _, report = run(Path("scene.yaml"), [change], name, force=True)
+    _, report = render_scene(RenderJob(Path("scene.yaml"), RenderOptions([change], name, force=True)))
     assert not report.warnings, report.warnings
 """
 
@@ -48,22 +49,26 @@ def main() -> None:
 
 def damaged(flips: int, truncations: int) -> int:
     """Pictures that differ after an entry was damaged."""
-    from illumcli.commands.render import opened_store, run
-    from illumcli.render_graph import cached as artifacts
+    from illumcli.cache import policy as artifacts
+    from illumcli.cache.store import open_store
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
 
     artifacts.worth = lambda seconds, size: True
-    (path,), _ = run(Path("scene.yaml"), (), "a.png", force=True, cache=False)
+    (path,), _ = render_scene(
+        RenderJob(Path("scene.yaml"), RenderOptions((), "a.png", force=True, cache=False))
+    )
     good, random, wrong, seen = path.read_bytes(), np.random.default_rng(0), 0, 0
-    run(Path("scene.yaml"), (), "a.png", force=True)
+    render_scene(RenderJob(Path("scene.yaml"), RenderOptions((), "a.png", force=True)))
     for number in range(flips + truncations):
-        entries = [entry for entry in opened_store().entries() if entry.bytes]  # cut to nothing, not needed
+        entries = [entry for entry in open_store().entries() if entry.bytes]  # cut to nothing, not needed
         entry = entries[int(random.integers(len(entries)))].path
         data = bytearray(entry.read_bytes())
         place = int(random.integers(len(data)))
         if number < flips:
             data[place] ^= 1 << int(random.integers(8))
         entry.write_bytes(data if number < flips else data[:place])
-        _, report = run(Path("scene.yaml"), (), "a.png", force=True)
+        _, report = render_scene(RenderJob(Path("scene.yaml"), RenderOptions((), "a.png", force=True)))
         seen += bool(report.warnings)
         wrong += path.read_bytes() != good
     print(f"{seen} damaged entries were read and found out, the others were not needed")
@@ -72,9 +77,9 @@ def damaged(flips: int, truncations: int) -> int:
 
 def shared(processes: int, runs: int) -> int:
     """Runs that failed and pictures that differ between processes."""
-    from illumcli.commands.render import opened_store
+    from illumcli.cache.store import open_store
 
-    opened_store().prune(0)
+    open_store().prune(0)
     workers = [subprocess.Popen([sys.executable, "-c", WORKER, str(n), str(runs)]) for n in range(processes)]
     failed = sum(worker.wait() != 0 for worker in workers)
     for k in range(min(5, runs)):

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import _bench
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from _bench import planned
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
 
 SIZE = ("film.width=64", "film.height=36") if _bench.SMALL else ("film.width=480", "film.height=270")
@@ -32,17 +32,17 @@ RUNS = {
 }
 
 
-class Run:
+class Picture:
     """A scene rendered at some sampling, meshes and tree made beforehand."""
 
     def __init__(self, scene: Path, *overrides: str) -> None:
         loaded = load(scene, (*SIZE, *overrides))
-        self.steps = plan(loaded.scene, loaded, ["beauty"])
-        self.shared = run_once(self.steps, RenderStats())
+        self.steps = planned(loaded, ["beauty"])
+        self.shared = run_once(self.steps, Run())
 
     def __call__(self) -> None:
         self.tally = RenderStats()
-        made = list(bands(self.steps, self.shared, self.steps.views[0], 1, self.tally))
+        made = list(bands(self.steps, self.shared, Run(self.tally, threads=1)))
         self.beauty = np.concatenate([band.layers["beauty"] for band in made])
 
     @property
@@ -51,11 +51,11 @@ class Run:
         return sum(self.tally.rays.values())
 
 
-def compared(what: str, scene: Path, *overrides: str) -> dict[str, Run]:
+def compared(what: str, scene: Path, *overrides: str) -> dict[str, Picture]:
     """Print a row per sampling."""
-    reference = Run(scene, *overrides, f"film.samples={REFERENCE}", "seed=99")
+    reference = Picture(scene, *overrides, f"film.samples={REFERENCE}", "seed=99")
     reference()
-    runs = {name: Run(scene, *overrides, *own) for name, own in RUNS.items()}
+    runs = {name: Picture(scene, *overrides, *own) for name, own in RUNS.items()}
     times = _bench.interleaved(runs, REPEATS)
     print(f"\n{what}: {SIZE[0]}, {SIZE[1]}, reference {REFERENCE} samples")
     head = ("RMSE", "rays", "cpu [s]", "cpu / 16", "refined", "samples spared")
@@ -71,7 +71,7 @@ def compared(what: str, scene: Path, *overrides: str) -> dict[str, Run]:
     return runs
 
 
-def left(folder: Path, what: str, runs: dict[str, Run]) -> None:
+def left(folder: Path, what: str, runs: dict[str, Picture]) -> None:
     """Write pictures to look at."""
     from illumcli.film.encode import picture
     from illumcli.images.writer import ImageWriter

@@ -27,7 +27,7 @@ from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeSettings
 from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, interact
-from illumcli.render_graph.build import recipes
+from illumcli.render_graph.build import build
 from illumcli.scene.load import SceneFile, load
 from illumcli.visibility.baked import read_npz
 
@@ -42,9 +42,9 @@ class Pictures:
     """A mesh's surface, asked at points as a picture asks its samples."""
 
     def __init__(self, loaded: SceneFile) -> None:
-        self.book = recipes(loaded.scene, loaded)
+        graph = build(loaded.scene, loaded)
         given = ("hits", "interaction", "obscurance_draws", "view", "tile")
-        self.steps = topological_order(self.book, [*MADE, "obscurance"], given)
+        self.steps = topological_order(graph.nodes, [*MADE, "obscurance"], given)
         self.known: dict[str, Any] = {}
         self.at: set[str] = {"hits", "interaction", "obscurance_draws"}
         for step in self.steps:

@@ -20,9 +20,8 @@ import numpy as np
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, dot, length, take_rows, unit
 from illumcli.baking.inputs import mesh_alone
-from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
-from illumcli.render_graph.build import recipes
+from illumcli.render_graph.build import build
 from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.hemisphere import Hemispheres
@@ -64,9 +63,8 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     """Edges, and the mean jump of w about geometric and about shading normals, and of nothing but noise."""
     loaded = mesh_alone(path)
     made: dict[str, Any] = {}
-    for step in topological_order(
-        recipes(loaded.scene, loaded), ["geometry", "tracer", "corner_normals", "planar_polygons"]
-    ):
+    buffers = ["geometry", "tracer", "corner_normals", "planar_polygons"]
+    for step in build(loaded.scene, loaded).topological_order(buffers):
         made[step.output] = step.run(made)
     geometry = made["geometry"]
     sides = []

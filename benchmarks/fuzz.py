@@ -140,11 +140,10 @@ def tried(cases: Iterator[bytes] | list[bytes], suffix: str, read: Callable[[Pat
 
 def load_and_plan(path: Path) -> None:
     """A scene as `illum plan` reads it."""
-    from illumcli.render_graph.schedule import plan
+    from illumcli.commands.render import prepared
     from illumcli.scene.load import load
 
-    loaded = load(path)
-    plan(loaded.scene, loaded)
+    prepared(load(path))
 
 
 def meshes() -> dict[str, tuple[str, bytes]]:

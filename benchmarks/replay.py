@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from _bench import REPEATS, SMALL, Took, ambient_scene, header, ratio, table, took
-from illumcli.commands.render import run
+from _bench import REPEATS, SMALL, Took, ambient_scene, header, planned, ratio, table, took
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.film.tiles import Tile
 from illumcli.rays.embree import Tracer
 from illumcli.render_graph import execute
-from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
 
 Question = tuple[str, np.ndarray, np.ndarray, Any]
@@ -34,8 +34,8 @@ Question = tuple[str, np.ndarray, np.ndarray, Any]
 def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     """The world and the questions of every band of tiles, as the renderer asks them."""
     loaded = load(path)
-    steps = plan(loaded.scene, loaded, ["obscurance"])
-    shared = execute.run_once(steps, execute.RenderStats())
+    steps = planned(loaded, ["obscurance"])
+    shared = execute.run_once(steps, execute.Run())
     asked: list[Question] = []
     own = {name: getattr(Tracer, name) for name in ("closest", "distance", "occluded")}
 
@@ -51,7 +51,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     try:
         for name in own:
             setattr(Tracer, name, recording(name))
-        view = steps.views[0]
+        view = steps.view
         side = steps.tile_side(view)
         for y in range(0, view.height, side):
             tiles = [
@@ -59,7 +59,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
                 for x in range(0, view.width, side)
             ]
             x, rows = (np.concatenate(part) for part in zip(*(tile.pixels() for tile in tiles), strict=True))
-            execute.at_pixels(steps, shared, view, x, rows, threads, execute.RenderStats())
+            execute.at_pixels(steps, shared, execute.Run(threads=threads), x, rows)
             yield shared["geometry"], asked[:]
             asked.clear()
     finally:
@@ -116,10 +116,16 @@ def main(rays: int, width: int, height: int) -> None:
         os.environ["ILLUM_CACHE"] = str(folder / "cache")
         scene = ambient_scene(folder, width, height, rays)
         times: dict[str, list[Took]] = {"whole render, in process": [], "its rays alone": []}
-        run(scene, only=["obscurance"], force=True)  # parsed meshes are kept from here on, as a user has them
+        render_scene(
+            RenderJob(scene, RenderOptions(only=["obscurance"], force=True))
+        )  # parsed meshes are kept from here on, as a user has them
         count = 0
         for seed in range(1, REPEATS + 1):
-            whole = took(lambda seed=seed: run(scene, only=["obscurance"], seed=seed, force=True))
+            whole = took(
+                lambda seed=seed: render_scene(
+                    RenderJob(scene, RenderOptions(only=["obscurance"], seed=seed, force=True))
+                )
+            )
             alone, count = replay(scene, threads)
             times["whole render, in process"].append(whole)
             times["its rays alone"].append(alone)

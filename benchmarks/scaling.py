@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from _bench import REPEATS, SMALL, Took, header, illum, interleaved, lit_scene, spread
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 
 AXES = ("pixels", "samples", "lights", "triangles")
 
@@ -25,7 +26,8 @@ AXES = ("pixels", "samples", "lights", "triangles")
 def rows(title: str, scenes: dict[int, Path]) -> None:
     """A row per scene, from small to large, and its time per unit beside the largest's."""
     runs = {
-        str(count): lambda scene=scene: run(scene, force=True, cache=False) for count, scene in scenes.items()
+        str(count): lambda scene=scene: render_scene(RenderJob(scene, RenderOptions(force=True, cache=False)))
+        for count, scene in scenes.items()
     }
     times = interleaved(runs, 1 if SMALL else REPEATS)
     print(f"\n{title:>12s} {'wall [s]':>26s} {'cpu [s]':>26s} {'cpu per unit / at the most':>34s}")

@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from unittest.mock import patch
 
@@ -22,10 +21,11 @@ from illumcli.lights import incident
 from illumcli.lights.incident import LitPoints
 from illumcli.models._base import IlluminationModel
 from illumcli.render_graph import build as recipes
-from illumcli.render_graph.cached import Artifacts
-from illumcli.render_graph.culling import unseen_objects, without
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph import culling, explain
+from illumcli.render_graph.build import build
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.pipeline import place_and_cull
+from illumcli.render_graph.schedule import outputs_of, schedule
 from illumcli.scene.load import load
 from illumcli.shading import direct
 
@@ -103,8 +103,7 @@ def _directions(_):
 
 
 DARK = ((recipes, "sends", yes),)
-plan_module = import_module("illumcli.render_graph.schedule")
-AMBIENT = ((recipes, "is_ambient", yes), (plan_module, "is_ambient", yes))
+AMBIENT = ((recipes, "is_ambient", yes), (explain, "is_ambient", yes))
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
     Skip(
@@ -124,7 +123,7 @@ SKIPS = (
     Skip(
         "objects no view can tell",
         ("obscurance.falloff={falloff: smooth, max_distance: 1}",),
-        ((sys.modules[__name__], "unseen_objects", lambda *_: ()),),
+        ((culling, "unaffecting", lambda *_: ()),),
         objects=AWAY,
     ),
     Skip("ids alone", (), (), ("object_id",), ("object_id", "beauty")),
@@ -145,14 +144,14 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
         return evaluate(lobes, given)
 
     loaded = load(path, skip.overrides)
-    made = plan(loaded.scene, loaded, layers)
-    tally = RenderStats()
-    made = without(made, loaded, unseen_objects(made, Artifacts(), tally))
+    run, outputs = Run(RenderStats()), outputs_of(loaded.scene, layers)
+    graph = place_and_cull(build(loaded.scene, loaded), outputs, run)
+    plan = schedule(graph, outputs, graph.views[0])
     with patch.object(direct, "response", counted), patch.object(direct, "evaluate", counted_lobes):
-        shared = run_once(made, tally)
-        parts = list(bands(made, shared, made.views[0], 1, tally))
-    counts["rays"] = sum(tally.rays.values())
-    counts["steps"] = len(made.once) + len(made.tile)
+        shared = run_once(plan, run)
+        parts = list(bands(plan, shared, run))
+    counts["rays"] = sum(run.stats.rays.values())
+    counts["steps"] = len(plan.once) + len(plan.tile)
     counts["triangles"] = len(shared["geometry"].triangles)
     return {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}, counts
 

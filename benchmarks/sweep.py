@@ -16,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from illumcli.commands.options import RenderOptions
+
 MESH = Path(__file__).parents[2] / "shared" / "meshes" / "stanford-bunny.obj"
 SCENE = """
 version: 1
@@ -69,7 +71,8 @@ def main() -> None:
 
 def swept(count: int, cold: int) -> None:
     """A sweep of one material parameter: variants against the first render, bytes against cold ones."""
-    from illumcli.commands.render import run as render
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
     from illumcli.commands.sweep import sweep_scene
     from illumcli.scene.variants import variants_of
 
@@ -83,8 +86,11 @@ def swept(count: int, cold: int) -> None:
     same = 0
     some = done.outcomes[:: max(1, count // cold)]
     for outcome in some:
-        (path,), _ = render(
-            Path("scene.yaml"), outcome.variant.overrides, "cold.png", force=True, cache=False
+        (path,), _ = render_scene(
+            RenderJob(
+                Path("scene.yaml"),
+                RenderOptions(outcome.variant.overrides, "cold.png", force=True, cache=False),
+            )
         )
         same += path.read_bytes() == outcome.paths[0].read_bytes()
     print(f"  same bytes as a cold render of its own: {same} of {len(some)} tried")
@@ -106,7 +112,8 @@ def shell(runs: int) -> None:
 
 def moved() -> None:
     """What is traced again after one thing moves."""
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob
+    from illumcli.commands.render import render_scene
 
     changes = {
         "colours": [
@@ -119,20 +126,23 @@ def moved() -> None:
         "eye moved": ["camera.position=[1.4,1.5,3.5]"],
     }
     for name, overrides in changes.items():
-        _, report = run(Path("scene.yaml"), overrides, "moved.png", force=True)
+        _, report = render_scene(
+            RenderJob(Path("scene.yaml"), RenderOptions(overrides, "moved.png", force=True))
+        )
         meshes = [each for each in report.seconds if each.startswith("mesh:")]
         print(f"{name}: rays {report.rays}, meshes parsed {meshes}")
 
 
 def stored() -> None:
     """Every artifact: bytes, seconds it took, seconds to load it, checksum included."""
-    from illumcli.cache.store import described
-    from illumcli.commands.render import opened_store, run
+    from illumcli.cache.store import described, open_store
+    from illumcli.commands.options import RenderJob
+    from illumcli.commands.render import render_scene
 
-    store = opened_store()
+    store = open_store()
     store.prune(0)
     size = ["film.width=1920", "film.height=1080", "obscurance.samples=4"]
-    _, cold = run(Path("scene.yaml"), size, "hd.png", force=True)
+    _, cold = render_scene(RenderJob(Path("scene.yaml"), RenderOptions(size, "hd.png", force=True)))
     total = 0
     for entry in store.entries():
         start = time.perf_counter()

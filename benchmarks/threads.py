@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from _bench import SMALL, ambient_scene, header, interleaved, lit_scene, ratio, table
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 
 
 def numbers(threads: int) -> Callable[[], object]:
@@ -45,8 +46,8 @@ def main() -> None:
         }
         for title, (scene, only) in scenes.items():
             runs = {
-                f"{title}, -t {n}": lambda scene=scene, only=only, n=n: run(
-                    scene, only=only, threads=n, force=True, cache=False
+                f"{title}, -t {n}": lambda scene=scene, only=only, n=n: render_scene(
+                    RenderJob(scene, RenderOptions(only=only, threads=n, force=True, cache=False))
                 )
                 for n in counts
             }

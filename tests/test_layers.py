@@ -52,12 +52,12 @@ def test_a_channel_leads_to_its_layer(layer):
 
 
 def test_every_layer_can_be_shown_and_has_a_buffer_in_some_scene(root):
-    from illumcli.render_graph.build import recipes
+    from illumcli.render_graph.build import build
     from illumcli.scene.load import load
 
     assert {layer.preview for layer in FIXED.values()} == set(PREVIEWS)
     buffers = set()
     for path in sorted((root / "scenes").glob("*.yaml")):
         loaded = load(path)
-        buffers |= set(recipes(loaded.scene, loaded))
+        buffers |= set(build(loaded.scene, loaded).nodes)
     assert {layer.buffer for layer in FIXED.values()} <= buffers

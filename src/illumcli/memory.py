@@ -55,6 +55,13 @@ def refuse_beyond(need: int, what: str, way: str) -> None:
         )
 
 
+def peak_memory() -> int:
+    """Largest resident size of this process so far [bytes]."""
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
 def in_words(count: float) -> str:
     """Bytes as people read them."""
     for unit in ("bytes", "KiB", "MiB", "GiB"):

@@ -15,7 +15,7 @@ import hashlib, resource, subprocess, sys
 from pathlib import Path
 
 # every artifact is kept, however fast it was made
-CLI = "from illumcli.render_graph import artifacts; artifacts.worth = lambda seconds, size: True\\n" \\
+CLI = "from illumcli.cache import policy as artifacts; artifacts.worth = lambda seconds, size: True\\n" \\
       "from illumcli.cli import illum; illum()"
 
 def render(name, *words):

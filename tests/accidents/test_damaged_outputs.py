@@ -11,6 +11,7 @@ from illumcli.accuracy.convergence_files import ConvergenceFiles
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render, render_all
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import OutputError
@@ -19,10 +20,9 @@ from illumcli.scene.variants import variants_of
 
 def picture(folder, name):
     def make(force=False):
-        _, report = render.run(
-            folder / "scene.yaml", force=force, threads=1, cache=False, pattern=str(folder / name),
-            overrides=["film.width=24", "film.height=16"], only=["beauty"],
-        )  # fmt: skip
+        changes = ("film.width=24", "film.height=16")
+        options = RenderOptions(changes, str(folder / name), ("beauty",), threads=1, force=force, cache=False)
+        _, report = render.render_scene(RenderJob(folder / "scene.yaml", options))
         return [str(path) for path in report.kept]
 
     return make
@@ -39,9 +39,9 @@ def bake(folder, name):
 def report(folder, name):
     def make(force=False):
         changes = ("film.width=24", "film.height=16")
-        settings = render_all.Settings(changes, str(folder / "o.exr"), cache=False, force=force)
+        settings = RenderOptions(changes, str(folder / "o.exr"), cache=False, force=force)
         ignore = lambda *words: None  # noqa: E731
-        kept = render_all.run(
+        kept = render_all.render_scenes(
             [folder / "scene.yaml"], settings, folder / name, progress=ignore, written=ignore, tell=ignore
         )
         return [str(folder / name)] if kept else []
@@ -54,7 +54,7 @@ def swept(folder, name):
 
     def make(force=False):
         pattern = str(folder / "o" / "{ambient}.png")
-        settings = render_all.Settings(pattern=pattern, only=("beauty",), cache=False, force=force, threads=1)
+        settings = RenderOptions(pattern=pattern, only=("beauty",), cache=False, force=force, threads=1)
         files = SweepFiles(**{name.partition(".")[0]: folder / name})
         variants = variants_of(["ambient=0.1,0.2", "film.width=16", "film.height=12"])
         return list(map(str, sweep_scene(folder / "scene.yaml", variants, settings, files).kept))

@@ -8,7 +8,8 @@ COMMON = """
 import os, sys, hashlib, shutil
 from pathlib import Path
 from illumcli.errors import OutputError, known
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.images import exr  # loaded before files may not grow
 
 def files(folder="out"):
@@ -17,7 +18,7 @@ def files(folder="out"):
 def parts():
     return [str(p) for p in Path(".").rglob("*.part")]
 
-run(Path("scene.yaml"), threads=1)
+render_scene(RenderJob(Path("scene.yaml"), RenderOptions(threads=1)))
 whole = files()
 sizes = {p.name: p.stat().st_size for p in Path("out").glob("*")}
 """
@@ -32,7 +33,7 @@ for limit in range(0, max(sizes.values()) + 2 * step, step):
     shutil.rmtree("out")
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     try:
-        run(Path("scene.yaml"), threads=1, cache=limit % (2 * step) == 0)
+        render_scene(RenderJob(Path("scene.yaml"), RenderOptions(threads=1, cache=limit % (2 * step) == 0)))
         complete = True
     except OutputError as error:
         complete, text = False, str(error)
@@ -48,7 +49,7 @@ for limit in range(0, max(sizes.values()) + 2 * step, step):
         assert len(text.splitlines()) == 1 and "cannot be written" in text, text
         assert limit < max(sizes.values()), limit
 assert complete
-run(Path("scene.yaml"), threads=1)
+render_scene(RenderJob(Path("scene.yaml"), RenderOptions(threads=1)))
 assert files() == whole
 print(refusals)
 """
@@ -89,7 +90,7 @@ while True:
         shutil.rmtree("cache", ignore_errors=True)
     state.update(calls=0, fail=n)
     try:
-        run(Path("scene.yaml"), threads=1)
+        render_scene(RenderJob(Path("scene.yaml"), RenderOptions(threads=1)))
         complete = True
     except Exception as error:
         complete = False
@@ -110,7 +111,7 @@ while True:
     assert n < 3000
 setattr(place, attribute, real)
 shutil.rmtree("out", ignore_errors=True)
-run(Path("scene.yaml"), threads=1)
+render_scene(RenderJob(Path("scene.yaml"), RenderOptions(threads=1)))
 assert files() == whole and not parts()
 print(n, refused)
 """

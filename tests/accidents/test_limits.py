@@ -43,16 +43,21 @@ def test_too_large_is_exit_4_in_one_line_with_little_memory(python, tmp_path, wh
 
 
 def test_little_memory_and_little_disk_are_refused_before_anything_is_made(folder, monkeypatch):
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
 
     monkeypatch.setattr(memory, "free_memory", lambda: 100_000)
     with pytest.raises(LimitError, match="memory"):
-        run(folder / "scene.yaml", pattern=str(folder / "x.exr"), cache=False)
+        render_scene(
+            RenderJob(folder / "scene.yaml", RenderOptions(pattern=str(folder / "x.exr"), cache=False))
+        )
     monkeypatch.undo()
     disk = SimpleNamespace(f_bavail=1, f_frsize=100)
     monkeypatch.setattr(limits.os, "statvfs", lambda path: disk)
     with pytest.raises(LimitError, match="disk"):
-        run(folder / "scene.yaml", pattern=str(folder / "x.exr"), cache=False)
+        render_scene(
+            RenderJob(folder / "scene.yaml", RenderOptions(pattern=str(folder / "x.exr"), cache=False))
+        )
     assert not list(folder.glob("*.exr"))
 
 
@@ -125,14 +130,14 @@ def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(py
 
 def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path):
     """One column of 60,000 pixels makes cells of 15 million; 90,000 variants make as many cells."""
-    from illumcli.commands.render_all import Settings
+    from illumcli.commands.options import RenderOptions
     from illumcli.commands.sweep import sweep_scene
     from illumcli.commands.sweep_files import SweepFiles
     from illumcli.scene.variants import variants_of
 
     start = "version: 1\nambient: 1\nobjects: [{mesh: {shape: box}}]\n"
     (tmp_path / "s.yaml").write_text(f"{start}film: {{width: 1, height: 60000, samples: 1}}\n")
-    settings = Settings(pattern=str(tmp_path / "{seed}.png"), cache=False)
+    settings = RenderOptions(pattern=str(tmp_path / "{seed}.png"), cache=False)
     files = SweepFiles(sheet=tmp_path / "sheet.png")
     with pytest.raises(LimitError, match="a sheet of 8 pictures, 256 x 15360000 pixels each: takes about"):
         sweep_scene(tmp_path / "s.yaml", variants_of(["seed=1:8:8"]), settings, files)
@@ -148,12 +153,12 @@ def test_references_are_numbers_of_variants_or_files(tmp_path, said):
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):
-    from illumcli.commands.plan import run
+    from illumcli.commands.plan import plan_scene
 
     bombs(tmp_path)
-    assert "shapes " in run(tmp_path / "spheres.yaml", cache=False)
-    assert "textures 49,1" in run(tmp_path / "texture.yaml", cache=False)
-    assert "textures" not in run(tmp_path / "unused.yaml", cache=False)
+    assert "shapes " in plan_scene(tmp_path / "spheres.yaml", cache=False)
+    assert "textures 49,1" in plan_scene(tmp_path / "texture.yaml", cache=False)
+    assert "textures" not in plan_scene(tmp_path / "unused.yaml", cache=False)
 
 
 @pytest.fixture
@@ -195,14 +200,16 @@ def hook(event, words):
 
 from pathlib import Path
 from illumcli.errors import IllumError
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.images import exr
 import illumcli.commands.check
 os.chdir(root)
 sys.addaudithook(hook)
 for number in range(int(sys.argv[2])):
     try:
-        run(Path(f"{number}.yaml"), pattern=f"{number}.exr", cache=number % 2 == 0)
+        options = RenderOptions(pattern=f"{number}.exr", cache=number % 2 == 0)
+        render_scene(RenderJob(Path(f"{number}.yaml"), options))
         print(number, "rendered")
     except IllumError as error:
         print(number, error.exit_code, str(error).splitlines()[0][:200])
@@ -250,7 +257,8 @@ OUTSIDE = [
 @pytest.mark.parametrize("pattern", OUTSIDE)
 def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pattern):
     from illumcli.commands.check import check_scenes
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
     from illumcli.scene.load import load
 
     monkeypatch.chdir(jail)
@@ -265,37 +273,41 @@ def test_a_scene_writes_where_it_may_read_alone(jail, tmp_path, monkeypatch, pat
     with pytest.raises(
         InputError, match=r"s\.yaml:6:11: outputs\.files\.0: .*lies outside .*--allow"
     ) as told:
-        run(scene, cache=False, force=True)
+        render_scene(RenderJob(scene, RenderOptions(cache=False, force=True)))
     assert check_scenes([scene]).problems == list(told.value.problems)
     assert sorted(tmp_path.rglob("*")) == before
 
     # the user's own word leads anywhere, and opens a folder to scenes
-    paths, _ = run(scene, pattern=str(tmp_path / "mine.png"), cache=False)
-    paths += run(scene, [f"outputs.files=[{tmp_path / 'over.png'}]"], cache=False)[0]
+    paths, _ = render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "mine.png"), cache=False)))
+    paths += render_scene(
+        RenderJob(scene, RenderOptions([f"outputs.files=[{tmp_path / 'over.png'}]"], cache=False))
+    )[0]
     monkeypatch.setenv("ILLUM_ALLOW", str(tmp_path))
-    paths += run(scene, cache=False, force=True)[0]
+    paths += render_scene(RenderJob(scene, RenderOptions(cache=False, force=True)))[0]
     assert all(os.path.exists(os.path.realpath(path)) for path in paths)
     assert load(scene).scene.outputs.files == (written,)
 
 
 def test_names_of_a_scene_hold_no_control_characters(folder):
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
 
     for said in ("\\e[31mx.png", "a\\0.png", "a\\nb.png", "\\x9b.png"):
         text = (folder / "scene.yaml").read_text().partition("outputs:")[0]
         (folder / "s.yaml").write_text(f'{text}outputs: {{files: ["{said}"]}}\n')
         with pytest.raises(InputError, match=r"character U\+00(1B|00|0A|9B)"):
-            run(folder / "s.yaml", cache=False)
+            render_scene(RenderJob(folder / "s.yaml", RenderOptions(cache=False)))
 
 
 @pytest.mark.parametrize("pattern", ["x.png", "new/x.png", "../x.png", "../c/x.png", "{top}/a/b/x.png"])
 def test_a_scene_writes_beside_itself_and_where_the_user_stands(jail, tmp_path, monkeypatch, pattern):
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
 
     monkeypatch.chdir(jail)
     (jail / "s.yaml").write_text(
         "version: 1\nambient: 1\nfilm: {width: 4, height: 4, samples: 1}\nobjects: [{mesh: {shape: box}}]\n"
         f"outputs: {{files: ['{pattern.format(top=tmp_path)}']}}\n"
     )
-    paths, _ = run(jail / "s.yaml", cache=False)
+    paths, _ = render_scene(RenderJob(jail / "s.yaml", RenderOptions(cache=False)))
     assert all(path.exists() for path in paths)

@@ -10,10 +10,10 @@ SLOW = pytest.mark.slow
 SWEEP = """
 import gc, json, os, sys
 from pathlib import Path
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.scene.variants import variants_of
-from illumcli.render_graph import cached as artifacts
+from illumcli.cache import policy as artifacts
 
 count = int(sys.argv[1])
 artifacts.worth = lambda seconds, size: True  # every artifact is kept, however fast it was made
@@ -29,7 +29,7 @@ def written(outcome):
 
 gc.disable()
 variants = variants_of([f"camera.position.0=1:2:{count}"])
-settings = Settings(pattern="out/{camera.position.0}.png", force=True, only=("beauty",))
+settings = RenderOptions(pattern="out/{camera.position.0}.png", force=True, only=("beauty",))
 for again in range(2):
     states = []
     done = sweep_scene(Path("scene.yaml"), variants, settings, written=written)
@@ -41,14 +41,15 @@ print(json.dumps(states))
 GARBAGE = """
 import gc
 from pathlib import Path
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 
-run(Path("scene.yaml"))
+render_scene(RenderJob(Path("scene.yaml")))
 gc.collect()
 gc.disable()
 gc.set_debug(gc.DEBUG_SAVEALL)
 for again in range(2):
-    run(Path("scene.yaml"), force=True)
+    render_scene(RenderJob(Path("scene.yaml"), RenderOptions(force=True)))
 gc.collect()
 kinds = [type(value).__name__ for value in gc.garbage]
 assert not {"ndarray", "memmap", "Mesh", "Picture"} & set(kinds), sorted(set(kinds))

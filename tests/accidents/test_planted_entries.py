@@ -265,7 +265,7 @@ def test_a_disk_that_is_full_before_an_entry_is_whole_ends_no_process(tmp_path):
 
 RENDER = """
 import sys
-from illumcli.render_graph import cached as artifacts
+from illumcli.cache import policy as artifacts
 artifacts.worth = lambda seconds, size: True
 from illumcli.cli import illum
 illum()

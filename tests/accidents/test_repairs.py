@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from illumcli.commands.render import run
+from illumcli.cache import policy as artifacts
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, NO_MATERIAL, NOT_ASKED
-from illumcli.render_graph import cached as artifacts
 
 BAD = """v 0 0 0
 v 1 0 0
@@ -81,10 +82,12 @@ def test_a_mesh_that_was_renamed_is_called_by_its_new_name(tmp_path, monkeypatch
     Path("s.yaml").write_text(
         "version: 1\nfilm: {width: 8, height: 8, samples: 1}\nobjects: [{mesh: bad.obj}]\n"
     )
-    run(Path("s.yaml"))
+    render_scene(RenderJob(Path("s.yaml")))
     Path("deep").mkdir()
     Path("bad.obj").rename("deep/new.obj")
-    _, report = run(Path("s.yaml"), ["objects.0.mesh=deep/new.obj"], force=True)
+    _, report = render_scene(
+        RenderJob(Path("s.yaml"), RenderOptions(["objects.0.mesh=deep/new.obj"], force=True))
+    )
     assert any("store" in reused.values() for reused in report.reused.values())
     assert {each.first for each in report.repairs.values()} == {f"deep/new.obj:{n}" for n in (4, 8, 10, 12)}
 

@@ -115,7 +115,8 @@ def test_little_memory_gives_the_right_picture_or_one_line(folder, steps):
 MANY = """
 import os, sys, gc
 from pathlib import Path
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 
 def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -124,12 +125,14 @@ def handles():
     return len(os.listdir("/proc/self/fd"))
 
 count = int(sys.argv[1])
+options = RenderOptions(('film={width: 24, height: 16, samples: 1}',), threads=2, force=True)
+job = RenderJob(Path('scene.yaml'), options)
 for warm in range(30):
-    run(Path("scene.yaml"), ["film={width: 24, height: 16, samples: 1}"], threads=2, force=True)
+    render_scene(job)
 gc.collect()
 before, opened = resident(), handles()
 for number in range(count):
-    run(Path("scene.yaml"), ["film={width: 24, height: 16, samples: 1}"], threads=2, force=True)
+    render_scene(job)
 gc.collect()
 print(resident() - before, handles() - opened)
 """

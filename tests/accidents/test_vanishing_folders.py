@@ -9,7 +9,7 @@ import pytest
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import OutputError
@@ -23,11 +23,9 @@ def test_of_a_render(folder, name):
     def gone(what, done, of):
         shutil.rmtree(folder / "new", ignore_errors=True)
 
+    options = RenderOptions(SMALL, str(folder / "new" / name), ["beauty"], threads=1, cache=False)
     with pytest.raises(OutputError, match=r"cannot be written: No such file"):
-        render.run(
-            folder / "scene.yaml", SMALL, str(folder / "new" / name), ["beauty"],
-            threads=1, cache=False, progress=gone,
-        )  # fmt: skip
+        render.render_scene(RenderJob(folder / "scene.yaml", options), gone)
 
 
 @pytest.mark.parametrize("name", ["a.npz", "a.ply", "a.glb"])
@@ -46,7 +44,7 @@ def test_of_a_sweep(folder, what):
         shutil.rmtree(folder / "new", ignore_errors=True)
 
     files = SweepFiles(**{what: folder / f"all.{'png' if what == 'sheet' else 'csv'}"})
-    settings = Settings(pattern=str(folder / "new" / "{ambient}.png"), cache=False, only=("beauty",))
+    settings = RenderOptions(pattern=str(folder / "new" / "{ambient}.png"), cache=False, only=("beauty",))
     variants = variants_of(["ambient=0.1,0.2", *SMALL])
     with pytest.raises(OutputError, match="others took it away"):
         sweep_scene(folder / "scene.yaml", variants, settings, files, written=gone)

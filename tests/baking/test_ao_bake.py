@@ -18,10 +18,10 @@ from illumcli.errors import InputError, OutputError
 from illumcli.geometry.normals import corner_normals
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
 from illumcli.visibility.baked import read_npz
+from planned import planned
 
 CUBE = """
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
@@ -508,8 +508,8 @@ def test_a_picture_reads_the_values_of_corners(hard_cube, text_mesh, tmp_path):
         "objects: [{name: mesh, mesh: {file: mesh.obj, obscurance: cube.npz}}]\n"
     )
     scene = load(text_mesh(text, "scene.yaml"))
-    steps = plan(scene.scene, scene, ["obscurance"])
-    rows = bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats())
+    steps = planned(scene, ["obscurance"])
+    rows = bands(steps, run_once(steps, Run()), Run(threads=1))
     w = np.concatenate([band.layers["obscurance"] for band in rows])
     np.testing.assert_allclose(w, 1, atol=1e-6)  # the top, whose vertices have 0.7 in the mean
 

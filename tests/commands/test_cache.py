@@ -149,7 +149,7 @@ def refused(path, missing_ok=False):
     unlink(path, missing_ok)
 
 Path.unlink = refused
-from illumcli.render_graph import cached as artifacts
+from illumcli.cache import policy as artifacts
 artifacts.worth = lambda seconds, size: True
 from illumcli.cli import illum
 illum()
@@ -209,10 +209,11 @@ def test_processes_share_one_cache(own):
     code = """
 import sys
 from pathlib import Path
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 for k in range(3):
     change, name = f"materials.clay.exponent={8 + k}", f"{sys.argv[1]}-{k}.png"
-    _, report = run(Path("ring.yaml"), [change], name, force=True)
+    _, report = render_scene(RenderJob(Path("ring.yaml"), RenderOptions([change], name, force=True)))
     assert not report.warnings, report.warnings
 """
     runs = [

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.images.reader import read_image, read_metadata
 
 SCENE = """version: 1
@@ -28,8 +29,14 @@ def pictures(tmp_path_factory):
     folder = tmp_path_factory.mktemp("data")
     (folder / "s.yaml").write_text(SCENE)
     only = [*NAMES, "key"]
-    run(folder / "s.yaml", pattern=str(folder / "all.exr"), only=only, cache=False)
-    run(folder / "s.yaml", pattern=str(folder / "{layer}.png"), only=only, cache=False)
+    render_scene(
+        RenderJob(folder / "s.yaml", RenderOptions(pattern=str(folder / "all.exr"), only=only, cache=False))
+    )
+    render_scene(
+        RenderJob(
+            folder / "s.yaml", RenderOptions(pattern=str(folder / "{layer}.png"), only=only, cache=False)
+        )
+    )
     exact = read_image(folder / "all.exr").channels
     names = {"depth": "Z", "alpha": "A", "uv": "uv.UV", "position": "P.XYZ", "normal": "N.XYZ"}
 
@@ -94,7 +101,11 @@ def test_nothing_seen_is_black_however_far_things_are(tmp_path):
         "objects: [{mesh: {shape: plane, size: [900, 900]}, "
         "transform: {rotate: [90, 0, 0], translate: [0, 0, -2000]}}]\n"
     )
-    run(tmp_path / "far.yaml", pattern=str(tmp_path / "z.png"), only=["depth"], cache=False)
+    render_scene(
+        RenderJob(
+            tmp_path / "far.yaml", RenderOptions(pattern=str(tmp_path / "z.png"), only=["depth"], cache=False)
+        )
+    )
     shown = read_image(tmp_path / "z.png").channels["Y"]
     assert sorted(np.unique(shown * 255).round().tolist()) == [0, 1]
 
@@ -108,12 +119,21 @@ def test_ids_beyond_single_precision_stay_exact_the_whole_way(tmp_path, monkeypa
 
     (tmp_path / "s.yaml").write_text(SCENE)
     names = {"half": ["triangle_id", "beauty"], "float": ["depth", "triangle_id"]}
-    run(tmp_path / "s.yaml", pattern=str(tmp_path / "plain.exr"), only=["triangle_id"], cache=False)
+    render_scene(
+        RenderJob(
+            tmp_path / "s.yaml",
+            RenderOptions(pattern=str(tmp_path / "plain.exr"), only=["triangle_id"], cache=False),
+        )
+    )
     plain = read_image(tmp_path / "plain.exr").channels["triangleId.Y"]
     monkeypatch.setattr(stages, "triangle_id", triangle_id)
     for colour, only in names.items():
         path = tmp_path / f"{colour}.exr"
-        run(tmp_path / "s.yaml", [f"outputs.colour={colour}"], str(path), only, cache=False)
+        render_scene(
+            RenderJob(
+                tmp_path / "s.yaml", RenderOptions([f"outputs.colour={colour}"], str(path), only, cache=False)
+            )
+        )
         found = read_image(path).channels["triangleId.Y"]
         assert found.dtype == np.uint32
         np.testing.assert_array_equal(found, np.where(plain > 0, plain + 2**24, 0))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pydantic_core import ValidationError
 
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.errors import InputError
 from illumcli.images.reader import read_image
 from illumcli.images.writer import ImageWriter
@@ -33,8 +34,13 @@ def obj(path, vertices, faces, more=""):
 def layers(path, *overrides, only=("object_id",), film=SMALL):
     """Channels of a picture of a bare mesh, and the report."""
     out = path.parent / "out.exr"
-    _, report = run(
-        path, [*film, "outputs.colour=float", *overrides], str(out), only, force=True, cache=False
+    _, report = render_scene(
+        RenderJob(
+            path,
+            RenderOptions(
+                [*film, "outputs.colour=float", *overrides], str(out), only, force=True, cache=False
+            ),
+        )
     )
     return read_image(out).channels, report
 

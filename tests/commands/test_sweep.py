@@ -9,7 +9,7 @@ import re
 
 import pytest
 
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import InputError, LimitError, OutputError
@@ -108,12 +108,14 @@ def test_names_that_are_equal_by_their_pattern_are_told_without_reading_a_scene(
     tmp_path, words, pattern, said
 ):
     with pytest.raises(InputError, match=re.escape(said)):
-        sweep_scene(tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), Settings(pattern=pattern))
+        sweep_scene(
+            tmp_path / "none.yaml", variants_of(**{"texts": [], **words}), RenderOptions(pattern=pattern)
+        )
 
 
 def test_equal_values_that_go_with_others_are_variants(scene, tmp_path):
     variants = variants_of(["film.exposure=0,0", "seed=1,2"], together=True)
-    done = sweep_scene(scene, variants, Settings(pattern=str(tmp_path / "{seed}.png")))
+    done = sweep_scene(scene, variants, RenderOptions(pattern=str(tmp_path / "{seed}.png")))
     assert len(done.outcomes) == 2
 
 
@@ -236,7 +238,7 @@ def test_pictures_that_vanish_before_the_table_is_written_are_exit_5(scene, tmp_
 
     variants = variants_of(["materials.clay.specular=0.1,0.2"])
     files = SweepFiles(table=tmp_path / "t.csv")
-    settings = Settings(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
+    settings = RenderOptions(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
     with pytest.raises(OutputError, match="others took it away"):
         sweep_scene(scene, variants, settings, files, written=gone)
 
@@ -255,7 +257,7 @@ def test_what_has_an_effect_in_some_variant_is_not_told(scene, tmp_path):
     variants = variants_of(
         ["ambient=0,0.2", "film={width: 4, height: 4, samples: 1, filter: {filter: tent}}"]
     )
-    done = sweep_scene(scene, variants, Settings(pattern=str(tmp_path / "{ambient}.png"), cache=False))
+    done = sweep_scene(scene, variants, RenderOptions(pattern=str(tmp_path / "{ambient}.png"), cache=False))
     assert len(done.warnings) == 1
     assert "a single sample looks" in done.warnings[0]
 

@@ -12,21 +12,21 @@ from unittest.mock import patch
 
 import numpy as np
 
+from illumcli.cache import policy as artifacts
+from illumcli.cache.memory import MemoryCache
 from illumcli.cache.store import Store
 from illumcli.commands import render
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.images.reader import read_image
-from illumcli.render_graph import cached as artifacts
-from illumcli.render_graph.cached import Memory
-from illumcli.render_graph.execute import RenderStats, at_pixels, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, at_pixels, run_once
 from illumcli.scene.load import load
 from illumcli.scene.variants import Variant
 from metamorphic.pictures import ALL, Pictures, Studio, close, light_layers, pictures, same
 from metamorphic.premises import UNDRAWN, at_centres, fixed_samples, one_camera, without_rays
 from metamorphic.relation import relation
 from metamorphic.scenes import MEASUREMENT, Case
+from planned import planned
 
 
 @relation("exact")
@@ -62,13 +62,12 @@ def a_crop_is_part_of_the_whole(case: Case, random: Random, studio: Studio) -> N
     loaded = load(path)
     layers = (*ALL, "triangle_id", *light_layers(case))
     whole = pictures(path, layers=layers)
-    steps = plan(loaded.scene, loaded, layers)
-    view = steps.views[0]
+    steps = planned(loaded, layers)
+    view = steps.view
     x0, y0 = random.randrange(view.width), random.randrange(view.height)
     x1, y1 = random.randint(x0 + 1, view.width), random.randint(y0 + 1, view.height)
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(x0, x1), np.arange(y0, y1)))
-    tally = RenderStats()
-    part = at_pixels(steps, run_once(steps, tally), view, x, y, 1, tally)
+    part = at_pixels(steps, run_once(steps, Run()), Run(), x, y)
     shape = (y1 - y0, x1 - x0, -1)
     same(
         {key: np.ascontiguousarray(values[y0:y1, x0:x1]) for key, values in whole.items()},
@@ -137,7 +136,7 @@ def what_is_kept_is_what_is_made(case: Case, random: Random, studio: Studio) -> 
     layers = (*ALL, *light_layers(case))
     changes = [change(case, random) for _ in range(3)]
     fresh = [pictures(path, overrides, layers) for overrides in changes]
-    store, memory = Store(folder / "cache", 1 << 26), Memory()
+    store, memory = Store(folder / "cache", 1 << 26), MemoryCache()
     with patch.object(artifacts, "worth", lambda seconds, size: True):
         for overrides, made in zip([*changes, *changes], [*fresh, *fresh], strict=True):
             kept = random.random() < 0.7
@@ -266,10 +265,12 @@ def a_sweep_is_as_many_renders(case: Case, random: Random, studio: Studio) -> No
     layers = (*ALL, "lights", "shadows")
     keep = random.random() < 0.5
     pattern = str(folder / "swept{frame}.exr")
-    made = sweep_scene(path, variants, Settings(pattern=pattern, only=layers, threads=1, cache=keep))
+    made = sweep_scene(path, variants, RenderOptions(pattern=pattern, only=layers, threads=1, cache=keep))
     for variant, outcome in zip(variants, made.outcomes, strict=True):
         alone = folder / f"alone{variant.frame}.exr"
-        render.run(path, variant.overrides, str(alone), layers, threads=1, cache=False)
+        render.render_scene(
+            RenderJob(path, RenderOptions(variant.overrides, str(alone), layers, threads=1, cache=False))
+        )
         same(file_pictures(outcome.paths[0]), file_pictures(alone))
 
 
@@ -283,7 +284,9 @@ def a_file_holds_what_is_made(case: Case, random: Random, studio: Studio) -> Non
     folder = studio.folder()
     path = case.write(folder)
     layers = (*ALL, "triangle_id", *light_layers(case))
-    render.run(path, (), str(folder / "file.exr"), layers, threads=1, cache=False)
+    render.render_scene(
+        RenderJob(path, RenderOptions((), str(folder / "file.exr"), layers, threads=1, cache=False))
+    )
     channels = [values.astype(np.float32) for values in read_image(folder / "file.exr").channels.values()]
     made = [np.moveaxis(values, -1, 0) for values in pictures(path, layers=layers).values()]
     told = sorted(values.tobytes() for values in channels)

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.cache.memory import MemoryCache
+from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
 from illumcli.layers import NAMES
-from illumcli.render_graph.cached import Artifacts, Memory
-from illumcli.render_graph.culling import unseen_objects, without
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan, reusing
+from illumcli.render_graph.build import build
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.pipeline import place_and_cull, plan_view
+from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
 from metamorphic.scenes import Case
 
@@ -33,19 +35,17 @@ def pictures(
     threads: int = 1,
     side: int | None = None,
     store: Store | None = None,
-    memory: Memory | None = None,
+    memory: MemoryCache | None = None,
 ) -> Pictures:
     """Every view of a scene file as a render makes it, objects that nothing tells left out."""
     loaded = load(path, overrides)
-    made = plan(loaded.scene, loaded, layers)
-    first = Artifacts(store, memory)
-    steps = without(made, loaded, unseen_objects(made, first, RenderStats(), threads))
+    run = Run(RenderStats(), Cache(store, memory), threads)
+    outputs = outputs_of(loaded.scene, layers)
+    graph = place_and_cull(build(loaded.scene, loaded), outputs, run)
     out: Pictures = {}
-    for view in steps.views:
-        artifacts = Artifacts(store, memory, reused=dict(first.reused), made=first.made)
-        narrowed, tally = reusing(steps, view, artifacts), RenderStats()
-        shared = run_once(narrowed, tally, artifacts, threads)
-        rows = list(bands(narrowed, shared, view, threads, tally, side=side, artifacts=artifacts))
+    for view in graph.views:
+        plan = plan_view(graph, outputs, view, run.cache)
+        rows = list(bands(plan, run_once(plan, run), run, side=side))
         for name in rows[0].layers:
             out[view.name, name] = np.concatenate([row.layers[name] for row in rows])
     return out

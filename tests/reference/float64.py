@@ -202,11 +202,12 @@ class Difference:
 
 def compare(setup, folder):
     """A row per layer, over the pixels whose every ray answered alike, and the counts of those left out."""
-    from illumcli.commands.render import run
+    from illumcli.commands.options import RenderJob, RenderOptions
+    from illumcli.commands.render import render_scene
     from illumcli.images.reader import read_image
 
     image = folder / f"{setup.name}.exr"
-    run(setup.write(folder), pattern=str(image), cache=False)
+    render_scene(RenderJob(setup.write(folder), RenderOptions(pattern=str(image), cache=False)))
     single, double = read_image(image).channels, render(setup)
     hits = single["triangleId.Y"] == double["triangleId.Y"]
     shadows = single["shadow.key.Y"] == double["shadow.key.Y"]

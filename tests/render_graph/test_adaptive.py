@@ -7,12 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.errors import InputError
 from illumcli.layers import NAMES
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -44,9 +45,9 @@ def scene(tmp_path_factory):
 def rendered(path, only=ALL, threads=1, side=None, overrides=()):
     """Layers, and what was done."""
     loaded = load(path, overrides)
-    steps = plan(loaded.scene, loaded, only)
+    steps = planned(loaded, only)
     tally = RenderStats()
-    made = list(bands(steps, run_once(steps, tally), steps.views[0], threads, tally, side=side))
+    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=threads), side=side))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally
 
 
@@ -107,7 +108,7 @@ def test_edges_and_shadows_get_all_samples(scene):
 def test_counts_are_those_of_the_rays(scene, whole):
     _, tally = whole
     loaded = load(scene)
-    view = plan(loaded.scene, loaded).views[0]
+    view = planned(loaded).view
     assert tally.spared["samples"] == (59 * 43 - tally.refined) * (12 - 3)
     assert view.is_adaptive
 
@@ -134,12 +135,12 @@ def test_the_job_reports_it_and_keeps_its_bytes_in_a_cache(scene, tmp_path, monk
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
     pictures = []
     for number, cache in enumerate((False, True, True)):
-        (path,), report = run(scene, pattern=f"{number}.exr", cache=cache)
+        (path,), report = render_scene(RenderJob(scene, RenderOptions(pattern=f"{number}.exr", cache=cache)))
         pictures.append(path.read_bytes())
         data = json.loads(json.dumps(report.as_data()))
         assert 0 < data["refined"] < 59 * 43
         assert data["spared"]["samples"] != 0
-    run(scene, ["film.adaptive=null"], pattern="plain.exr")
-    run(scene, pattern="again.exr")
+    render_scene(RenderJob(scene, RenderOptions(["film.adaptive=null"], pattern="plain.exr")))
+    render_scene(RenderJob(scene, RenderOptions(pattern="again.exr")))
     assert (tmp_path / "again.exr").read_bytes() == pictures[0] == pictures[1] == pictures[2]
     assert (tmp_path / "plain.exr").read_bytes() != pictures[0]

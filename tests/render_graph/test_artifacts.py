@@ -8,13 +8,20 @@ import sys
 import numpy as np
 import pytest
 
+from illumcli.cache import policy
+from illumcli.cache.codec import decode, encode
+from illumcli.cache.memory import MemoryCache, arrays_in
+from illumcli.cache.recorder import NO_CACHE, Cache
 from illumcli.cache.store import Store
-from illumcli.render_graph import cached as policy
-from illumcli.render_graph.cached import Artifacts, Memory, decode, encode
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.keys import Keys
-from illumcli.render_graph.schedule import content_key, plan, read_by_others, reusing
+from illumcli.render_graph.build import build
+from illumcli.render_graph.cached import Lookup, substitute_cached
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.keys import Keys, content_key
+from illumcli.render_graph.known import with_known
+from illumcli.render_graph.pipeline import plan_view
+from illumcli.render_graph.schedule import outputs_of, shared_keys
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -87,14 +94,17 @@ def store(tmp_path):
 def picture(path, *overrides, store=None, memory=None, only=ALL, threads=1, side=None):
     """Layers, what was made, rays, what was reused."""
     loaded = load(path, overrides)
-    made = plan(loaded.scene, loaded, only)
-    artifacts, tally = Artifacts(store, memory), RenderStats()
-    narrowed = reusing(made, made.views[0], artifacts)
-    shared = run_once(narrowed, tally, artifacts)
-    parts = list(bands(narrowed, shared, made.views[0], threads, tally, side=side, artifacts=artifacts))
+    run = Run(RenderStats(), Cache(store, memory), threads)
+    plan = planned(loaded, only, run.cache)
+    parts = list(bands(plan, run_once(plan, run), run, side=side))
     layers = {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}
-    steps = {step.output for step in (*narrowed.once, *narrowed.tile)} - narrowed.reused.keys()
-    return layers, steps, dict(tally.rays), narrowed.reused
+    return layers, plan.computed, dict(run.stats.rays), plan.lookup.reused
+
+
+def shared(first, second):
+    """Keys of what the second scene reads of the first."""
+    graphs = [build(each.scene, each) for each in (first, second)]
+    return shared_keys(*graphs, outputs_of(second.scene, ALL))
 
 
 def same(a, b):
@@ -123,11 +133,7 @@ def test_no_change_finds_what_is_not_its_own(scene, tmp_path, change, store):
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_variants_share_memory_and_keep_their_bits(scene, change):
-    plans = []
-    for overrides in ([], [change]):
-        loaded = load(scene, overrides)
-        plans.append(plan(loaded.scene, loaded, ALL))
-    memory = Memory(read_by_others(*plans))
+    memory = MemoryCache(shared(load(scene), load(scene, [change])))
     picture(scene, memory=memory)
     same(picture(scene, change)[0], picture(scene, change, memory=memory)[0])
 
@@ -234,11 +240,9 @@ def test_damage_costs_time_and_no_bit(scene, store):
 
 def test_an_interrupted_picture_keeps_nothing_of_its_tiles(scene, store):
     loaded = load(scene)
-    made = plan(loaded.scene, loaded, ["beauty"])
-    artifacts, tally = Artifacts(store), RenderStats()
-    narrowed = reusing(made, made.views[0], artifacts)
-    shared = run_once(narrowed, tally, artifacts)
-    rows = bands(narrowed, shared, made.views[0], 1, tally, side=8, artifacts=artifacts)
+    run = Run(RenderStats(), Cache(store))
+    plan = planned(loaded, ["beauty"], run.cache)
+    rows = bands(plan, run_once(plan, run), run, side=8)
     next(rows)
     rows.close()
     assert picture(scene, store=store)[1] >= {"hits", "obscurance"}
@@ -247,27 +251,27 @@ def test_an_interrupted_picture_keeps_nothing_of_its_tiles(scene, store):
 
 def test_keys_are_the_same_in_every_process(scene):
     loaded = load(scene)
-    made = plan(loaded.scene, loaded, ALL)
-    keys = Keys(made.book, made.views[0], "salt")
+    graph = build(loaded.scene, loaded)
+    keys = Keys(graph.nodes, graph.views[0], "salt")
     code_ = f"""
 from pathlib import Path
-from illumcli.render_graph.keys import Keys
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.build import build
+from illumcli.render_graph.keys import Keys, content_key
 from illumcli.scene.load import load
 loaded = load(Path({str(scene)!r}))
-made = plan(loaded.scene, loaded, {ALL!r})
-keys = Keys(made.book, made.views[0], "salt")
-print(*(f"{{name}}={{keys(name)}}" for name in made.book), sep="\\n\\n")
+graph = build(loaded.scene, loaded)
+keys = Keys(graph.nodes, graph.views[0], "salt")
+print(*(f"{{name}}={{keys(name)}}" for name in graph.nodes), sep="\\n\\n")
 """
     done = subprocess.run([sys.executable, "-c", code_], capture_output=True, text=True, check=True)
-    assert done.stdout.strip().split("\n\n") == [f"{name}={keys(name)}" for name in made.book]
+    assert done.stdout.strip().split("\n\n") == [f"{name}={keys(name)}" for name in graph.nodes]
 
 
 def test_a_file_is_known_by_its_layers_alone(scene):
     def key(layer, *overrides):
         loaded = load(scene, overrides)
-        made = plan(loaded.scene, loaded, [layer])
-        return content_key(made, made.views[0], [layer])
+        graph = build(loaded.scene, loaded)
+        return content_key(graph.nodes, graph.views[0], [layer])
 
     assert key("depth") == key("depth", "materials.red.diffuse=0.3", "ambient=0", "lights.key.intensity=1")
     assert key("depth") != key("depth", "camera.fov=41")
@@ -287,8 +291,7 @@ def test_what_costs_more_than_it_saves_is_not_kept(scene, store, monkeypatch):
 def test_memory_gives_up_what_does_not_fit(scene):
     loaded = load(scene, ["materials.red.diffuse=0.5"])
     first = load(scene)
-    plans = [plan(each.scene, each, ALL) for each in (first, loaded)]
-    memory = Memory(read_by_others(*plans), limit=20_000)
+    memory = MemoryCache(shared(first, loaded), limit=20_000)
     picture(scene, memory=memory)
     same(
         picture(scene, "materials.red.diffuse=0.5")[0],
@@ -301,13 +304,13 @@ def test_memory_gives_up_what_does_not_fit(scene):
 
 def test_buffers_come_back_as_they_were(scene):
     loaded = load(scene)
-    made = plan(loaded.scene, loaded, ["beauty"])
-    geometry = run_once(made, RenderStats())["geometry"]
+    made = planned(loaded, ["beauty"])
+    geometry = run_once(made, Run())["geometry"]
     arrays = []
     said = encode(geometry, arrays, {})
     assert sum(array.nbytes for array in arrays) < 1.05 * sum(
-        {id(array): array.nbytes for array in policy.arrays_in(geometry)}.values()
-    ) + sum(a.nbytes for placed in geometry.placed for a in policy.arrays_in(placed))
+        {id(array): array.nbytes for array in arrays_in(geometry)}.values()
+    ) + sum(a.nbytes for placed in geometry.placed for a in arrays_in(placed))
     again = decode(said, tuple(arrays))
     assert again.render_space == geometry.render_space
     assert again.placed[1].mesh.corners is again.placed[2].mesh.corners
@@ -317,14 +320,6 @@ def test_buffers_come_back_as_they_were(scene):
         assert a.flags.f_contiguous == b.flags.f_contiguous
 
 
-def test_a_book_lists_what_it_may_be_asked_for(scene, store):
-    loaded = load(scene)
-    made = plan(loaded.scene, loaded, ["beauty"])
-    book = policy.Book(made.book, made.views[0], Artifacts(store))
-    assert list(book) == list(made.book)
-    assert len(book) == len(made.book)
-
-
 def test_what_is_no_buffer_is_a_programming_error():
     with pytest.raises(TypeError, match="object is not among what is kept"):
         encode(object(), [], {})
@@ -332,12 +327,16 @@ def test_what_is_no_buffer_is_a_programming_error():
 
 def test_a_look_reads_nothing_and_finds_what_is_there(scene, store):
     loaded = load(scene)
-    made = plan(loaded.scene, loaded, ["beauty"])
-    assert reusing(made, made.views[0], Artifacts(store, look=True)).reused == {}
+    graph, outputs = build(loaded.scene, loaded), outputs_of(loaded.scene, ["beauty"])
+
+    def look():
+        return plan_view(graph, outputs, graph.views[0], Cache(store), look=True).lookup.reused
+
+    assert look() == {}
     picture(scene, store=store, only=["beauty"])
     for entry in store.entries():
         entry.path.write_bytes(b"")
-    assert {"hits", "geometry"} <= reusing(made, made.views[0], Artifacts(store, look=True)).reused.keys()
+    assert {"hits", "geometry"} <= look().keys()
 
 
 def test_buffers_of_another_rate_are_not_kept(scene, store):
@@ -349,9 +348,13 @@ def test_buffers_of_another_rate_are_not_kept(scene, store):
 
 
 def test_what_this_run_made_is_loaded_from_nowhere(scene):
-    recipe = Artifacts(made={"key": "the buffer"}).recipe("geometry", "key", None)
-    assert recipe.function() == "the buffer"
-    assert Artifacts(made={"key": "the buffer"}).recipe("geometry", "other", None) is None
+    loaded = load(scene)
+    graph = with_known(build(loaded.scene, loaded), "object_bounds", Run())
+    cached, lookup = substitute_cached(graph, ["object_bounds"], graph.views[0], NO_CACHE)
+    assert [node.output for node in cached.topological_order(["object_bounds"])] == ["object_bounds"]
+    assert cached.loaders["object_bounds"].run({}) is graph.known["object_bounds"].value
+    assert lookup == Lookup()
+    assert cached.without_loaders() == graph
 
 
 def test_a_store_too_small_for_a_buffer_keeps_none_of_it(scene, store):

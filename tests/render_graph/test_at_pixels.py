@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.render_graph.execute import RenderStats, at_pixels, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, at_pixels, bands, run_once
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -22,11 +22,11 @@ def test_scattered_pixels_are_those_of_the_picture(tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE)
     loaded = load(path)
-    steps = plan(loaded.scene, loaded, ["beauty", "obscurance", "depth"])
-    shared, view = run_once(steps, RenderStats()), steps.views[0]
-    whole = list(bands(steps, shared, view, 2, RenderStats()))
+    steps = planned(loaded, ["beauty", "obscurance", "depth"])
+    shared, run = run_once(steps, Run()), Run(threads=2)
+    whole = list(bands(steps, shared, run))
     x, y = np.array([23, 0, 11, 12, 3]), np.array([0, 17, 9, 9, 4])
-    some = at_pixels(steps, shared, view, x, y, 2, RenderStats())
+    some = at_pixels(steps, shared, run, x, y)
     for name in ("beauty", "obscurance", "depth"):
         picture = np.concatenate([band.layers[name] for band in whole])
         np.testing.assert_array_equal(some[name], picture[y, x])

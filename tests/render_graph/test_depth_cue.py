@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -30,8 +30,8 @@ def rendered(tmp_path):
 
     def render(*overrides):
         loaded = load(path, overrides)
-        steps = plan(loaded.scene, loaded)
-        made = list(bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats()))
+        steps = planned(loaded)
+        made = list(bands(steps, run_once(steps, Run()), Run(threads=1)))
         layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
         return layers, {step.output for step in steps.tile}
 

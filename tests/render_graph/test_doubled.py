@@ -7,12 +7,14 @@ import json
 import numpy as np
 import pytest
 
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.plan import table
-from illumcli.commands.render import run
-from illumcli.render_graph.execute import RenderStats, bands, run_once
+from illumcli.commands.render import render_scene
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.explain import expected_rays, plan_data
 from illumcli.render_graph.replicates import LUMINANCE
-from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -37,8 +39,8 @@ def scene(tmp_path):
 def layers(path, *overrides, only=("beauty", "error")):
     """Layer -> (H, W, channels), and the rays by step."""
     loaded = load(path, overrides)
-    steps, tally = plan(loaded.scene, loaded, only), RenderStats()
-    made = list(bands(steps, run_once(steps, tally), steps.views[0], 2, tally))
+    steps, tally = planned(loaded, only), RenderStats()
+    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=2)))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally.rays
 
 
@@ -107,7 +109,8 @@ def test_the_picture_is_the_same_and_a_quarter_of_it_is_doubled(scene):
     assert more["again.hits"] == pytest.approx(rays["hits"] / 4, rel=0.05)
     assert more["again.obscurance"] == pytest.approx(rays["obscurance"] / 4, rel=0.05)
     loaded = load(scene, overrides)
-    expected = plan(loaded.scene, loaded, ("beauty", "error")).expected_rays
+    plan = planned(loaded, ("beauty", "error"))
+    expected = expected_rays(loaded.scene, [plan.view], plan.computed)
     assert expected["again.primary"] == 48 * 32 * 4
     assert expected["again.obscurance"] == 48 * 32 * 4 * 16
 
@@ -117,16 +120,17 @@ def test_nothing_random_is_exact_and_doubles_nothing(scene):
     assert not made["error"].any()
     assert not [name for name in rays if name.startswith("again.")]
     loaded = load(scene, ("obscurance=null",))
-    assert "nothing in the picture is random: its error is 0" in table(
-        [plan(loaded.scene, loaded, ("error",))]
-    )
+    part = plan_data(planned(loaded, ("error",)), {})
+    assert "nothing in the picture is random: its error is 0" in table([part])
 
 
 def test_the_report_and_the_file_have_it(scene, tmp_path):
     from illumcli.images.reader import read_image
 
     target = tmp_path / "out.exr"
-    _, report = run(scene, pattern=str(target), only=("beauty", "error"), cache=False)
+    _, report = render_scene(
+        RenderJob(scene, RenderOptions(pattern=str(target), only=("beauty", "error"), cache=False))
+    )
     image = read_image(target)
     error = image.channels["error.Y"].astype(float)
     said = json.loads(json.dumps(report.as_data()))["standard_error"]["main"]

@@ -11,9 +11,11 @@ from illumcli.errors import InputError
 from illumcli.film.tiles import FEWEST, tiles
 from illumcli.graph import Node
 from illumcli.layers import NAMES
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import Plan, plan
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.explain import expected_rays, why_not
+from illumcli.render_graph.schedule import Plan
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -47,10 +49,10 @@ def picture(tmp_path_factory):
 
     def render(*only, threads=1, side=None, overrides=(), **more):
         loaded = load(path, overrides)
-        steps = plan(loaded.scene, loaded, only)
+        steps = planned(loaded, only)
         tally = RenderStats()
-        shared = run_once(steps, tally, threads=threads)
-        made = list(bands(steps, shared, steps.views[0], threads, tally, side=side, **more))
+        shared = run_once(steps, Run(tally, threads=threads))
+        made = list(bands(steps, shared, Run(tally, threads=threads), side=side, **more))
         names = made[0].layers
         return {name: np.concatenate([band.layers[name] for band in made]) for name in names}
 
@@ -112,7 +114,7 @@ def test_tiles_cover_every_pixel_once_and_end_small(width, height, side, samples
 
 
 def only_once(*steps):
-    return Plan((), (), steps, (), {}, {})
+    return Plan(None, (), None, steps, ())
 
 
 def test_what_does_not_need_each_other_is_made_at_once():
@@ -124,7 +126,7 @@ def test_what_does_not_need_each_other_is_made_at_once():
         Node("d", lambda b, c: b + c, {"b": "b", "c": "c"}),
     )
     tally = RenderStats()
-    assert list(run_once(steps, tally, threads=2).items()) == [("a", 1), ("b", 2), ("c", 3), ("d", 5)]
+    assert list(run_once(steps, Run(tally, threads=2)).items()) == [("a", 1), ("b", 2), ("c", 3), ("d", 5)]
     assert set(tally.seconds) == set("abcd")
 
 
@@ -143,7 +145,7 @@ def test_of_several_faults_the_plans_first_is_told():
 
     steps = only_once(Node("a", first, {}), Node("b", second, {}), Node("c", len, {"b": "b"}))
     with pytest.raises(InputError, match="first"):
-        run_once(steps, RenderStats(), threads=2)
+        run_once(steps, Run(threads=2))
     assert order == ["second", "first"]
 
 
@@ -185,9 +187,9 @@ outputs: {layers: [beauty, lights, object_id, material_id, depth]}
             own = own.replace(word, name)
         (tmp_path / "s.yaml").write_text(own)
         loaded = load(tmp_path / "s.yaml")
-        steps = plan(loaded.scene, loaded)
-        (band,) = bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats())
-        made.append([band.layers[layer.name] for layer in steps.layers])
+        steps = planned(loaded)
+        (band,) = bands(steps, run_once(steps, Run()), Run(threads=1))
+        made.append([band.layers[layer.name] for layer in steps.outputs])
     for a, b in zip(*made, strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -199,7 +201,7 @@ def test_a_file_without_suffix_is_not_taken_for_a_mesh_of_that_name(tmp_path):
     (tmp_path / "ball").write_text("")
     loaded = load(tmp_path / "s.yaml")
     with pytest.raises(InputError, match="ball"):
-        run_once(plan(loaded.scene, loaded), RenderStats())
+        run_once(planned(loaded), Run())
 
 
 def test_layers_add_up_to_the_beauty(whole):
@@ -240,21 +242,21 @@ def test_what_a_layer_does_not_reach_is_not_run(tmp_path):
     path = tmp_path / "s.yaml"
     path.write_text(SCENE)
     loaded = load(path)
-    p = plan(loaded.scene, loaded, ["depth"])
+    p = planned(loaded, ["depth"])
     made = {step.output for step in (*p.once, *p.tile)}
     assert not made & {"corner_normals", "points", "shadow:key", "obscurance", "incident:key", "uvs"}
-    assert p.skipped["shadow:sun"] == "the light casts no shadows"
-    assert p.expected_rays == {"primary": 83 * 61 * 3}
+    assert why_not(p.graph, p.outputs)["shadow:sun"] == "the light casts no shadows"
+    assert expected_rays(p.graph.scene, [p.view], p.computed) == {"primary": 83 * 61 * 3}
 
 
 def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
     path = tmp_path / "s.yaml"
     path.write_text(SCENE)
     loaded = load(path, ["lights.key.intensity=0", "ambient=0", "obscurance=null"])
-    p = plan(loaded.scene, loaded)
+    p = planned(loaded)
     made = {step.output for step in p.tile}
     assert not made & {"incident:key", "shadow:key", "obscurance", "ambient"}
-    assert p.skipped["shadow:key"] == "the light's intensity is 0"
+    assert why_not(p.graph, p.outputs)["shadow:key"] == "the light's intensity is 0"
     assert "incident:rim" in made
 
 
@@ -270,9 +272,9 @@ def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
 )
 def test_worked_examples_of_the_texts(root, scene, overrides, value):
     loaded = load(root / "scenes" / f"{scene}.yaml", overrides)
-    steps = plan(loaded.scene, loaded)
+    steps = planned(loaded)
     tally = RenderStats()
-    made = list(bands(steps, run_once(steps, tally), steps.views[0], 1, tally))
+    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=1)))
     beauty = np.concatenate([band.layers["beauty"] for band in made])
     centre = beauty[beauty.shape[0] // 2, beauty.shape[1] // 2]
     np.testing.assert_allclose(centre, value, rtol=1e-6)
@@ -292,9 +294,9 @@ lights: [{light: directional, direction: [0, -1, 0], irradiance: 2}]
 """
     )
     loaded = load(path)
-    steps = plan(loaded.scene, loaded)
+    steps = planned(loaded)
     tally = RenderStats()
-    (band,) = bands(steps, run_once(steps, tally), steps.views[0], 1, tally)
+    (band,) = bands(steps, run_once(steps, Run(tally)), Run(tally, threads=1))
     np.testing.assert_allclose(band.layers["beauty"], 0.3 * 0.5 + 0.4 * 2 + 2, rtol=1e-6)
 
 
@@ -316,8 +318,9 @@ def test_the_plan_says_that_w_is_taken_about_geometric_normals(tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE)
     loaded = load(path, ("obscurance.about=geometric",))
-    said = plan(loaded.scene, loaded, ["obscurance"]).skipped["obscurance_normals"]
-    assert said == "the hemispheres of obscurance stand about the polygons' own normals"
+    p = planned(loaded, ["obscurance"])
+    why = why_not(p.graph, p.outputs)["obscurance_normals"]
+    assert why == "the hemispheres of obscurance stand about the polygons' own normals"
 
 
 def test_a_coarse_smooth_ball_alone_is_open_exactly(picture):

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.sampled import sampled_layer
+from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store, default_folder
 from illumcli.commands import plan as plan_job
-from illumcli.commands.render import run
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.commands.sweep import sweep_scene
 from illumcli.errors import InputError
 from illumcli.images.reader import read_image
 from illumcli.rays.camera import MARGIN
-from illumcli.render_graph.cached import Artifacts
-from illumcli.render_graph.execute import RenderStats
-from illumcli.render_graph.framing import framed
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.build import build
+from illumcli.render_graph.execute import Run
+from illumcli.render_graph.framing import place_cameras
 from illumcli.scene.load import load
 from illumcli.scene.variants import variants_of
 
@@ -54,7 +54,7 @@ def rows_and_columns(path, number=1):
 
 @pytest.mark.parametrize("more", [[], ["camera.fov=70"], ["camera={projection: orthographic, fit: rod}"]])
 def test_all_of_the_object_is_in_the_picture_and_fills_it(scene, more):
-    (path,), _ = run(scene, more, cache=False)
+    (path,), _ = render_scene(RenderJob(scene, RenderOptions(more, cache=False)))
     rows, columns = rows_and_columns(path)
     assert rows[0] in (1, 2, 3)
     assert rows[1] in (36, 37, 38)
@@ -69,34 +69,33 @@ def test_several_cameras_are_each_placed(scene):
             "fov: 30}", "fov: 30}, plain: {position: [7, 0, 9], target: [7, 0, 0]}}"
         )
     )
-    wide, plain = run(scene, cache=False)[0]
+    wide, plain = render_scene(RenderJob(scene, RenderOptions(cache=False)))[0]
     assert rows_and_columns(wide)[0][0] in (0, 1)
     assert read_image(plain).width == 60
 
 
 def test_an_object_that_nobody_sees_is_left_out_of_the_placed_view(scene):
-    _, report = run(scene, ["ambient=0"], cache=False)
+    _, report = render_scene(RenderJob(scene, RenderOptions(["ambient=0"], cache=False)))
     assert report.skipped["object:far"]
 
 
 def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
     words = ["film.width=600", "film.height=400", "film.samples=4"]
-    cold = json.loads(plan_job.run(scene, words, as_json=True))
+    cold = json.loads(plan_job.plan_scene(scene, words, as_json=True))
     assert "hits" not in cold[0]["reused"]
-    run(scene, words)
-    warm = json.loads(plan_job.run(scene, words, as_json=True))
+    render_scene(RenderJob(scene, RenderOptions(words)))
+    warm = json.loads(plan_job.plan_scene(scene, words, as_json=True))
     assert "hits" in warm[0]["reused"]
     assert "camera:main" not in warm[0]["skipped"]
     loaded = load(scene, words)
-    made = plan(loaded.scene, loaded)
-    store = Store(default_folder(), 1 << 30)
-    placed = framed(made, Artifacts(store), RenderStats(), at_hand=True).views[0].camera
-    assert placed == framed(made, Artifacts(), RenderStats()).views[0].camera
+    graph = build(loaded.scene, loaded)
+    run_ = Run(cache=Cache(Store(default_folder(), 1 << 30)))
+    assert placed_camera(graph, run_, only_cached=True) == placed_camera(graph, Run())
 
 
 def test_a_sweep_places_its_cameras(scene, tmp_path):
     variants = variants_of(["camera.fov=10,50"])
-    done = sweep_scene(scene, variants, Settings(pattern="{camera.fov}.exr", cache=False))
+    done = sweep_scene(scene, variants, RenderOptions(pattern="{camera.fov}.exr", cache=False))
     assert [outcome.error for outcome in done.outcomes] == [None, None]
     for name in ("10", "50"):
         rows, _ = rows_and_columns(tmp_path / f"{name}.exr")
@@ -106,12 +105,16 @@ def test_a_sweep_places_its_cameras(scene, tmp_path):
 def test_a_view_that_is_measured_is_placed_too(scene):
     loaded = load(scene)
     own = sampled_layer(loaded, "beauty")
-    assert own.view.camera == framed(plan(loaded.scene, loaded), Artifacts(), RenderStats()).views[0].camera
+    assert own.view.camera == placed_camera(build(loaded.scene, loaded), Run())
 
 
 def test_fit_names_an_object(scene):
     with pytest.raises(InputError, match=r"s.yaml:4:56: camera.fit: no object 'rodd'; did you mean 'rod'\?"):
         load_with(scene, "fit: rod,", "fit: rodd,")
+
+
+def placed_camera(graph, run_, only_cached=False):
+    return place_cameras(graph, run_, only_cached).views[0].camera
 
 
 def load_with(path, old, new):

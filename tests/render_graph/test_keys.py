@@ -13,7 +13,7 @@ import pytest
 import illumcli
 from illumcli.graph import Node, short_name
 from illumcli.render_graph import keys as module
-from illumcli.render_graph.build import recipes
+from illumcli.render_graph.build import build
 from illumcli.render_graph.keys import SOURCES, Keys, source_files
 from illumcli.scene.load import load
 
@@ -61,7 +61,7 @@ def nodes() -> list[Node]:
     found = []
     for path in SCENES:
         loaded = load(path)
-        found += recipes(loaded.scene, loaded).values()
+        found += build(loaded.scene, loaded).nodes.values()
     assert len(found) > 500
     return found
 
@@ -101,7 +101,7 @@ def test_names_tell_functions_apart(nodes):
 def test_a_function_that_moves_keeps_its_keys(nodes, monkeypatch):
     def key() -> str:
         loaded = load(SCENES[0])
-        return Keys(recipes(loaded.scene, loaded), None, "salt")("beauty")
+        return Keys(build(loaded.scene, loaded).nodes, None, "salt")("beauty")
 
     first = key()
     for node in nodes:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
+from planned import planned
 
 RATES = ("constant", "gouraud", "phong", "quadratic")
 SCENE = """
@@ -31,9 +31,9 @@ def picture(folder, mesh, rate, *layers):
     (folder / "a.ply").write_text(mesh)
     (folder / "scene.yaml").write_text(SCENE.format(rate=rate))
     loaded = load(folder / "scene.yaml")
-    steps = plan(loaded.scene, loaded, layers)
+    steps = planned(loaded, layers)
     tally = RenderStats()
-    made = list(bands(steps, run_once(steps, tally), steps.views[0], 1, tally))
+    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=1)))
     return {name: np.concatenate([band.layers[name] for band in made]) for name in layers}
 
 
@@ -113,8 +113,8 @@ def test_the_winding_alone_says_where_computed_normals_point(tmp_path):
     scene = SCENE.format(rate="phong").replace("file: a.ply", "file: a.ply, normals: {source: computed}")
     (tmp_path / "scene.yaml").write_text(scene)
     loaded = load(tmp_path / "scene.yaml")
-    steps = plan(loaded.scene, loaded, ("normal", "geometric_normal"))
-    made = list(bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats()))
+    steps = planned(loaded, ("normal", "geometric_normal"))
+    made = list(bands(steps, run_once(steps, Run()), Run(threads=1)))
     n, ng = (np.concatenate([band.layers[name] for band in made]) for name in ("normal", "geometric_normal"))
     seen = np.linalg.norm(ng, axis=-1) > 0.99
     np.testing.assert_allclose(n[seen], ng[seen], atol=1e-5)

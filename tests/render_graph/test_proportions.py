@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.commands.render import run
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.commands.sweep import sweep_scene
 from illumcli.scene.variants import variants_of
 
@@ -28,7 +28,9 @@ def told(tmp_path, monkeypatch):
     def lines(text, *overrides, only=()):
         path = tmp_path / "s.yaml"
         path.write_text(text)
-        return run(path, overrides, "s.exr", only, force=True, cache=False)[1].warnings
+        return render_scene(
+            RenderJob(path, RenderOptions(overrides, "s.exr", only, force=True, cache=False))
+        )[1].warnings
 
     return lines
 
@@ -80,7 +82,7 @@ def test_what_is_small_in_the_picture_is_not_told(told):
 def test_a_sweep_says_it_once(told, tmp_path):
     (tmp_path / "s.yaml").write_text(sized(1e6))
     done = sweep_scene(
-        tmp_path / "s.yaml", variants_of(["seed=1,2,3"]), Settings(pattern="{seed}.exr", cache=False)
+        tmp_path / "s.yaml", variants_of(["seed=1,2,3"]), RenderOptions(pattern="{seed}.exr", cache=False)
     )
     assert len(done.warnings) == 1
     assert np.isfinite(done.seconds)

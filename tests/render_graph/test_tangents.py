@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
+from planned import planned
 
 SCENE = """
 version: 1
@@ -28,9 +28,9 @@ def highlight(tmp_path):
         path = tmp_path / "scene.yaml"
         path.write_text(SCENE.format(more=more, mesh=mesh))
         loaded = load(path)
-        steps = plan(loaded.scene, loaded)
-        shared = run_once(steps, RenderStats())
-        parts = [band.layers["beauty"] for band in bands(steps, shared, steps.views[0], 1, RenderStats())]
+        steps = planned(loaded)
+        shared = run_once(steps, Run())
+        parts = [band.layers["beauty"] for band in bands(steps, shared, Run(threads=1))]
         return np.concatenate(parts)[..., 0]
 
     return render
@@ -99,7 +99,7 @@ def test_a_grain_costs_no_uv(tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE.format(more="grain: [1, 0, 0]", mesh=DISC))
     loaded = load(path)
-    steps = plan(loaded.scene, loaded)
+    steps = planned(loaded)
     assert "uv_tangents" not in {step.output for step in steps.once}
     path.write_text(
         SCENE.format(more="grain: [1, 0, 0]", mesh=DISC)
@@ -108,4 +108,4 @@ def test_a_grain_costs_no_uv(tmp_path):
         .replace(", specular: 0.3,", "")
     )
     loaded = load(path)
-    assert "t" not in {step.output for step in plan(loaded.scene, loaded).tile}
+    assert "t" not in {step.output for step in planned(loaded).tile}

@@ -9,18 +9,20 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from illumcli.cache import policy
+from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
-from illumcli.commands.render import run
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.commands.sweep import sweep_scene
 from illumcli.geometry.bounds import object_bounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.layers import NAMES
-from illumcli.render_graph import cached as policy
-from illumcli.render_graph.cached import Artifacts
-from illumcli.render_graph.culling import unseen_objects, why_all, without
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan, reusing
+from illumcli.render_graph.build import build
+from illumcli.render_graph.culling import why_all
+from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.pipeline import place_and_cull, plan_view
+from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
 from illumcli.scene.variants import variants_of
 from illumcli.visibility.culling import (
@@ -63,21 +65,19 @@ def scene(tmp_path):
 def pictures(path, overrides=(), only=ALL, leave_out=True, store=None):
     """Layers of every view, the names left out, and the triangles that were traced."""
     loaded = load(path, overrides)
-    made = plan(loaded.scene, loaded, only)
-    first = Artifacts(store)
-    numbers = unseen_objects(made, first, RenderStats()) if leave_out else ()
+    outputs = outputs_of(loaded.scene, only)
+    graph, run = build(loaded.scene, loaded), Run(cache=Cache(store))
+    graph = place_and_cull(graph, outputs, run) if leave_out else graph
     out = {}
-    for view in made.views:
-        artifacts = Artifacts(store, made=first.made)
-        narrowed = reusing(without(made, loaded, numbers), view, artifacts)
-        tally = RenderStats()
-        shared = run_once(narrowed, tally, artifacts)
-        parts = list(bands(narrowed, shared, view, 1, tally, artifacts=artifacts))
+    for view in graph.views:
+        plan = plan_view(graph, outputs, view, run.cache)
+        shared = run_once(plan, run)
+        parts = list(bands(plan, shared, run))
         for name in parts[0].layers:
             out[view.name, name] = np.concatenate([part.layers[name] for part in parts])
     names = loaded.scene.object_names()
     triangles = len(shared["geometry"].triangles) if "geometry" in shared else None
-    return out, [names[number] for number in numbers], triangles
+    return out, [names[number] for number in graph.culled], triangles
 
 
 def same(a, b):
@@ -123,7 +123,8 @@ def test_a_depth_alone_needs_nothing_that_only_shadows(scene):
 def test_numbers_of_triangles_need_all_objects(scene):
     assert pictures(scene, only=["triangle_id"])[1] == []
     loaded = load(scene)
-    assert why_all(plan(loaded.scene, loaded, ["triangle_id"])).startswith("triangle_id")
+    graph, outputs = build(loaded.scene, loaded), outputs_of(loaded.scene, ["triangle_id"])
+    assert why_all(graph, outputs).startswith("triangle_id")
 
 
 def test_an_object_is_kept_that_one_of_several_views_sees(scene):
@@ -165,30 +166,30 @@ def test_of_many_objects_those_out_of_sight_are_left_out(scene):
 
 def test_the_job_counts_and_names_them(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    _, report = run(scene, pattern="few.png", cache=False)
+    _, report = render_scene(RenderJob(scene, RenderOptions(pattern="few.png", cache=False)))
     assert report.spared["polygons"] == 24 * 12 + 96 * 48
     assert {name for name in report.skipped if name.startswith("object:")} == {"object:away", "object:behind"}
-    _, whole = run(scene, pattern="all.png", cache=False, strict=True)
+    _, whole = render_scene(RenderJob(scene, RenderOptions(pattern="all.png", cache=False, strict=True)))
     assert "polygons" not in whole.spared
     assert (tmp_path / "few.png").read_bytes() == (tmp_path / "all.png").read_bytes()
 
 
 def test_a_sweep_shares_what_remains(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = sweep_scene(scene, variants_of(["materials.red.exponent=3,9,27"]), Settings(cache=False))
+    done = sweep_scene(scene, variants_of(["materials.red.exponent=3,9,27"]), RenderOptions(cache=False))
     rays = [sum(outcome.report.rays.values()) for outcome in done.outcomes]
     assert rays[0] > 0
     assert rays[1:] == [0, 0]
 
 
 def test_the_plan_tells_them_once_their_boxes_are_known(scene, tmp_path, monkeypatch):
-    from illumcli.commands.plan import run as told
+    from illumcli.commands.plan import plan_scene as told
 
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
     monkeypatch.setattr(policy, "worth", lambda seconds, size: True)
     (cold,) = json.loads(told(scene, as_json=True))
     assert "known once" in cold["objects"]
-    run(scene, pattern=str(tmp_path / "a.png"))
+    render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "a.png"))))
     (warm,) = json.loads(told(scene, as_json=True))
     assert "object:away" in warm["skipped"]
     assert "hits" in warm["reused"]

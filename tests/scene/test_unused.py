@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
-from illumcli.render_graph.execute import RenderStats, bands, run_once
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.repairs import repairs
-from illumcli.render_graph.schedule import plan
 from illumcli.scene.load import load, unused_lines
+from planned import planned
 
 BASE = """version: 1
 film: {width: 9, height: 8, samples: 2}
@@ -92,8 +92,8 @@ def lines(loaded):
 
 
 def pixels(loaded):
-    steps = plan(loaded.scene, loaded)
-    made = bands(steps, run_once(steps, RenderStats()), steps.views[0], 1, RenderStats())
+    steps = planned(loaded)
+    made = bands(steps, run_once(steps, Run()), Run(threads=1))
     return np.concatenate([band.layers["beauty"] for band in made])
 
 
@@ -163,7 +163,7 @@ def test_an_override_of_materials_that_a_mesh_selects_is_told(scene):
 def test_what_only_the_mesh_can_tell_is_told_too(scene, overrides, expected):
     loaded = scene(overrides)
     (loaded.folder / "n.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n")
-    found = repairs(run_once(plan(loaded.scene, loaded), RenderStats()))
+    found = repairs(run_once(planned(loaded), Run()))
     assert {
         what: each.first for what, each in found.items() if what in (NORMALS_OF_FILE, NO_GRAIN)
     } == expected

@@ -8,19 +8,20 @@ import struct
 import numpy as np
 import pytest
 
+from illumcli.cache import policy as artifacts
 from illumcli.color import from_srgb
 from illumcli.commands.check import check_scenes
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair
 from illumcli.images.writer import ImageWriter
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar
-from illumcli.render_graph import cached as artifacts
-from illumcli.render_graph.execute import RenderStats, bands, run_once
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
 from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
+from planned import planned
 
 F = np.float32
 FOUR = np.array([[[1.0], [2.0]], [[3.0], [4.0]]], F)  # the row of 3 and 4 is the bottom one
@@ -144,9 +145,9 @@ def scene(tmp_path):
 def picture():
     def render(path, *only, side=None, overrides=()):
         loaded = load(path, overrides)
-        steps = plan(loaded.scene, loaded, only)
-        shared = run_once(steps, RenderStats())
-        made = list(bands(steps, shared, steps.views[0], 1, RenderStats(), side=side))
+        steps = planned(loaded, only)
+        shared = run_once(steps, Run())
+        made = list(bands(steps, shared, Run(threads=1), side=side))
         layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
         repairs = {}
         for buffer in shared.values():
@@ -291,7 +292,7 @@ def test_what_a_mesh_lacks_is_said_before_anything_is_rendered(scene, tmp_path, 
     (tmp_path / "sheet.ply").write_text(PLY)
     loaded = load(scene(material, mesh))
     with pytest.raises(InputError, match="object") as caught:
-        run_once(plan(loaded.scene, loaded), RenderStats())
+        run_once(planned(loaded), Run())
     assert caught.value.problems == (said,)
 
 
@@ -299,7 +300,7 @@ def test_a_missing_texture_is_named_with_its_place(scene, print_):
     path = scene("{model: lambert, diffuse: {texture: prnt.png}}")
     loaded = load(path)
     with pytest.raises(InputError, match=r"scene.yaml:7:\d+: .*prnt.png; did you mean 'print.png'"):
-        run_once(plan(loaded.scene, loaded), RenderStats())
+        run_once(planned(loaded), Run())
     assert check_scenes([path]).problems
 
 
@@ -316,7 +317,7 @@ def test_a_missing_texture_is_named_with_its_place(scene, print_):
 )
 def test_images_are_read_only_for_what_is_made(scene, print_, only, material, read):
     loaded = load(scene(material))
-    steps = plan(loaded.scene, loaded, only)
+    steps = planned(loaded, only)
     assert [step.output for step in steps.once if step.output.endswith("_textures")] == read
 
 
@@ -394,12 +395,12 @@ def test_a_folder_that_was_copied_has_its_own_textures(own, tmp_path, monkeypatc
     monkeypatch.setattr(artifacts, "worth", lambda seconds, size: True)
     write_image(tmp_path / "print.png", np.full((2, 2, 3), 200))
     scene = own("newmtl m\nmap_Kd print.png\n")
-    first, _ = run(scene, pattern=str(tmp_path / "first.png"))
+    first, _ = render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "first.png"))))
     copy = tmp_path / "copy"
     copy.mkdir()
     for name in ("own.obj", "own.mtl", "own.yaml", "print.png"):
         (tmp_path / name).rename(copy / name)
-    again, report = run(copy / "own.yaml", pattern=str(copy / "again.png"))
+    again, report = render_scene(RenderJob(copy / "own.yaml", RenderOptions(pattern=str(copy / "again.png"))))
     assert "store" in {where for reused in report.reused.values() for where in reused.values()}
     assert again[0].read_bytes() == first[0].read_bytes()
 

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from illumcli.commands.render import run
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_scene
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.scene_geometry import place_meshes, scene_normals
@@ -66,7 +67,12 @@ def picture(tmp_path):
             **scene,
         }
         (tmp_path / "scene.yaml").write_text(json.dumps(said))
-        run(tmp_path / "scene.yaml", pattern=str(tmp_path / "out.exr"), cache=False, force=True)
+        render_scene(
+            RenderJob(
+                tmp_path / "scene.yaml",
+                RenderOptions(pattern=str(tmp_path / "out.exr"), cache=False, force=True),
+            )
+        )
         return read_image(tmp_path / "out.exr").channels
 
     return render

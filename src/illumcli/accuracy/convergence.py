@@ -12,7 +12,7 @@ from illumcli import __version__
 from illumcli.accuracy.curves import Curve, Run, curve_through, point_of, rmse_of
 from illumcli.accuracy.reference import Reference, Vary, reference_image, run_content
 from illumcli.accuracy.sampled import SampledLayer, Sampling, sampled_layer
-from illumcli.commands.render import opened_store, versions
+from illumcli.cache.store import open_store
 from illumcli.errors import InputError
 from illumcli.progress import Progress, no_progress
 from illumcli.rays.sampling import stream
@@ -20,6 +20,7 @@ from illumcli.records import Value
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
+from illumcli.versions import versions
 from illumcli.visibility.samplers import SAMPLERS
 
 IMAGES = 5
@@ -122,7 +123,7 @@ def measure_convergence(
     planned([contents[key] for key in in_order])
 
     # the images and their errors
-    truth, reference = reference_image(layer, finest, vary, opened_store() if settings.cache else None)
+    truth, reference = reference_image(layer, finest, vary, open_store() if settings.cache else None)
     runs: dict[RunKey, Run] = {}
     total, done = settings.repeats * sum(map(_cost, levels)), 0
     for repeat, seed in enumerate(seeds):
@@ -195,8 +196,8 @@ def _cost(sampling: Sampling) -> int:
 
 def _refuse_unvaried(layer: SampledLayer, vary: Vary) -> None:
     """Raise InputError for a layer that does not depend on what is varied."""
-    steps, _ = layer.planned(Sampling(1, 1, "spiral", 0))
-    if vary == "obscurance" and "obscurance" not in {step.output for step in steps.tile}:
+    plan = layer.planned(Sampling(1, 1, "spiral", 0))
+    if vary == "obscurance" and "obscurance" not in plan.buffers:
         raise InputError(
             f"layer '{layer.layer.name}' casts no obscurance ray; use --vary pixels or another --layer"
         )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.accuracy.sampled import SampledLayer, Sampling
-from illumcli.cache.fingerprint import digest
+from illumcli.cache.fingerprint import digest, fingerprint
 from illumcli.cache.store import Store
 from illumcli.rays.sampling import stream
 from illumcli.records import Value
@@ -75,5 +75,5 @@ def run_content(layer: SampledLayer, sampling: Sampling, finest: Sampling, vary:
 
 def image_key(layer: SampledLayer, sampling: Sampling) -> tuple[str, str]:
     """What the image of a layer at a sampling depends on."""
-    steps, view = layer.planned(sampling)
-    return Keys(steps.book, view, code())(layer.layer.buffer), repr(view)
+    plan = layer.planned(sampling)
+    return Keys(plan.graph.nodes, plan.view, code())(layer.layer.buffer), fingerprint(plan.view)

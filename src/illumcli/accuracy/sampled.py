@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.film.view import View
-from illumcli.graph import topological_order
+from illumcli.graph import Node
 from illumcli.layers import Layer
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import recipes
-from illumcli.render_graph.execute import RenderStats, at_pixels, bands
+from illumcli.render_graph.build import build, views
+from illumcli.render_graph.execute import Run, at_pixels, bands
 from illumcli.render_graph.framing import placed
-from illumcli.render_graph.schedule import Plan, plan
+from illumcli.render_graph.limits import refuse_rays
+from illumcli.render_graph.schedule import Plan, outputs_of, schedule
 from illumcli.scene.load import SceneFile
 from illumcli.scene.spec import Scene
 
@@ -56,40 +57,44 @@ class SampledLayer(Record):
         """The same from another view, all of whose pixels get all samples."""
         if view.camera.fit is not None:
             name = f"camera:{view.name}"
-            for step in topological_order(recipes(self.scene, self.loaded), [name]):
-                if step.output not in self.shared:
-                    self.shared[step.output] = step.run(self.shared)
+            self._compute(build(self.scene, self.loaded).topological_order([name]))
             view = placed(view, self.shared[name])
         return replace(self, view=replace(view, adaptive=None))
 
-    def planned(self, sampling: Sampling) -> tuple[Plan, View]:
-        """The plan and the view at a sampling, all that no tile changes being made."""
+    def _compute(self, nodes: Iterable[Node]) -> None:
+        """Compute what is not shared yet."""
+        for node in nodes:
+            if node.output not in self.shared:
+                self.shared[node.output] = node.run(self.shared)
+
+    def planned(self, sampling: Sampling) -> Plan:
+        """The plan at a sampling; the buffers of the whole scene are computed."""
         update: dict[str, Any] = {"seed": sampling.seed}
         if self.scene.obscurance is not None:
             finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
             update["obscurance"] = self.scene.obscurance.replaced(**finer)
-        steps = plan(self.scene.replaced(**update), self.loaded, [self.layer.name])
-        for step in steps.once:
-            if step.output not in self.shared:
-                self.shared[step.output] = step.run(self.shared)
-        return steps, replace(self.view, samples=sampling.pixel)
+        graph = build(self.scene.replaced(**update), self.loaded)
+        outputs = outputs_of(graph.scene, [self.layer.name])
+        refuse_rays(graph, outputs)
+        plan = schedule(graph, outputs, replace(self.view, samples=sampling.pixel))
+        self._compute(plan.once)
+        return plan
 
     def render(self, sampling: Sampling) -> tuple[NDArray[np.float32], int, float]:
         """(H, W, channels) the layer at a sampling, the rays it took, and the seconds."""
-        steps, view = self.planned(sampling)
-        tally, start = RenderStats(), time.perf_counter()
-        rows = [band.layers for band in bands(steps, self.shared, view, self.threads, tally)]
+        plan, run = self.planned(sampling), Run(threads=self.threads)
+        start = time.perf_counter()
+        rows = [band.layers for band in bands(plan, self.shared, run)]
         seconds = time.perf_counter() - start
-        return np.concatenate([row[self.layer.name] for row in rows]), sum(tally.rays.values()), seconds
+        return np.concatenate([row[self.layer.name] for row in rows]), sum(run.stats.rays.values()), seconds
 
     def render_pixels(
         self, sampling: Sampling, x: NDArray[np.int64], y: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], int]:
         """(K, channels) the layer at K pixels, and the rays it took."""
-        steps, view = self.planned(sampling)
-        tally = RenderStats()
-        made = at_pixels(steps, self.shared, view, x, y, self.threads, tally)
-        return made[self.layer.name].astype(np.float64), sum(tally.rays.values())
+        run = Run(threads=self.threads)
+        layers = at_pixels(self.planned(sampling), self.shared, run, x, y)
+        return layers[self.layer.name].astype(np.float64), sum(run.stats.rays.values())
 
     def random_pixels(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Columns and rows of `count` pixels drawn at random; of all of them where they are fewer."""
@@ -122,15 +127,15 @@ def sampled_layer(
     InputError
         No such layer, or one without error; no such camera.
     """
-    steps = plan(loaded.scene, loaded, [name])
-    view = chosen_view(steps.views, camera)
-    if len(steps.layers) != 1 or steps.layers[0].data:
+    outputs = outputs_of(loaded.scene, [name])
+    view = chosen_view(views(loaded.scene), camera)
+    if len(outputs) != 1 or outputs[0].data:
         raise InputError(
             f"layer '{name}' is no mean of a pixel's samples; take beauty, ambient, obscurance or one light"
         )
     if width is not None and view.width > width:
         view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))
-    layer = SampledLayer(loaded, view, steps.layers[0], threads or len(os.sched_getaffinity(0)))
+    layer = SampledLayer(loaded, view, outputs[0], threads or len(os.sched_getaffinity(0)))
     return layer.seen_by(view)
 
 

@@ -22,8 +22,9 @@ from illumcli.accuracy.sampled import SampledLayer, Sampling, sampled_layer
 from illumcli.errors import InputError, LimitError
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import views
-from illumcli.render_graph.schedule import plan
+from illumcli.render_graph.build import build
+from illumcli.render_graph.limits import refuse_rays
+from illumcli.render_graph.schedule import outputs_of, reached
 from illumcli.scene.load import load
 
 PIXELS, SHARE = 4000, 50
@@ -132,16 +133,17 @@ def choose_sampling(
     loaded = load(path, overrides)
     if seed is not None:
         loaded = replace(loaded, scene=loaded.scene.replaced(seed=seed))
-    steps = plan(loaded.scene, loaded, only)
-    means = [layer for layer in steps.layers if not layer.data]
+    graph, outputs = build(loaded.scene, loaded), outputs_of(loaded.scene, only)
+    refuse_rays(graph, outputs)
+    means = [layer for layer in outputs if not layer.data]
     if not means:
         raise InputError(
             f"{path}: no layer asked for is a mean of samples; --target-error has nothing to reach"
         )
     layer = min(means, key=lambda layer: layer.buffer != "beauty")
     first = sampled_layer(loaded, layer.name, threads)
-    layers = tuple(map(first.seen_by, views(loaded.scene)))
-    has_rays = "obscurance" in {step.output for step in steps.tile} and loaded.scene.obscurance is not None
+    layers = tuple(map(first.seen_by, graph.views))
+    has_rays = "obscurance" in reached(graph, outputs) and loaded.scene.obscurance is not None
 
     # counts of least cost by the pilots' laws, until pairs at these counts confirm them
     pilots = [Pilot(each, has_rays) for each in layers]

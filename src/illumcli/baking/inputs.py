@@ -21,11 +21,10 @@ from illumcli.errors import InputError
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import CornerVectors
-from illumcli.graph import topological_order
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph import stages
-from illumcli.render_graph.build import recipes
+from illumcli.render_graph.build import build
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs
 from illumcli.scene.load import SceneFile, load
@@ -115,7 +114,7 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The scene's placed meshes, the same as a render's, with the normals that obscurance is about; what was
     repaired."""
     buffers: dict[str, Any] = {}
-    for node in topological_order(recipes(scene, loaded), ["geometry", "corner_normals", "repairs"]):
+    for node in build(scene, loaded).topological_order(["geometry", "corner_normals", "repairs"]):
         buffers[node.output] = node.run(buffers)
     geometry, normals = buffers["geometry"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":

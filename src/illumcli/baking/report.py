@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from illumcli import __version__
-from illumcli.commands.render import peak_memory
 from illumcli.geometry.repairs import Repairs
+from illumcli.memory import peak_memory
 from illumcli.records import Record
 from illumcli.render_graph.repairs import repairs_data
 

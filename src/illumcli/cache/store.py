@@ -34,6 +34,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.errors import InputError
 from illumcli.files import atomic
 from illumcli.memory import free_memory
 from illumcli.records import Record, Value
@@ -551,6 +552,21 @@ def _write_at(file: BinaryIO, data: NDArray[np.uint8], at: int) -> None:
     while view:
         count = os.pwrite(file.fileno(), view, at)
         view, at = view[count:], at + count
+
+
+def open_store() -> Store | None:
+    """The store that the user's environment names; None for a user who has no home folder.
+
+    Raises
+    ------
+    InputError
+        ILLUM_CACHE_SIZE says no size.
+    """
+    folder = default_folder()
+    try:
+        return Store(folder, default_limit()) if folder is not None else None
+    except ValueError as error:
+        raise InputError(f"ILLUM_CACHE_SIZE: {error}; write it as 500M or 4G") from None
 
 
 def default_folder() -> Path | None:

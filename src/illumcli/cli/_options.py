@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 
 if TYPE_CHECKING:
-    from illumcli.commands.render_all import Settings as RenderOptions
+    from illumcli.commands.options import RenderOptions
     from illumcli.records import Value
 
 C = TypeVar("C", bound=Callable[..., Any])
@@ -209,6 +209,6 @@ def taken(record: type[R], options: dict[str, Any]) -> R:
 
 def render_options(options: dict[str, Any]) -> RenderOptions:
     """How scenes are rendered, of the options of a command."""
-    from illumcli.commands.render_all import Settings as RenderOptions
+    from illumcli.commands.options import RenderOptions
 
     return taken(RenderOptions, options)

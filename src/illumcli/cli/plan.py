@@ -27,7 +27,7 @@ def plan(scene: Path, overrides: tuple[str, ...], only: tuple[str, ...], as_json
       illum plan scenes/teapot.yaml
       illum plan scenes/teapot.yaml --only depth --json
     """
-    from illumcli.commands.plan import refuse_too_large, run
+    from illumcli.commands.plan import plan_scene, refuse_too_large
 
-    click.echo(run(scene, overrides, only, as_json, cache))
+    click.echo(plan_scene(scene, overrides, only, as_json, cache))
     refuse_too_large(scene, overrides)

@@ -28,8 +28,8 @@ from illumcli.cli._options import (
 from illumcli.cli._printing import print_paths, say, say_kept
 
 if TYPE_CHECKING:
+    from illumcli.commands.options import RenderOptions
     from illumcli.commands.render_all import Rendered
-    from illumcli.commands.render_all import Settings as RenderOptions
 
 
 @click.command()
@@ -78,7 +78,7 @@ def render(
         print_paths(done.paths)
         _say_report(done, quiet, verbose)
 
-    is_kept = job.run(scenes, options, report, reporter(quiet), written, say)
+    is_kept = job.render_scenes(scenes, options, report, reporter(quiet), written, say)
     if is_kept and not quiet:
         say_kept([report])
 

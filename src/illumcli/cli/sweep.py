@@ -29,7 +29,7 @@ from illumcli.cli._options import (
 from illumcli.cli._printing import print_paths, say, say_kept
 
 if TYPE_CHECKING:
-    from illumcli.commands.render_all import Settings as RenderOptions
+    from illumcli.commands.options import RenderOptions
     from illumcli.commands.sweep_files import SweepFiles
     from illumcli.commands.sweep_outcome import Outcome
     from illumcli.scene.variants import Variant

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from illumcli.commands.render import report_text
+from illumcli.commands.report import report_text
 from illumcli.errors import IllumError, known
 from illumcli.files.atomic import write_text
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix

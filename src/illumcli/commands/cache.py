@@ -6,8 +6,17 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from illumcli.cache.store import Entry, Pruned, Refused, Store, described, distrust, removed, size_of
-from illumcli.commands.render import opened_store
+from illumcli.cache.store import (
+    Entry,
+    Pruned,
+    Refused,
+    Store,
+    described,
+    distrust,
+    open_store,
+    removed,
+    size_of,
+)
 from illumcli.errors import InputError, OutputError
 from illumcli.records import Value
 
@@ -102,7 +111,7 @@ def refuse_stayed(stayed: Mapping[Path, str]) -> None:
 
 
 def _opened() -> Store:
-    store = opened_store()
+    store = open_store()
     if store is None:
         raise InputError("there is no home folder to keep anything in; name one by ILLUM_CACHE")
     if (fact := distrust(store.folder)) is not None:

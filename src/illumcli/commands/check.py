@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from illumcli.commands.render import prepared, refuse_too_large
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.work import refuse_too_large, work_of
 from illumcli.errors import InputError, LimitError
 from illumcli.records import Value
 from illumcli.scene.load import file_problems, load, unused_lines
@@ -39,7 +40,7 @@ def check_scenes(paths: Sequence[Path], overrides: Sequence[str] = ()) -> SceneC
             loaded = load(path, overrides)
             of_scene = file_problems(loaded)
             if not of_scene:
-                work = prepared(loaded)
+                work = work_of(RenderJob(path, RenderOptions(tuple(overrides))), loaded)
                 refuse_too_large(work, work.targets)
             outputs = loaded.scene.outputs
             unused += unused_lines(loaded, loaded.scene, outputs.layers, outputs.files)

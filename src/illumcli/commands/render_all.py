@@ -9,29 +9,13 @@ from pathlib import Path
 
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
-from illumcli.commands.render import Progress, Report, Work, prepared, run_prepared
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import render_prepared
+from illumcli.commands.report import Report
+from illumcli.commands.work import Work, prepared
 from illumcli.files.names import check_unique
+from illumcli.progress import Progress
 from illumcli.records import Value
-from illumcli.scene.load import load
-
-
-class Settings(Value):
-    """What all scenes are rendered with."""
-
-    overrides: tuple[str, ...] = ()
-    pattern: str | None = None
-    only: tuple[str, ...] = ()
-    seed: int | None = None
-    threads: int | None = None
-    target_error: float | None = None
-    force: bool = False
-    cache: bool = True
-    strict: bool = False
-    keep_going: bool = True
-
-    def prepared(self, scene: Path) -> Work:
-        """The scene loaded and planned."""
-        return prepared(load(scene, self.overrides), self.pattern, self.only, self.seed)
 
 
 class Rendered(Value):
@@ -44,9 +28,9 @@ class Rendered(Value):
     """What `target_error` chose, as `-D` has it."""
 
 
-def run(
+def render_scenes(
     scenes: Sequence[Path],
-    settings: Settings,
+    options: RenderOptions,
     report: Path | None,
     progress: Progress,
     written: Callable[[Rendered], None],
@@ -61,23 +45,23 @@ def run(
     IllumError
         At last, where any scene failed; at once, where files have one name or the report cannot be written.
     """
-    batch = Batch("scenes", len(scenes), settings.keep_going, tell)
+    batch = Batch("scenes", len(scenes), options.keep_going, tell)
     works: dict[int, Work] = {}
     whole = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
 
     # all that can be known before the first ray
     for number in batch.due():
         with batch.piece(number):
-            works[number] = work = settings.prepared(scenes[number])
-            work.due(settings.force)
+            works[number] = work = prepared(RenderJob(scenes[number], options))
+            work.due()
             names = [str(target.path) for target in work.targets]
-            whole.plan(number, digest((work.content, names, settings.target_error)))
+            whole.plan(number, digest((work.content, names, options.target_error)))
     check_unique([str(path) for path, _ in _files(works)])
-    whole.look(settings.force)
+    whole.look(options.force)
 
     for number in batch.due():
         with batch.piece(number):
-            done = _rendered(scenes[number], works.pop(number), settings, progress)
+            done = _rendered(works.pop(number), progress)
             whole.add(number, done.report.as_data())
             written(done)
     return whole.finish(batch)
@@ -90,22 +74,20 @@ def _files(works: dict[int, Work]) -> list[tuple[Path, str]]:
     )
 
 
-def _rendered(scene: Path, work: Work, settings: Settings, progress: Progress) -> Rendered:
-    """The scene rendered, with as many samples as the error that is asked for takes."""
+def _rendered(work: Work, progress: Progress) -> Rendered:
+    """A scene rendered, with as many samples as the error that is asked for takes."""
     start = time.perf_counter()
-    choice = None
-    if settings.target_error is not None:
+    job, options, choice = work.job, work.job.options, None
+    if options.target_error is not None:
         from illumcli.accuracy.target import choose_sampling
 
         choice = choose_sampling(
-            scene, settings.target_error, settings.overrides, settings.only, settings.seed, settings.threads
+            job.scene, options.target_error, options.overrides, options.only, options.seed, options.threads
         )
-        settings = replace(settings, overrides=(*settings.overrides, *choice.overrides))
-        work = settings.prepared(scene)
-    paths, report = run_prepared(
-        work, settings.pattern, settings.threads, settings.force, progress, settings.cache, settings.strict
-    )
+        overrides = (*options.overrides, *choice.overrides)
+        work = prepared(replace(job, options=replace(options, overrides=overrides)))
+    paths, report = render_prepared(work, progress)
     if choice is not None:
         report.error = choice.as_data()
     report.total_seconds = time.perf_counter() - start
-    return Rendered(scene, paths, report, choice.overrides if choice else ())
+    return Rendered(job.scene, paths, report, choice.overrides if choice else ())

@@ -7,23 +7,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from illumcli.cache.memory import MemoryCache
+from illumcli.cache.recorder import Cache
+from illumcli.cache.store import open_store
 from illumcli.commands.batch import Batch
-from illumcli.commands.render import Work, opened_store, prepared, rendered, unused_keys
-from illumcli.commands.render_all import Settings
+from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render import rendered
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome, SweepResult
+from illumcli.commands.work import Work, prepared, unused_keys
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress, no_progress
-from illumcli.render_graph.cached import Memory
-from illumcli.scene.load import load
 from illumcli.scene.variants import Variant
 
 
 def sweep_scene(
     path: Path,
     variants: Sequence[Variant],
-    settings: Settings | None = None,
+    options: RenderOptions | None = None,
     files: SweepFiles | None = None,
     progress: Progress = no_progress,
     written: Callable[[Outcome], None] = lambda outcome: None,
@@ -38,21 +40,21 @@ def sweep_scene(
     ------
     IllumError
         At the end, where any variant failed; before anything is rendered, where all failed, one did and
-        `settings` stop at the first, or what holds for all of them is wrong.
+        `options` stop at the first, or what holds for all of them is wrong.
     """
     start = time.perf_counter()
-    settings, files = settings or Settings(), files or SweepFiles()
-    batch = Batch("variants", len(variants), settings.keep_going, lambda text: None)
+    options, files = options or RenderOptions(), files or SweepFiles()
+    batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
     # faults that can be known before the first ray
-    outcomes = _prepared(path, variants, settings, batch, written)
-    if len(batch.failures) == len(variants) or (batch.failures and not settings.keep_going):
+    outcomes = _prepared(path, variants, options, batch, written)
+    if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
-    planned = plan_files(files, outcomes, settings.force)
+    planned = plan_files(files, outcomes, options.force)
 
     # the images
-    outcomes, warnings = _rendered(outcomes, settings, batch, progress, written)
+    outcomes, warnings = _rendered(outcomes, options, batch, progress, written)
     seconds = time.perf_counter() - start
 
     # the files about all of them
@@ -67,19 +69,21 @@ def sweep_scene(
 def _prepared(
     path: Path,
     variants: Sequence[Variant],
-    settings: Settings,
+    options: RenderOptions,
     batch: Batch,
     written: Callable[[Outcome], None],
 ) -> list[Outcome]:
     """Plan every variant that has no fault."""
-    pattern = settings.pattern or default_pattern(variants)
+    pattern = options.pattern or default_pattern(variants)
     refuse_equal_names(variants, pattern)
 
     def planned(outcome: Outcome) -> Outcome:
-        loaded = load(path, outcome.variant.overrides)
-        fields = {"frame": outcome.variant.frame}
-        work = prepared(loaded, pattern, settings.only, settings.seed, fields)
-        return replace(outcome, work=work, is_due=bool(work.due(settings.force)))
+        overrides = tuple(outcome.variant.overrides)
+        job = RenderJob(
+            path, replace(options, pattern=pattern, overrides=overrides), {"frame": outcome.variant.frame}
+        )
+        work = prepared(job)
+        return replace(outcome, work=work, is_due=bool(work.due()))
 
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
     return [_attempt(outcome, planned, batch, written) for outcome in outcomes]
@@ -87,14 +91,14 @@ def _prepared(
 
 def _rendered(
     outcomes: Sequence[Outcome],
-    settings: Settings,
+    options: RenderOptions,
     batch: Batch,
     progress: Progress,
     written: Callable[[Outcome], None],
 ) -> tuple[list[Outcome], list[str]]:
     """The outcomes with their reports, and warnings."""
-    store = opened_store() if settings.cache else None
-    memory = Memory()
+    store, memory = open_store() if options.cache else None, MemoryCache()
+    cache = Cache(store, memory)
     done = list(outcomes)
 
     # one variant after the other; buffers that the next one reads stay in memory
@@ -103,11 +107,7 @@ def _rendered(
 
         def images(outcome: Outcome, following: Work | None = following) -> Outcome:
             assert outcome.work is not None
-            report = rendered(
-                outcome.work, store, memory, settings.threads, settings.force, progress, settings.strict,
-                following,
-            )  # fmt: skip
-            outcome = replace(outcome, report=report)
+            outcome = replace(outcome, report=rendered(outcome.work, cache, progress, following))
             written(outcome)
             return outcome
 
@@ -116,7 +116,7 @@ def _rendered(
 
     # warnings of the scene hold in all variants, those of images in any
     works = [outcome.work for outcome in done if outcome.work]
-    warnings = _in_all([unused_keys(work, settings.pattern) for work in works])
+    warnings = _in_all([unused_keys(work) for work in works])
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
     warnings += dict.fromkeys(of_images)
     if store is not None:

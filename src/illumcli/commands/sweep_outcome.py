@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from illumcli.commands.render import Report, Work
+from illumcli.commands.report import Report
+from illumcli.commands.work import Work
 from illumcli.errors import IllumError
 from illumcli.records import Record
 from illumcli.scene.variants import Variant

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.cache.fingerprint import file_digest
-from illumcli.commands.render import Work, channels
 from illumcli.commands.sweep_outcome import Outcome
+from illumcli.commands.work import Work
 from illumcli.errors import InputError, OutputError
 from illumcli.records import Record, Value
 
@@ -79,7 +79,7 @@ def _variant_number(text: str, count: int, works: dict[int, Work]) -> int | None
 def _kind(work: Work) -> _Kind:
     """Of a variant's first image."""
     target = work.targets[0]
-    count = _channel_count(channels(work.scene, target))
+    count = _channel_count(work.development.channels(target))
     return _Kind(target.view.height, target.view.width, count, target.path.suffix.lower() == ".png")
 
 

@@ -46,6 +46,12 @@ Repairs: TypeAlias = Mapping[str, Repair]
 """Class -> how often and where."""
 
 
+class MeshRepairs(Value):
+    """What was wrong with meshes and put right or left out."""
+
+    repairs: Repairs
+
+
 def note(repairs: MutableMapping[str, Repair], what: str, first: str = "", count: int = 1) -> None:
     """Count `count` more of the class `what`; `first` is kept where it is the first of its class."""
     known = repairs.get(what)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
 from illumcli.film.view import View, depth, rays, samples, view_vectors
-from illumcli.graph import Node
+from illumcli.graph import Node, topological_order
 from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.lights import incident as light_at
 from illumcli.lights._base import Light
 from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
+from illumcli.records import Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.replicates import error_recipes
 from illumcli.scene.load import resolve
@@ -139,14 +141,46 @@ def active_lights(scene: Scene) -> dict[str, Light]:
     return {name: light for name, light in scene.named_lights().items() if sends(light)}
 
 
-def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str, Node]:
-    """Every buffer this scene could make, by name; `view` and `tile` are given.
+class Known(Value):
+    """A buffer of the whole scene that was computed or loaded before the graph is scheduled."""
 
-    The objects of the numbers `unseen` are left out of it, as far as nothing can tell.
+    value: Any
+    source: str = ""
+    """Where it was loaded from, `memory` or `store`; nothing if it was computed in this run."""
 
-    A recipe binds only those parts of the scene that its buffer depends on: they are what the buffer is known
-    by (`plan.keys`).
+
+class Graph(Value):
+    """All nodes of a scene, by the buffer that each computes, and the views that they may be asked for."""
+
+    scene: Scene
+    views: tuple[View, ...]
+    nodes: Mapping[str, Node] = field(repr=False)
+    known: Mapping[str, Known] = field(default_factory=dict, repr=False)
+    """Buffers that need no node any more."""
+    loaders: Mapping[str, Node] = field(default_factory=dict, repr=False)
+    """Nodes that load a buffer of one view instead of computing it."""
+    culled: tuple[int, ...] = ()
+    """Numbers of the objects that affect no view."""
+
+    def topological_order(self, buffers: Iterable[str]) -> list[Node]:
+        """The nodes that some buffers need, each after its inputs; loaders where there are some."""
+        return topological_order({**self.nodes, **self.loaders}, buffers, GIVEN)
+
+    def without_loaders(self) -> Graph:
+        """The graph before cached buffers were substituted."""
+        return replace(self, loaders={})
+
+
+def build(scene: Scene, loaded: Any) -> Graph:
+    """The graph of a scene. Reads no mesh, runs nothing.
+
+    A node binds only those parts of the scene that its buffer depends on: they are its key in the cache
+    (`render_graph.keys`). The buffers `view` and `tile` are given.
     """
+    return Graph(scene, tuple(views(scene)), _nodes(scene, loaded))
+
+
+def _nodes(scene: Scene, loaded: Any) -> dict[str, Node]:
     rate = rates(scene)
     wanted = reached_words(scene)
     smooth = {"normals": "corner_normals"} if set(rate) & set(SMOOTH) else {}
@@ -158,7 +192,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
     grains = tuple(thing.grain for thing in scene.objects)
     by_uv = {name: name for name in ("uv_tangents", "point_weights")} if None in grains else {}
     book = [
-        *_geometry(scene, loaded, rate, unseen),
+        *_geometry(scene, loaded, rate),
         Node.of(stages.uvs),
         Node.of(stages.polygon_centres),
         Node.of(stages.planar_polygons),
@@ -184,7 +218,7 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
             normals="corner_normals",
             **of_normals,
         ),
-        *_obscurance(scene, loaded, unseen),
+        *_obscurance(scene, loaded),
         Node.of(stages.ambient_color, **_varying(scene, "ambient")),
         Node.of(stages.emission, **_varying(scene, "emission")),
         Node.of(stages.alpha),
@@ -204,21 +238,19 @@ def recipes(scene: Scene, loaded: Any, unseen: tuple[int, ...] = ()) -> dict[str
         book += _light(name, light, eye, at_samples, implied)
     made = {recipe.output: recipe for recipe in [*book, *_sums(scene)]}
     counts = [view.samples for view in views(scene)]
-    made |= {f"camera:{view.name}": recipe for view, recipe in _framings(scene, unseen)}
+    made |= {f"camera:{view.name}": recipe for view, recipe in _framings(scene)}
     return made | error_recipes(made, scene.seed, scene.film.background, counts, GIVEN)
 
 
-def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Node]]:
+def _framings(scene: Scene) -> list[tuple[View, Node]]:
     """The views that an object is to fill, and what makes their cameras."""
     numbers = {name: number for number, name in enumerate(scene.object_names())}
-    every = "every_mesh" if unseen else "meshes"
     return [
         (
             view,
             Node.of(
                 partial(stages.framed, view.camera, view.width / view.height, numbers[view.camera.fit]),
                 f"camera:{view.name}",
-                meshes=every,
             ),
         )
         for view in views(scene)
@@ -226,12 +258,9 @@ def _framings(scene: Scene, unseen: tuple[int, ...]) -> list[tuple[View, Node]]:
     ]
 
 
-def _obscurance(scene: Scene, loaded: Any, unseen: tuple[int, ...]) -> list[Node]:
+def _obscurance(scene: Scene, loaded: Any) -> list[Node]:
     """w, by rays or from the files that its objects' meshes name."""
-    files = tuple(
-        (name, None if number in unseen else file)
-        for number, (name, file) in enumerate(baked_files(scene, loaded))
-    )
+    files = baked_files(scene, loaded)
     settings = scene.obscurance or Obscurance()
     more = {"open_triangles": "open_triangles"}
     if any(file for _, file in files):
@@ -272,7 +301,7 @@ def all_baked(scene: Scene) -> bool:
     return bool(scene.objects) and all(is_baked(scene))
 
 
-def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int, ...]) -> list[Node]:
+def _geometry(scene: Scene, loaded: Any, rate: Sequence[str]) -> list[Node]:
     """Meshes, each source once, what is made of them all, and their normals."""
     sources = [_source(scene, thing.mesh) for thing in scene.objects]
     found = {
@@ -286,7 +315,6 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
     parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
     by_file = tuple(said is None or said.source == "file" for said in normals)
     flat = tuple(own == "constant" or scene.terminator == "none" for own in rate)
-    every = "every_mesh" if unseen else "meshes"
     called = tuple(
         source.file if isinstance(source, MeshFile) else f"object {name}"
         for source, name in zip(sources, scene.object_names(), strict=True)
@@ -301,17 +329,14 @@ def _geometry(scene: Scene, loaded: Any, rate: Sequence[str], unseen: tuple[int,
         for thing in scene.objects
     )
     wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
-    left = [Node.of(partial(stages.left, unseen), "meshes", meshes=every)] if unseen else []
     return [
         *(Node.of(partial(stages.mesh, _read(loaded, found[name])), f"mesh:{name}") for name in names),
-        Node(every, partial(stages.meshes, which), parts),
-        *left,
+        Node("meshes", partial(stages.meshes, which), parts),
         Node.of(
             partial(stages.object_bounds, tuple(thing.transform for thing in scene.objects)),
             "object_bounds",
-            meshes=every,
         ),
-        Node.of(partial(stages.implied_widths, flat), "implied_widths", meshes=every),
+        Node.of(partial(stages.implied_widths, flat), "implied_widths"),
         Node.of(partial(stages.geometry, by_file), "geometry"),
         Node.of(stages.render_space),
         Node.of(partial(stages.repairs, called, computes), "repairs"),

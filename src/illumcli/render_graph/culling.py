@@ -1,114 +1,128 @@
-"""Objects that no view can tell the presence of are left out: neither cut into triangles nor traced.
+"""Objects that cannot affect any view are neither cut into triangles nor traced.
 
-Only boxes tell, which are known once the meshes are read; the frame stays that of all objects.
+Their bounding boxes decide, which are known once the meshes are read; render space stays that of all objects.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from illumcli.geometry.bounds import ObjectBounds
-from illumcli.graph import topological_order
-from illumcli.render_graph.build import SMOOTH, active_lights, rates
-from illumcli.render_graph.cached import Artifacts, Book
-from illumcli.render_graph.execute import RenderStats, run_once
-from illumcli.render_graph.schedule import GIVEN, Plan, plan
+from illumcli.graph import Node
+from illumcli.layers import Layer
+from illumcli.records import Record
+from illumcli.render_graph import stages
+from illumcli.render_graph.build import SMOOTH, Graph, active_lights, rates
+from illumcli.render_graph.execute import Run
+from illumcli.render_graph.known import with_known
+from illumcli.render_graph.schedule import reached
 from illumcli.scene.spec import Obscurance
 from illumcli.visibility.culling import Boxes, SecondaryRays, culled_objects, frustum
 
-WHY = "no view sees it, and it shadows and obscures nothing that one sees"
+
+class Bounds(Record):
+    """The boxes of all objects, and how far the surfaces that their normals imply may leave the polygons."""
+
+    objects: ObjectBounds
+    widths: NDArray[np.float64]
+    """(O,) widest polygon of each object with such a surface [scene units], else 0."""
 
 
-def why_all(made: Plan) -> str | None:
+def why_all(graph: Graph, outputs: Sequence[Layer]) -> str | None:
     """Why every object is needed, as far as the scene alone tells; None where boxes may tell more."""
-    scene = made.scene
-    if scene is None or len(scene.objects) < 2:
+    if len(graph.scene.objects) < 2:
         return "there is one object at most"
-    if any(layer.buffer == "triangle_id" for layer in made.layers):
+    if any(layer.buffer == "triangle_id" for layer in outputs):
         return "triangle_id numbers the triangles of all objects"
-    if _reach(made, 1.0) == np.inf:
+    if _obscurance_reach(graph, reached(graph, outputs), 1.0) == np.inf:
         return "obscurance rays reach any distance"
     return None
 
 
-def _reach(made: Plan, radius: float) -> float:
-    """How far obscurance rays of the plan tell anything [scene units]; 0 where it casts none."""
-    steps = {step.output for step in made.tile}
-    if made.scene is None or not {"obscurance", "obscurance_draws"} <= steps:
-        return 0.0
-    return (made.scene.obscurance or Obscurance()).falloff.reach(radius)
+def find_bounds(
+    graph: Graph, outputs: Sequence[Layer], run: Run, only_cached: bool = False
+) -> tuple[Graph, Bounds | None]:
+    """The bounds of all objects, and the graph in which they are known; None where no object can be culled.
 
-
-def unseen_objects(
-    made: Plan, artifacts: Artifacts, tally: RenderStats, threads: int = 1, at_hand: bool = False
-) -> tuple[int, ...]:
-    """The numbers of the objects that can be left out of all views of a plan.
-
-    What is made to know it is counted in `tally`, and at hand in `artifacts` from then on. With `at_hand`
-    nothing is made: where the store does not know the boxes, or where a camera stands, nothing is left out.
+    With `only_cached` nothing is computed: where the bounds are not cached there are none.
     """
-    scene = made.scene
-    if scene is None or why_all(made) is not None or any(view.camera.fit for view in made.views):
-        return ()
-    object_bounds: ObjectBounds | None = asked(made, "object_bounds", artifacts, tally, threads, at_hand)
-    if object_bounds is None:
-        return ()
-    render_space, film = object_bounds.render_space, scene.film
-    boxes = Boxes(
-        *(
-            (corner - render_space.centre) / render_space.radius
-            for corner in (object_bounds.low, object_bounds.high)
-        )
+    if why_all(graph, outputs) is not None or any(view.camera.fit for view in graph.views):
+        return graph, None
+    graph = with_known(graph, "object_bounds", run, only_cached)
+    if "object_bounds" not in graph.known:
+        return graph, None
+    objects = graph.known["object_bounds"].value
+    bounds = Bounds(objects, np.zeros(len(objects.low)))
+
+    # normals matter only if a box alone would be culled and shadow rays start from the smooth surface
+    scene = graph.scene
+    shadowed = any(name.startswith("shadow:") for name in reached(graph, outputs))
+    smooth = scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH)
+    if shadowed and smooth and unaffecting(graph, outputs, bounds):
+        graph = with_known(graph, "implied_widths", run, only_cached)
+        if "implied_widths" not in graph.known:
+            return graph, None
+        bounds = Bounds(objects, graph.known["implied_widths"].value)
+    return graph, bounds
+
+
+def unaffecting(graph: Graph, outputs: Sequence[Layer], bounds: Bounds) -> tuple[int, ...]:
+    """The numbers of the objects that change no view: outside each of them, and their shadows and what they
+    obscure, too."""
+    space, film = bounds.objects.render_space, graph.scene.film
+    low, high = (
+        (corner - space.centre) / space.radius for corner in (bounds.objects.low, bounds.objects.high)
     )
     views = [
-        frustum(view.camera, render_space, view.width, view.height, film.filter if view.samples > 1 else None)
-        for view in made.views
+        frustum(view.camera, space, view.width, view.height, film.filter if view.samples > 1 else None)
+        for view in graph.views
     ]
-    steps = {step.output for step in made.tile}
+    buffers = reached(graph, outputs)
     lights = [
-        light for name, light in active_lights(scene).items() if light.shadows and f"shadow:{name}" in steps
+        light
+        for name, light in active_lights(graph.scene).items()
+        if light.shadows and f"shadow:{name}" in buffers
     ]
-    rays = SecondaryRays(lights, _reach(made, render_space.radius) / render_space.radius)
-    found = culled_objects(boxes, np.zeros(len(boxes.low)), views, rays, render_space)
-    if found.any() and lights and scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH):
-        widths = asked(made, "implied_widths", artifacts, tally, threads, at_hand)
-        if widths is None:
-            return ()
-        found = culled_objects(boxes, widths / render_space.radius, views, rays, render_space)
-    if found.any():
-        tally.add({}, {}, {"polygons": int(object_bounds.polygons[found].sum())})
-    return tuple(int(number) for number in np.flatnonzero(found))
+    rays = SecondaryRays(lights, _obscurance_reach(graph, buffers, space.radius) / space.radius)
+    culled = culled_objects(Boxes(low, high), bounds.widths / space.radius, views, rays, space)
+    return tuple(int(number) for number in np.flatnonzero(culled))
 
 
-def without(made: Plan, loaded: Any, numbers: tuple[int, ...]) -> Plan:
-    """The plan with these objects left out."""
-    if made.scene is None or not numbers:
-        return made
-    fewer = plan(made.scene, loaded, [layer.name for layer in made.layers], numbers)
-    names = made.scene.object_names()
-    skipped = {name: why for name, why in fewer.skipped.items() if name != "implied_widths"}
-    skipped |= {f"object:{names[number]}": WHY for number in numbers}
-    return replace(fewer, views=made.views, skipped=skipped)
+def cull(graph: Graph, outputs: Sequence[Layer], bounds: Bounds | None) -> Graph:
+    """The graph without the polygons of objects that change no view."""
+    return graph if bounds is None else without_objects(graph, unaffecting(graph, outputs, bounds))
 
 
-def asked(
-    made: Plan, name: str, artifacts: Artifacts, tally: RenderStats, threads: int, at_hand: bool
-) -> Any:
-    """A buffer of the whole scene, before the plan runs; None where it would have to be made and must not."""
-    book = Book(made.book, made.views[0], artifacts)
-    steps = topological_order(book, [name], GIVEN)
-    if at_hand and name not in artifacts.reused:
-        return None
-    new = [
-        step.output
-        for step in steps
-        if step.output not in artifacts.reused and book.keys_of(step.output) not in artifacts.made
-    ]
-    kept = {each: book.keys_of(each) for each in new if artifacts.keeps(each)}
-    first = replace(made, once=tuple(steps), reused=artifacts.reused, keeps=kept)
-    buffers = run_once(first, tally, artifacts, threads)
-    artifacts.made.update((book.keys_of(each), value) for each, value in buffers.items())
-    return buffers[name]
+def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
+    """The graph without the polygons of the objects of these numbers.
+
+    Their meshes are read, and bounds and cameras see them; no values are read that were baked for them.
+    """
+    if not numbers:
+        return graph
+    nodes = dict(graph.nodes)
+    nodes["every_mesh"] = replace(nodes["meshes"], output="every_mesh", kind="meshes")
+    nodes["meshes"] = Node.of(partial(stages.left, numbers), "meshes", meshes="every_mesh")
+    for name, node in nodes.items():
+        if name in ("object_bounds", "implied_widths") or name.startswith("camera:"):
+            nodes[name] = replace(node, inputs={**node.inputs, "meshes": "every_mesh"})
+    bound: Any = nodes["baked"].function
+    kept = tuple((name, None if k in numbers else file) for k, (name, file) in enumerate(bound.args[0]))
+    nodes["baked"] = replace(nodes["baked"], function=partial(bound.func, kept))
+    known = dict(graph.known)
+    if "meshes" in known:
+        known["every_mesh"] = known.pop("meshes")
+    return replace(graph, nodes=nodes, known=known, culled=numbers)
+
+
+def _obscurance_reach(graph: Graph, buffers: Collection[str], radius: float) -> float:
+    """The distance up to which obscurance rays find anything [scene units]; 0 where none are cast."""
+    if not {"obscurance", "obscurance_draws"} <= set(buffers):
+        return 0.0
+    return (graph.scene.obscurance or Obscurance()).falloff.reach(radius)

@@ -14,18 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import column_major
+from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
-from illumcli.film.tiles import MOST, Scattered, Tile
-from illumcli.film.tiles import tiles as cut
+from illumcli.film.tiles import MOST, Scattered, Tile, tiles
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.lights.incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
-from illumcli.records import Record
+from illumcli.records import Record, Value
 from illumcli.render_graph.build import SHAPE
-from illumcli.render_graph.cached import Artifacts, Keeper
 from illumcli.render_graph.schedule import Plan
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32 or, ids, uint32
@@ -67,99 +66,109 @@ class Band(Record):
     layers: Mapping[str, NDArray[Any]]  # layer, or what was made of them -> (rows, width, channels)
 
 
+class Run(Value):
+    """What running nodes takes beside them: where buffers are kept, how many threads, who counts."""
+
+    stats: RenderStats = field(default_factory=RenderStats)
+    cache: Cache = NO_CACHE
+    threads: int = 1
+
+
 class _Common(Record):
-    """What the tiles of a picture have in common."""
+    """What the tiles of a view have in common."""
 
     plan: Plan
     shared: Mapping[str, Any]
-    view: View
-    tally: RenderStats
+    stats: RenderStats
     stop: threading.Event
-    keeper: Keeper
+    recorder: BufferRecorder
     develop: Develop
     last_use: Mapping[str, int]
 
 
-def _as_they_are(tile: Tile, layers: Planes) -> Planes:
+def _unchanged(tile: Tile, layers: Planes) -> Planes:
     return layers
 
 
-def run_once(
-    plan: Plan, tally: RenderStats, artifacts: Artifacts | None = None, threads: int = 1
-) -> dict[str, Any]:
-    """The buffers that no tile changes; those that do not need each other are made beside each other.
+def run_once(plan: Plan, run: Run) -> dict[str, Any]:
+    """The buffers of the whole scene; those that do not need each other are computed side by side.
 
-    Of several faults the one is raised that comes first in the plan.
+    Of several errors the one is raised that comes first in the plan.
     """
     pending: dict[str, Future[Any]] = {}
 
-    def make(step: Node) -> Any:
-        needs = {name: pending[name].result() for name in step.inputs.values()}  # handed out before it
+    def compute(node: Node) -> Any:
+        inputs = {name: pending[name].result() for name in node.inputs.values()}  # submitted before it
         start = time.perf_counter()
-        made = step.run(needs)
-        tally.add({step.output: time.perf_counter() - start}, {})
-        return made
+        value = node.run(inputs)
+        run.stats.add({node.output: time.perf_counter() - start}, {})
+        return value
 
     buffers: dict[str, Any] = {}
-    pool = ThreadPoolExecutor(threads, thread_name_prefix="once")
+    pool = ThreadPoolExecutor(run.threads, thread_name_prefix="once")
     try:
-        for step in plan.once:
-            pending[step.output] = pool.submit(make, step)
+        for node in plan.once:
+            pending[node.output] = pool.submit(compute, node)
         for name, future in pending.items():
             buffers[name] = future.result()
-            if artifacts is not None and name in plan.keeps:
-                artifacts.keep_once(name, plan.keeps[name], buffers[name], _cost(plan, name, tally))
+            if name in plan.lookup.keeps:
+                run.cache.keep(name, plan.lookup.keeps[name], buffers[name], _cost(plan, name, run.stats))
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     return buffers
 
 
-def _cost(plan: Plan, name: str, tally: RenderStats) -> float:
-    """Seconds of one processor that a buffer took, with all that had to be made for it."""
-    return sum(tally.seconds.get(need, 0.0) for need in plan.needed_for(name))
+def _cost(plan: Plan, name: str, stats: RenderStats) -> float:
+    """Seconds of one processor that a buffer took, with all that had to be computed for it."""
+    return sum(stats.seconds.get(need, 0.0) for need in plan.needed_for(name))
 
 
 def bands(
     plan: Plan,
     shared: Mapping[str, Any],
-    view: View,
-    threads: int,
-    tally: RenderStats,
+    run: Run,
     done: Callable[[int], None] = lambda pixels: None,
     side: int | None = None,
-    artifacts: Artifacts | None = None,
-    develop: Develop = _as_they_are,
+    develop: Develop = _unchanged,
 ) -> Iterator[Band]:
     """A view's picture as bands of rows from the top, each as soon as its tiles are done.
 
-    Bands hold the layers, or what `develop` makes of them tile by tile. The pixels do not depend on
-    `threads`, `side` or `artifacts`, where what is worth it is kept. When the consumer stops or is
-    interrupted, tiles in flight end at their next step.
+    Bands hold the layers, or what `develop` makes of them tile by tile. The pixels do not depend on the
+    threads, the `side` of tiles or the cache, where what is worth it is kept. When the consumer stops or is
+    interrupted, tiles in flight end at their next node.
+
+    Parameters
+    ----------
+    shared : mapping
+        The buffers of the whole scene, as `run_once` returns them.
+    done : callable
+        Gets the number of pixels of each tile that is done.
     """
-    adaptive = view.is_adaptive
-    first = view.coarse() if adaptive else view
-    tiles = cut(view.width, view.height, plan.tile_side(first, side), first.samples)
-    stop = threading.Event()
-    ahead = threads + 1
-    keeper = Keeper(artifacts or Artifacts(), {} if adaptive else plan.keeps, view)
-    common = _Common(plan, shared, view, tally, stop, keeper, develop, plan.last_use())
-    make = _adaptive_tile if adaptive else _tile
+    view = plan.view
+    first = view.coarse() if view.is_adaptive else view
+    rows = tiles(view.width, view.height, plan.tile_side(first, side), first.samples)
+    keeps = {} if view.is_adaptive else plan.lookup.keeps
+    recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
+    common = _Common(plan, shared, run.stats, stop, recorder, develop, plan.last_use())
+    compute = _adaptive_tile if view.is_adaptive else _tile
     keep_freed_memory()
-    with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
+    with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
         try:
             pending: list[tuple[Tile, Future[tuple[Mapping[str, NDArray[Any]], Kept]]]] = []
-            queue = iter([tile for row in tiles for tile in row])
+            queue = iter([tile for row in rows for tile in row])
 
+            # a row of tiles and some more are in flight, so that no thread waits for the consumer
             def submit() -> None:
                 for tile in queue:
-                    pending.append((tile, pool.submit(make, common, tile)))
-                    if len(pending) >= ahead + len(tiles[0]):
+                    pending.append((tile, pool.submit(compute, common, tile)))
+                    if len(pending) >= run.threads + 1 + len(rows[0]):
                         break
 
             submit()
-            for row in tiles:
+            for row in rows:
+                # join the tiles of a row in their order
                 height = row[0].height
-                whole: dict[str, NDArray[Any]] = {}
+                band: dict[str, NDArray[Any]] = {}
                 kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
@@ -168,40 +177,34 @@ def bands(
                         pass
                     layers, others = future.result()
                     for name, values in layers.items():
-                        if name not in whole:
-                            whole[name] = np.empty((height, view.width, values.shape[2]), values.dtype)
-                        whole[name][:, tile.x : tile.x + tile.width] = values
+                        if name not in band:
+                            band[name] = np.empty((height, view.width, values.shape[2]), values.dtype)
+                        band[name][:, tile.x : tile.x + tile.width] = values
                     for name, packed in others.items():
                         kept[name].append(packed)
                     done(tile.width * tile.height)
                     submit()
-                keeper.write(kept)
-                yield Band(row[0].y, whole)
-            keeper.finish({name: _cost(plan, name, tally) for name in plan.keeps})
+                recorder.write(kept)
+                yield Band(row[0].y, band)
+            recorder.finish({name: _cost(plan, name, run.stats) for name in keeps})
         finally:
             stop.set()
-            keeper.discard()
+            recorder.discard()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
 def at_pixels(
-    plan: Plan,
-    shared: Mapping[str, Any],
-    view: View,
-    x: NDArray[np.int64],
-    y: NDArray[np.int64],
-    threads: int,
-    tally: RenderStats,
+    plan: Plan, shared: Mapping[str, Any], run: Run, x: NDArray[np.int64], y: NDArray[np.int64]
 ) -> Planes:
-    """Layer -> (K, channels) at K pixels of a view: what `bands` makes there, and nothing else is made."""
-    some = max(1, MOST // view.samples)
-    tiles = [Scattered.at(x[a : a + some], y[a : a + some]) for a in range(0, len(x), some)]
-    stop, keeper = threading.Event(), Keeper(Artifacts(), {}, view)
-    common = _Common(plan, shared, view, tally, stop, keeper, _as_they_are, plan.last_use())
-    with ThreadPoolExecutor(threads, thread_name_prefix="tile") as pool:
+    """Layer -> (K, channels) at K pixels of a view: what `bands` computes there, and nothing else."""
+    count = max(1, MOST // plan.view.samples)
+    pieces = [Scattered.at(x[a : a + count], y[a : a + count]) for a in range(0, len(x), count)]
+    stop, recorder = threading.Event(), BufferRecorder(NO_CACHE, {}, plan.view)
+    common = _Common(plan, shared, run.stats, stop, recorder, _unchanged, plan.last_use())
+    with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
         try:
-            made = [pool.submit(_tile, common, tile) for tile in tiles]
-            parts = [future.result()[0] for future in made]
+            pending = [pool.submit(_tile, common, tile) for tile in pieces]
+            parts = [future.result()[0] for future in pending]
         finally:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
@@ -210,14 +213,14 @@ def at_pixels(
 
 def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
     """What is wanted of one tile, and what is kept of its buffers."""
-    buffers, kept = _made(common, common.view, tile)
+    buffers, kept = _buffers(common, common.plan.view, tile)
     start = time.perf_counter()
-    out = common.develop(tile, _pixels(common.plan, buffers, common.view, tile))
-    common.tally.add({"film": time.perf_counter() - start}, {})
+    out = common.develop(tile, _pixels(common.plan, buffers, common.plan.view, tile))
+    common.stats.add({"film": time.perf_counter() - start}, {})
     return out, kept
 
 
-def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
+def _buffers(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
     """The buffers of one tile that the film reads, and what is kept of them all; `view` has its samples."""
     buffers: dict[str, Any] = {**common.shared, "view": view, "tile": tile}
     tracer = None
@@ -234,12 +237,12 @@ def _made(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept
             rays[step.output] = tracer.rays - before
         if isinstance(made, LitPoints):
             lanes[step.output] = made.count - len(made.index)
-        if step.output in common.keeper.names:
-            kept[step.output] = common.keeper.take(step.output, buffers, tile)
+        if step.output in common.recorder.names:
+            kept[step.output] = common.recorder.take(step.output, buffers, tile)
         for name in step.inputs.values():
             if common.last_use.get(name) == number:
                 buffers.pop(name, None)
-    common.tally.add(seconds, rays, lanes)
+    common.stats.add(seconds, rays, lanes)
     return buffers, kept
 
 
@@ -250,9 +253,9 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     layer decides for itself, by the shapes seen and its own values: no layer depends on what others are asked
     for.
     """
-    plan, view, tally = common.plan, common.view, common.tally
+    plan, view, stats = common.plan, common.plan.view, common.stats
     few, around = view.coarse(), tile.grown(view.width, view.height)
-    buffers, _ = _made(common, few, around)
+    buffers, _ = _buffers(common, few, around)
     start = time.perf_counter()
     own = (
         slice(tile.y - around.y, tile.y - around.y + tile.height),
@@ -263,28 +266,28 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     which = {name: mask[own] for name, mask in differing.items()}
     wanted = np.logical_or.reduce([*which.values()])
     down, across = np.nonzero(wanted)
-    tally.add({"film": time.perf_counter() - start}, {})
+    stats.add({"film": time.perf_counter() - start}, {})
     rest = view.rest()
     some = max(1, MOST // rest.samples)
     for first in range(0, len(down), some):
         y, x = down[first : first + some], across[first : first + some]
         part = Scattered.at(x + tile.x, y + tile.y)
-        others, _ = _made(common, rest, part)
+        others, _ = _buffers(common, rest, part)
         start = time.perf_counter()
         pixel = (part.rows - around.y) * around.width + part.columns - around.x
         joined = _joined(plan, buffers, others, pixel)
-        tally.add({"film": time.perf_counter() - start}, {})
+        stats.add({"film": time.perf_counter() - start}, {})
         for name, values in _pixels(plan, joined, view, part).items():
             mine = which[name][y, x]
             out[name][y[mine], x[mine]] = values[0][mine]
     pixels, refined = tile.width * tile.height, len(down)
     taken = around.width * around.height * few.samples + refined * rest.samples
-    tally.add({}, {}, {"samples": pixels * view.samples - taken})
-    with tally.lock:
-        tally.refined += refined
+    stats.add({}, {}, {"samples": pixels * view.samples - taken})
+    with stats.lock:
+        stats.refined += refined
     start = time.perf_counter()
     developed = common.develop(tile, out)
-    tally.add({"film": time.perf_counter() - start}, {})
+    stats.add({"film": time.perf_counter() - start}, {})
     return developed, {}
 
 
@@ -311,7 +314,7 @@ def _joined(
         "hits": replace(others["hits"], sample=lane[order]),
         "samples": replace(last, points=points.reshape(-1, 2), per_pixel=count, first=None),
     }
-    for name in {"alpha", *(layer.buffer for layer in plan.layers)}:
+    for name in {"alpha", *(layer.buffer for layer in plan.outputs)}:
         values = np.concatenate([few[name][among], others[name]])
         joined[name] = column_major(values[order])
     return joined
@@ -325,7 +328,7 @@ def _differing(
     objects, normals = (buffers[name] for name in SHAPE)
     forms = differs_in_shape(objects, normals, lane, shape, view.samples)
     out = {}
-    for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.layers] + [
+    for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.outputs] + [
         ("alpha", "alpha", True)
     ]:
         out[name] = forms
@@ -339,7 +342,7 @@ def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> P
     lane = buffers["hits"].sample
     pixels = tile.width * tile.height
     out = {}
-    for layer in plan.layers:
+    for layer in plan.outputs:
         values = buffers[layer.buffer]
         if layer.per_pixel:
             made = values

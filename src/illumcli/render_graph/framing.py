@@ -5,28 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 from illumcli.film.view import View
-from illumcli.render_graph.cached import Artifacts
-from illumcli.render_graph.culling import asked
-from illumcli.render_graph.execute import RenderStats
-from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.build import Graph
+from illumcli.render_graph.execute import Run
+from illumcli.render_graph.known import with_known
 from illumcli.render_graph.stages import Placement
 
 
-def framed(
-    made: Plan, artifacts: Artifacts, tally: RenderStats, threads: int = 1, at_hand: bool = False
-) -> Plan:
-    """The plan with its cameras in place.
+def place_cameras(graph: Graph, run: Run, only_cached: bool = False) -> Graph:
+    """The graph with all cameras of its views in place.
 
-    With `at_hand` no mesh is read: a camera that the store does not know stays where the scene says.
+    With `only_cached` no mesh is read: a camera whose place is not cached stays where the scene says.
     """
-
-    def known(view: View) -> View:
-        if view.camera.fit is None:
-            return view
-        place = asked(made, f"camera:{view.name}", artifacts, tally, threads, at_hand)
-        return view if place is None else placed(view, place)
-
-    return replace(made, views=tuple(known(view) for view in made.views))
+    views = []
+    for view in graph.views:
+        if view.camera.fit is not None:
+            graph = with_known(graph, f"camera:{view.name}", run, only_cached)
+            place = graph.known.get(f"camera:{view.name}")
+            view = view if place is None else placed(view, place.value)
+        views.append(view)
+    return replace(graph, views=tuple(views))
 
 
 def placed(view: View, place: Placement) -> View:

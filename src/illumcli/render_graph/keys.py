@@ -9,20 +9,22 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy
 
+from illumcli import __version__
 from illumcli.cache.fingerprint import digest, fingerprint
+from illumcli.film.view import View
 from illumcli.graph import Node
 
 SOURCES = (
     "arrays.py",
+    "cache/codec.py",
     "color.py",
     "film",
     "geometry",
@@ -42,7 +44,7 @@ imports of all nodes' functions and fails where one of them leads elsewhere."""
 class Keys:
     """The key of every buffer of a graph, 32 hexadecimal digits, computed when first needed."""
 
-    def __init__(self, graph: Mapping[str, Node], view: Any, salt: str) -> None:
+    def __init__(self, graph: Mapping[str, Node], view: View | None, salt: str) -> None:
         self._graph = graph
         self._salt = salt
         self._known = {"tile": "tile", "view": fingerprint(view)}
@@ -54,6 +56,12 @@ class Keys:
             inputs = [(parameter, self(buffer)) for parameter, buffer in node.inputs.items()]
             self._known[name] = digest((self._salt, node.name, node.function, inputs))
         return self._known[name]
+
+
+def content_key(nodes: Mapping[str, Node], view: View, buffers: Iterable[str]) -> str:
+    """Hash of all that some buffers of a view depend on, and of this version."""
+    keys = Keys(nodes, view, __version__)
+    return digest([keys(name) for name in buffers])
 
 
 def _installed(library: str) -> list[str]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.shapes._base import TRIANGLE_BYTES, Shape
+from illumcli.layers import Layer
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
+from illumcli.render_graph.build import Graph
+from illumcli.render_graph.explain import expected_rays
+from illumcli.render_graph.schedule import reached
 from illumcli.scene.load import SceneFile, resolve
 from illumcli.scene.spec import MeshFile, Scene
 
@@ -22,6 +26,8 @@ TEXEL_BYTES = 8
 """Of each channel: as a number, and as the channel that a parameter is read from."""
 WHILE_READ = 4
 """More bytes of each channel for the texture that is being read."""
+LARGEST_SIDE = 1 << 16
+MOST_RAYS = 10**11
 DENSEST = 20
 """No picture worth rendering packs better than this."""
 
@@ -86,6 +92,22 @@ def refuse_memory(rows: int, width: int, values: int, expected: Mapping[str, int
     ways |= {"shapes": "shapes with fewer segments, rings or quads, or fewer of them"}
     what = f"{place}: {largest} of {in_words(sizes[largest])}" if len(sizes) > 1 else place
     refuse_beyond(sum(sizes.values()), what, f"ask for {ways.get(largest, 'smaller or fewer textures')}")
+
+
+def refuse_rays(graph: Graph, outputs: Sequence[Layer]) -> None:
+    """Raise LimitError where a film is larger, or rays are more, than this program takes on."""
+    for view in graph.views:
+        if max(view.width, view.height) > LARGEST_SIDE:
+            raise LimitError(
+                f"camera {view.name}: a film of {view.width} x {view.height} pixels is beyond the limit of "
+                f"{LARGEST_SIDE} a side; render parts with a narrower camera"
+            )
+    rays = sum(expected_rays(graph.scene, graph.views, set(reached(graph, outputs))).values())
+    if rays > MOST_RAYS:
+        raise LimitError(
+            f"{rays:.2g} rays are beyond the limit of {MOST_RAYS:.0e}; lower film.samples, "
+            "obscurance.samples or the film's size"
+        )
 
 
 def refuse_disk(path: Path, pixel_bytes: int) -> None:

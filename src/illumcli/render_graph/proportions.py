@@ -12,10 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Value
-from illumcli.render_graph.build import View
+from illumcli.render_graph.build import Graph
+from illumcli.scene.load import SceneFile, told
 from illumcli.visibility.culling import Boxes, frustum, outside_frustum
 
 VISIBLE = 0.005
@@ -55,6 +57,20 @@ def disproportion(object_bounds: ObjectBounds, views: Sequence[View]) -> Disprop
             ratio, share = float(reach[large] / radius[i]), offset / float(radius[i])
             found.append(Disproportion(int(i), large, ratio, offset, share))
     return max(found, key=lambda each: each.share, default=None)
+
+
+def disproportion_lines(loaded: SceneFile, graph: Graph, object_bounds: ObjectBounds | None) -> list[str]:
+    """A line where rays that leave surfaces start visibly far off those around some object."""
+    worst = None if object_bounds is None else disproportion(object_bounds, graph.views)
+    if worst is None:
+        return []
+    small, ratio = graph.scene.object_names()[worst.small], float(f"{worst.ratio:.1g}")
+    fact = (
+        f"reaches {ratio:,.0f} times as far as {small} is large: around {small}, rays start up to "
+        f"{worst.offset:.1g} off surfaces, {100 * worst.share:,.1f} % of its radius, and shadows lose touch; "
+        "make it smaller, or bring it nearer"
+    )
+    return [told(loaded, ("objects", worst.large), fact)]
 
 
 def _edges(radius: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[np.float64]:

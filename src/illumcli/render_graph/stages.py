@@ -25,6 +25,7 @@ from illumcli.geometry.repairs import (
     NO_MATERIAL,
     NORMALS_OF_FILE,
     NOT_ASKED,
+    MeshRepairs,
     Repair,
     Repairs,
     joined,
@@ -149,12 +150,6 @@ def geometry(
 def render_space(object_bounds: ObjectBounds) -> RenderSpace:
     """The scene's centre and radius."""
     return object_bounds.render_space
-
-
-class MeshRepairs(Value):
-    """What was wrong with meshes and put right or left out."""
-
-    repairs: Repairs
 
 
 def repairs(names: tuple[str, ...], computes: tuple[bool, ...], meshes: tuple[Mesh, ...]) -> MeshRepairs:

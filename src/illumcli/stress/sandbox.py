@@ -51,7 +51,8 @@ class Sandbox:
         IllumError
             What `illum render` would end with.
         """
-        from illumcli.commands.render import run
+        from illumcli.commands.options import RenderJob, RenderOptions
+        from illumcli.commands.render import render_scene
         from illumcli.images.reader import read_image
 
         self.pictures += 1
@@ -59,7 +60,8 @@ class Sandbox:
         path = self.folder / f"{self.pictures}.yaml"
         path.write_text(json.dumps({"version": 1, **scene, "outputs": outputs}))
         image = self.folder / f"{self.pictures}.exr"
-        run(path, pattern=str(image).replace("{", "{{").replace("}", "}}"), threads=threads, cache=False)
+        pattern = str(image).replace("{", "{{").replace("}", "}}")
+        render_scene(RenderJob(path, RenderOptions(pattern=pattern, threads=threads, cache=False)))
         channels, data = read_image(image).channels, image.read_bytes()
         image.unlink()
         self._count(channels)

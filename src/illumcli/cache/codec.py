@@ -1,0 +1,237 @@
+"""How buffers are stored: those of a view sample by sample, those of the whole scene as JSON and arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, take_or_all
+from illumcli.cache.store import Stored
+from illumcli.film.tiles import Tile
+from illumcli.film.view import View
+from illumcli.geometry.bounds import ObjectBounds
+from illumcli.geometry.mesh import Mesh, Substitute
+from illumcli.geometry.planar import PlanarPolygons
+from illumcli.geometry.repairs import MeshRepairs, Repair
+from illumcli.geometry.scene_geometry import CornerVectors, PlacedMesh, SceneGeometry
+from illumcli.rays.interaction import Hits
+from illumcli.records import Record, Value
+from illumcli.render_space import RenderSpace
+from illumcli.shading.materials import Numbering
+from illumcli.shading.rates import Points, as_they_are
+
+CLASSES = {
+    cls.__name__: cls
+    for cls in (
+        Mesh,
+        ObjectBounds,
+        PlanarPolygons,
+        SceneGeometry,
+        PlacedMesh,
+        RenderSpace,
+        CornerVectors,
+        MeshRepairs,
+        Repair,
+        Numbering,
+        Substitute,
+    )
+}
+"""Records that buffers of the whole scene are made of."""
+
+
+class Misfit(Exception):
+    """A sound entry does not hold what its key stands for."""
+
+
+# --- buffers of a view, tile by tile --------------------------------------------------------------------
+
+
+class BufferCodec(Value):
+    """How one value per sample, or several, are stored for a whole view."""
+
+    dtype: Any
+    planes: int
+    pack: Callable[[Any, Mapping[str, Any]], NDArray[Any] | None]
+    """Buffer, all buffers of the tile -> (planes, M) at the hits; None where it cannot be kept."""
+    unpack: Callable[[NDArray[Any], Hits], Any]
+    """(planes, M) and the hits -> buffer."""
+
+    def layout(self, view: View) -> tuple[tuple[int, ...], Any]:
+        """Shape and type of what is stored for a view; truth values take a bit."""
+        row = view.width * view.samples
+        if self.dtype is np.bool_:
+            return (view.height, self.planes, -(-row // 8)), np.uint8
+        return (view.height, self.planes, row), self.dtype
+
+
+def _pack_hits(hits: Hits, buffers: Mapping[str, Any]) -> NDArray[np.int32]:
+    return np.stack([hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
+
+
+def _pack_points(points: Points, buffers: Mapping[str, Any]) -> NDArray[np.float32] | None:
+    if points.spread is not as_they_are:
+        return None
+    return np.concatenate([points.position.T, points.n.T])
+
+
+def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> Points:
+    return Points(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, as_they_are)
+
+
+def _pack_material(material: NDArray[np.int32], buffers: Mapping[str, Any]) -> NDArray[np.uint16] | None:
+    if buffers["points"].spread is not as_they_are or material.max(initial=0) >= 1 << 16:
+        return None
+    return material[None].astype(np.uint16)
+
+
+def _first(planes: NDArray[Any], hits: Hits) -> Any:
+    return planes[0]
+
+
+CODECS = {
+    "hits": BufferCodec(np.int32, 3, _pack_hits, lambda planes, hits: hits),
+    "points": BufferCodec(np.float32, 6, _pack_points, _unpack_points),
+    "material": BufferCodec(np.uint16, 1, _pack_material, lambda planes, hits: planes[0].astype(np.int32)),
+    "obscurance": BufferCodec(np.float32, 1, lambda w, buffers: w[None], _first),
+    "shadow": BufferCodec(
+        np.bool_, 1, lambda delta, buffers: delta[None] != 0, lambda planes, hits: planes[0].astype(F)
+    ),
+}
+"""Buffers of a view that are kept: primary hits, where and on what they lie, w, delta of each light."""
+
+
+def codec_of(name: str) -> BufferCodec | None:
+    """How the tile buffer `name` is stored; None for one that is not."""
+    return CODECS.get(name.partition(":")[0])
+
+
+class StoredBuffer(Record):
+    """A buffer of a whole view as it is stored: (height, planes, samples of a row), truth values in bits."""
+
+    codec: BufferCodec
+    values: NDArray[Any]
+    per_pixel: int
+
+    def tile(self, tile: Tile) -> NDArray[Any]:
+        """(planes, N) of the samples of a tile."""
+        first, last = tile.x * self.per_pixel, (tile.x + tile.width) * self.per_pixel
+        rows = self.values[tile.y : tile.y + tile.height]
+        if self.codec.dtype is np.bool_:
+            byte = first // 8
+            bits = np.unpackbits(rows[..., byte : -(-last // 8)], axis=-1)
+            block = bits[..., first - 8 * byte : last - 8 * byte]
+        else:
+            block = rows[..., first:last]
+        return block.transpose(1, 0, 2).reshape(self.codec.planes, -1)
+
+
+def load_hits(stored: StoredBuffer, tile: Tile) -> Hits:
+    """The stored hits of a tile."""
+    triangle, u, v = stored.tile(tile)
+    sample = np.flatnonzero(triangle >= 0).astype(np.int32)
+    return Hits(
+        sample,
+        take_or_all(triangle, sample),
+        take_or_all(u, sample).view(F),
+        take_or_all(v, sample).view(F),
+    )
+
+
+def load_tile(stored: StoredBuffer, tile: Tile, hits: Hits) -> Any:
+    """A stored buffer of a tile, at its hits."""
+    return stored.codec.unpack(take_or_all(stored.tile(tile).T, hits.sample).T, hits)
+
+
+def pack_tile(name: str, buffers: Mapping[str, Any], tile: Tile, per_pixel: int) -> NDArray[Any] | None:
+    """(height, planes, samples of a row) of a tile's buffer, -1 or 0 where there is no hit; None where it
+    cannot be kept."""
+    codec = codec_of(name)
+    packed = None if codec is None else codec.pack(buffers[name], buffers)
+    if codec is None or packed is None:
+        return None
+    row = tile.width * per_pixel
+    out = np.full((codec.planes, tile.height * row), -1 if codec.dtype is np.int32 else 0, codec.dtype)
+    out[:, buffers["hits"].sample] = packed
+    return out.reshape(codec.planes, tile.height, row).transpose(1, 0, 2)
+
+
+def stored_buffer(codec: BufferCodec, stored: Stored, view: View) -> StoredBuffer:
+    """A buffer of a view, from its entry.
+
+    Raises
+    ------
+    Misfit
+    """
+    if [(array.shape, array.dtype) for array in stored.arrays] != [codec.layout(view)]:
+        raise Misfit
+    return StoredBuffer(codec, stored.arrays[0], view.samples)
+
+
+# --- buffers of the whole scene as text and arrays -----------------------------------------------------
+
+
+def encode(value: Any, arrays: list[NDArray[Any]], seen: dict[int, int]) -> Any:
+    """`value` as JSON has it, its arrays in a list of their own; an array that occurs twice is kept once."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.ndarray):
+        turned = value.flags.f_contiguous and not value.flags.c_contiguous
+        if id(value) not in seen:
+            seen[id(value)] = len(arrays)
+            arrays.append(value.T if turned else value)
+        return {"array": seen[id(value)], "turned": turned}
+    if isinstance(value, tuple | list):
+        return {"tuple": [encode(part, arrays, seen) for part in value]}
+    if isinstance(value, Mapping):
+        return {"dict": [[key, encode(part, arrays, seen)] for key, part in value.items()]}
+    if type(value).__name__ not in CLASSES:
+        raise TypeError(f"{type(value).__name__} is not among what is kept")
+    parts = {name: encode(part, arrays, seen) for name, part in vars(value).items()}
+    return {"class": type(value).__name__, "fields": parts}
+
+
+def decode(data: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
+    """What `encode` was given."""
+    if not isinstance(data, dict):
+        return data
+    if "array" in data:
+        array = arrays[data["array"]]
+        return array.T if data["turned"] else array
+    if "tuple" in data:
+        return tuple(decode(part, arrays) for part in data["tuple"])
+    if "dict" in data:
+        return {key: decode(part, arrays) for key, part in data["dict"]}
+    cls = CLASSES[data["class"]]
+    parts = {name: decode(part, arrays) for name, part in data["fields"].items()}
+    for name, part in parts.items():
+        if not _fits(part, str(cls.__dataclass_fields__[name].type)):
+            raise TypeError(f"{name} of {cls.__name__}")
+    return cls(**parts)
+
+
+def _fits(part: Any, declared: str) -> bool:
+    """Is the part of a record, as decoded, what its declaration says, as far as arrays and None go?"""
+    if part is None:
+        return "None" in declared
+    if isinstance(part, np.ndarray):
+        return declared.startswith(f"NDArray[np.{part.dtype.name}")
+    return not declared.startswith("NDArray")
+
+
+def decode_entry(stored: Stored, expected: type | tuple[type, ...]) -> Any:
+    """A buffer of the whole scene, from its entry.
+
+    Raises
+    ------
+    Misfit
+    """
+    try:
+        value = decode(stored.about["value"], stored.arrays)
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
+        raise Misfit from None
+    if not isinstance(value, expected):
+        raise Misfit
+    return value

@@ -1,0 +1,75 @@
+"""Buffers that the variants of a sweep keep in memory for each other."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.film.tiles import Tile
+from illumcli.records import Value
+
+LIMIT = 1 << 30
+"""Bytes of tile buffers that are kept."""
+
+
+class MemoryCache:
+    """Buffers by key in this process, of tiles and of the whole scene, up to a number of bytes."""
+
+    def __init__(self, wanted: frozenset[str] = frozenset(), limit: int = LIMIT) -> None:
+        self.wanted = wanted
+        """Keys of buffers that the next variant reads."""
+        self.limit = limit
+        self.once: dict[str, Any] = {}
+        """Buffers of the whole scene."""
+        self._tiles: dict[str, dict[Tile, Any]] = {}
+        self._complete: set[str] = set()
+        self._bytes = 0
+        self._lock = threading.Lock()
+
+    def tiles(self, key: str) -> Mapping[Tile, Any] | None:
+        """The buffer of this key by tile; None where not every tile has it."""
+        return self._tiles[key] if key in self._complete else None
+
+    def add(self, key: str, tile: Tile, buffer: Any) -> None:
+        """Keep a tile's buffer; beyond the limit the key is given up with all its tiles."""
+        size = sum(array.nbytes for array in arrays_in(buffer))
+        with self._lock:
+            if key not in self.wanted or key in self._complete:
+                return
+            if self._bytes + size > self.limit:
+                self.wanted -= {key}
+                self._drop(key)
+                return
+            self._bytes += size
+            self._tiles.setdefault(key, {})[tile] = buffer
+
+    def complete(self, keys: frozenset[str]) -> None:
+        """Every tile of these keys has been added."""
+        self._complete |= keys & self._tiles.keys()
+
+    def retire(self) -> None:
+        """Drop everything that is not wanted."""
+        for key in self._tiles.keys() - self.wanted:
+            self._drop(key)
+            self._complete.discard(key)
+        self.once = {key: value for key, value in self.once.items() if key in self.wanted}
+
+    def _drop(self, key: str) -> None:
+        dropped = self._tiles.pop(key, {})
+        self._bytes -= sum(array.nbytes for buffer in dropped.values() for array in arrays_in(buffer))
+
+
+def arrays_in(value: Any) -> Iterator[NDArray[Any]]:
+    """Every array in a buffer."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, Mapping):
+        for part in value.values():
+            yield from arrays_in(part)
+    elif isinstance(value, Value):
+        for part in vars(value).values():
+            yield from arrays_in(part)

@@ -1,0 +1,60 @@
+"""What happened when a scene was rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from illumcli import __version__
+from illumcli.files.reports import sealed_json
+from illumcli.geometry.repairs import Repairs
+from illumcli.memory import peak_memory
+from illumcli.render_graph.execute import RenderStats
+from illumcli.render_graph.repairs import repairs_data
+from illumcli.versions import versions
+
+
+@dataclass(slots=True)
+class Report:
+    """What happened."""
+
+    scene: str
+    scene_hash: str
+    seed: int
+    threads: int
+    written: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+    skipped: dict[str, str] = field(default_factory=dict)
+    repairs: Repairs = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    rays: dict[str, int] = field(default_factory=dict)
+    spared: dict[str, int] = field(default_factory=dict)
+    """Points that a light does not reach (`incident`) or not freely (`unshadowed`): no ray, no response.
+    Polygons of culled objects. Samples of pixels that adaptive antialiasing leaves at the first few."""
+    refined: int = 0
+    """Pixels that adaptive antialiasing gave all samples."""
+    reused: dict[str, dict[str, str]] = field(default_factory=dict)
+    """Camera -> buffer -> where it was loaded from: `memory` or `store`."""
+    warnings: list[str] = field(default_factory=list)
+    clamped: int = 0
+    error: dict[str, float] = field(default_factory=dict)
+    """Asked for, reached, and by which counts, where an error was asked for."""
+    standard_error: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Camera -> mean and root mean square of its layer `error`, where that was rendered."""
+    total_seconds: float = 0.0
+
+    def count(self, stats: RenderStats) -> None:
+        """Take over what was counted."""
+        self.seconds, self.rays, self.spared = dict(stats.seconds), dict(stats.rays), dict(stats.spared)
+        self.refined = stats.refined
+
+    def as_data(self) -> dict[str, Any]:
+        """The report as JSON has it, with versions and the peak of memory."""
+        data = {name: getattr(self, name) for name in self.__slots__} | repairs_data(self.repairs)
+        return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
+
+
+def report_text(entries: Sequence[Mapping[str, Any]]) -> str:
+    """One entry, or a list of several, as JSON; each says its `content`, the first the file's hash."""
+    return sealed_json(entries, in_a_list=len(entries) > 1)

@@ -1,0 +1,86 @@
+"""Write the files of one view, band by band as they are rendered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+from numpy.typing import NDArray
+
+from illumcli import __version__
+from illumcli.commands.work import Work
+from illumcli.film.tiles import Tile
+from illumcli.images.develop import ErrorSums, Target, how_to_read
+from illumcli.progress import Progress
+from illumcli.render_graph.execute import Planes, Run, bands
+from illumcli.render_graph.schedule import Plan
+from illumcli.render_space import RenderSpace
+from illumcli.scene.spec import Scene
+
+
+def write_view(
+    work: Work,
+    plan: Plan,
+    shared: Mapping[str, Any],
+    targets: Sequence[Target],
+    run: Run,
+    progress: Progress,
+) -> tuple[int, ErrorSums]:
+    """Write one view's files band by band; how many values were beyond half's range, and the errors."""
+    from illumcli.images.writer import ImageWriter
+
+    view, space, development = plan.view, shared["render_space"], work.development
+    sums, done, pixels = ErrorSums(), 0, plan.view.width * plan.view.height
+
+    def advance(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(view.name, done, pixels)
+
+    def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
+        files = {str(target.path): development.pixels(target, tile, layers, space) for target in targets}
+        return files | ({"error": layers["error"]} if "error" in layers else {})
+
+    with ExitStack() as files:
+        writers = [
+            files.enter_context(
+                ImageWriter(
+                    target.path,
+                    view.width,
+                    view.height,
+                    development.channels(target),
+                    metadata(work.scene, target, space),
+                    srgb=target.layers[0].kind == "light",
+                )
+            )
+            for target in targets
+        ]
+        for band in bands(plan, shared, run, advance, develop=develop):
+            start = time.perf_counter()
+            if "error" in band.layers:
+                sums.add(band.layers["error"])
+            for target, writer in zip(targets, writers, strict=True):
+                writer.write_band(band.y, band.layers[str(target.path)])
+            run.stats.add({"write": time.perf_counter() - start}, {})
+        start = time.perf_counter()
+        clamped = sum(writer.close().clamped for writer in writers)
+        run.stats.add({"write": time.perf_counter() - start}, {})
+    return clamped, sums
+
+
+def metadata(scene: Scene, target: Target, space: RenderSpace) -> Mapping[str, Any]:
+    """What a file says of itself."""
+    return {
+        "Software": f"illum {__version__}",
+        "illum:version": __version__,
+        "illum:content": target.content,
+        "illum:camera": target.view.name,
+        "illum:layers": ",".join(layer.name for layer in target.layers),
+        "illum:samples": target.view.samples,
+        "illum:seed": str(scene.seed),
+        "illum:exposure": scene.film.exposure,
+        "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
+        **how_to_read(target, space),
+    }

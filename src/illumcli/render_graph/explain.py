@@ -1,0 +1,160 @@
+"""Why buffers are not computed, how many rays and how much memory a plan takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from illumcli.cache.codec import codec_of
+from illumcli.film.view import View
+from illumcli.layers import Layer
+from illumcli.lights._base import Light
+from illumcli.records import Value
+from illumcli.render_graph.build import Graph, active_lights, is_ambient, is_baked, is_emissive
+from illumcli.render_graph.culling import why_all
+from illumcli.render_graph.replicates import AGAIN, doubled_count
+from illumcli.render_graph.schedule import Plan, reached
+from illumcli.scene.spec import Scene
+
+CULLED = "no view sees it, and it shadows and obscures nothing that one sees"
+CACHED = "all that needs it is at hand"
+SHADOW = ("shadow", "shadow_candidates")
+OBSCURANCE = ("obscurance", "obscurance_draws")
+AMBIENT = ("ambient", "ambient_color", *OBSCURANCE)
+
+
+class Unused(Value):
+    """A buffer that is not computed: its name, its parts before and after a colon, and what is."""
+
+    name: str
+    kind: str
+    light: str
+    scene: Scene
+    active: Mapping[str, Light]
+    """The lights that send anything."""
+    computed: set[str]
+
+
+Rule = tuple[Callable[[Unused], Any], str]
+RULES: tuple[Rule, ...] = (
+    (
+        lambda unused: unused.light and unused.light not in unused.active,
+        "the light's intensity is 0",
+    ),
+    (
+        lambda unused: unused.kind in SHADOW and unused.light and not unused.active[unused.light].shadows,
+        "the light casts no shadows",
+    ),
+    (
+        lambda unused: unused.name == "obscurance_draws" and any(is_baked(unused.scene)),
+        "the obscurance is baked",
+    ),
+    (
+        lambda unused: unused.kind in OBSCURANCE and unused.scene.obscurance is None,
+        "the scene has no obscurance: w = 1",
+    ),
+    (
+        lambda unused: unused.kind == "obscurance_normals" and "obscurance_draws" in unused.computed,
+        "the hemispheres of obscurance stand about the polygons' own normals",
+    ),
+    (
+        lambda unused: unused.kind in AMBIENT and not is_ambient(unused.scene),
+        "no ambient light leaves any surface",
+    ),
+    (lambda unused: unused.kind == "emission" and not is_emissive(unused.scene), "no material emits"),
+    (lambda unused: True, "no layer asked for reaches it"),
+)
+"""The first one that holds says why a buffer is not computed."""
+
+
+def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) -> dict[str, str]:
+    """A reason for every buffer that is not computed, and every object that is culled.
+
+    Parameters
+    ----------
+    plan : Plan, optional
+        Of one view, in which cached buffers are loaded.
+    """
+    scene, order = graph.scene, reached(graph, outputs)
+    computed, active = set(order), active_lights(scene)
+    reasons = {}
+    for name in graph.nodes:
+        kind, _, rest = name.partition(":")
+        if name in computed or name.startswith(AGAIN) or kind == "camera":
+            continue
+        if graph.culled and name in ("implied_widths", "every_mesh"):  # computed before anything was culled
+            continue
+        unused = Unused(name, kind, rest if kind != "mesh" else "", scene, active, computed)
+        reasons[name] = next(reason for holds, reason in RULES if holds(unused))
+    if "error" in computed and f"{AGAIN}samples" not in computed:
+        reasons[f"{AGAIN}beauty"] = "nothing in the picture is random: its error is 0"
+    names = scene.object_names()
+    reasons |= {f"object:{names[number]}": CULLED for number in graph.culled}
+    if plan is not None:
+        skipped = (name for name in order if name not in plan.buffers and name not in graph.known)
+        reasons |= dict.fromkeys(skipped, CACHED)
+    return reasons
+
+
+def which_objects(graph: Graph, outputs: Sequence[Layer]) -> str:
+    """Which objects take part, and why."""
+    why = why_all(graph, outputs)
+    if why is not None:
+        return f"all: {why}"
+    if graph.culled:
+        return f"all but {len(graph.culled)} that no view can tell"
+    return "known once the meshes are read, or all are needed"
+
+
+def expected_rays(scene: Scene, views: Sequence[View], computed: set[str]) -> dict[str, int]:
+    """Upper bounds of the rays of some views by purpose, where these buffers are computed."""
+    samples = sum(view.width * view.height * view.samples for view in views)
+    doubled = sum(doubled_count(view.width, view.height) * view.samples for view in views)
+    again = {name.removeprefix(AGAIN) for name in computed if name.startswith(AGAIN)}
+    more = _rays_of(scene, doubled, again)
+    return _rays_of(scene, samples, computed) | {f"{AGAIN}{name}": count for name, count in more.items()}
+
+
+def _rays_of(scene: Scene, samples: int, computed: set[str]) -> dict[str, int]:
+    """Rays of so many samples by purpose."""
+    rays = {"primary": samples} if "hits" in computed else {}
+    for name, light in scene.named_lights().items():
+        if f"shadow:{name}" in computed and light.shadows and any(light.color()):
+            rays[f"shadow:{name}"] = samples
+    if {"obscurance", "obscurance_draws"} <= computed and scene.obscurance:
+        rays["obscurance"] = samples * scene.obscurance.samples
+    return rays
+
+
+def expected_bytes(plan: Plan) -> dict[str, int]:
+    """What a plan takes beyond its meshes: a band of tiles, each cached buffer that is read, and each that
+    may be written, whose pages the system may drop. Upper bounds."""
+    view = plan.view
+    samples = min(view.height, plan.tile_side(view)) * view.width * view.samples
+    sizes = {"band": samples * 4 * sum(len(layer.channels) for layer in plan.outputs) // view.samples}
+    for name in [*plan.lookup.keeps, *plan.lookup.reused]:
+        if codec := codec_of(name):
+            shape, dtype = codec.layout(view)
+            sizes[name] = math.prod(shape) * np.dtype(dtype).itemsize
+    return sizes
+
+
+def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
+    """A plan as JSON has it; `expected` is what shapes, mesh files and textures take [bytes]."""
+    view, graph = plan.view, plan.graph
+    size = {"camera": view.name, "width": view.width, "height": view.height, "samples": view.samples}
+    whole = graph.without_loaders()
+    return {
+        "views": [size | ({"first_samples": view.adaptive.first} if view.is_adaptive else {})],
+        "layers": [layer.name for layer in plan.outputs],
+        "objects": which_objects(whole, plan.outputs),
+        "once": [node.output for node in plan.once],
+        "tile": [node.output for node in plan.tile],
+        "skipped": why_not(whole, plan.outputs, plan),
+        "expected_rays": expected_rays(graph.scene, (view,), plan.computed),
+        "reused": dict(plan.lookup.reused),
+        "expected_bytes": {**expected, **expected_bytes(plan)},
+    }

@@ -1,0 +1,38 @@
+"""The whole way from a graph to a plan: `build -> cull -> substitute_cached -> schedule -> execute`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from illumcli.cache.recorder import Cache
+from illumcli.film.view import View
+from illumcli.layers import Layer
+from illumcli.render_graph.build import Graph
+from illumcli.render_graph.cached import substitute_cached
+from illumcli.render_graph.culling import cull, find_bounds
+from illumcli.render_graph.execute import Run
+from illumcli.render_graph.framing import place_cameras
+from illumcli.render_graph.schedule import Plan, needed_buffers, schedule
+
+
+def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached: bool = False) -> Graph:
+    """The graph with its cameras in place and without objects that change no view.
+
+    With `only_cached` nothing is computed for it: what is not cached stays unknown, and as it is.
+    """
+    graph = place_cameras(graph, run, only_cached)
+    graph, bounds = find_bounds(graph, outputs, run, only_cached)
+    if bounds is None:
+        return graph
+    graph = cull(graph, outputs, bounds)
+    polygons = int(bounds.objects.polygons[list(graph.culled)].sum())
+    if polygons:
+        run.stats.add({}, {}, {"polygons": polygons})
+    return graph
+
+
+def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, look: bool = False) -> Plan:
+    """What runs for one view, where cached buffers are loaded; with `look` nothing is read."""
+    buffers = needed_buffers(graph, outputs, [view])
+    graph, lookup = substitute_cached(graph, buffers, view, cache, look)
+    return schedule(graph, outputs, view, lookup)

@@ -1,4 +1,4 @@
-"""CONTRIBUTING's example is complete: put where it says, it is a model that passes every test of models."""
+"""CONTRIBUTING's examples are complete: put where they say, they are rendered, and pass the shared tests."""
 
 from __future__ import annotations
 
@@ -7,34 +7,108 @@ import re
 import shutil
 import subprocess
 import sys
-import textwrap
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+EXAMPLE = re.compile(r"^`((?:src|tests)/[^`\n]*)`\n\n```(python|diff)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+SCENE = """
+version: 1
+camera: {position: [2, 3, 4], target: [0, 0, 0], fov: 45}
+film: {width: 32, height: 24, samples: 1}
+ambient: 0.5
+obscurance: {samples: 16, sampler: r2, falloff: {falloff: sine, max_distance: 1}}
+materials: {dust: {model: lunar_lambert, diffuse: 0.5}}
+lights: [{light: beam, position: [0, 0, 0], direction: [0, -1, 0], radius: 0.8, irradiance: 3}]
+objects:
+  - {mesh: {shape: star, radius: 3}, material: dust}
+  - {mesh: pyramid.off, material: dust}
+outputs: {layers: [beauty, lights, obscurance, slope], files: [out.exr], colour: float}
+"""
+OFF = "OFF\n5 5 0\n-1 0 -1\n1 0 -1\n1 0 1\n-1 0 1\n0 1 0\n4 0 1 2 3\n3 0 4 1\n3 1 4 2\n3 2 4 3\n3 3 4 0\n"
+CHECK = """
+import numpy as np
+from illumcli.images.reader import read_image
+
+channels = read_image("out.exr").channels
+slope = np.round(channels["slope.Y"], 3)
+assert {0, 45} <= set(slope.ravel().tolist()), np.unique(slope)
+lit, w = channels["beam1.G"] > 0, channels["obscurance.Y"]
+on_star = (slope == 0) & (w > 0)
+assert (lit & (slope == 45)).any()
+assert (on_star & ~lit).any()
+assert w[on_star].min() < 1
+"""
 
 
-def test_the_example_of_a_model_passes_the_tests_of_models(root, tmp_path):
-    text = (root / "CONTRIBUTING.md").read_text()
-    for name in ("src/illumcli", "tests/models", "tests/conftest.py", "pyproject.toml"):
-        copy = shutil.copytree if (root / name).is_dir() else shutil.copy
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        copy(root / name, tmp_path / name)
-    blocks = [
-        textwrap.dedent(each) for each in re.findall(r"^ +```python\n(.*?)^ +```", text, flags=re.M | re.S)
-    ]
-    files = re.findall(r"^\d\. Write `([^`]*)`", text, flags=re.M)
-    assert len(blocks) == len(files) == 2
-    for name, block in zip(files, blocks, strict=True):
-        assert not (root / name).exists()
-        (tmp_path / name).write_text(block)
+def inserted(text: str, diff: str) -> str:
+    """The text with the added lines of a diff, each below its context; those at the top are imports."""
+    lines = text.splitlines(keepends=True)
+    place = lines.index("from __future__ import annotations\n") + 1
+    for line in diff.splitlines(keepends=True):
+        if line.startswith("+"):
+            lines.insert(place, line[1:])
+            place += 1
+        else:
+            place = lines.index(line[1:] or "\n", place) + 1
+    return "".join(lines)
 
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "src")}
-    for words in (
-        ("ruff", "check", "--no-cache", *files),
-        ("ruff", "format", "--no-cache", "--check", *files),
-        ("pytest", "tests/models", "-k", "LunarLambert or test_lunar_lambert"),
-        ("illumcli", "models", "lunar_lambert"),
-    ):
-        done = subprocess.run(
-            [sys.executable, "-m", *words],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert "passed" in done.stdout or words[0] != "pytest"
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory) -> Path:
+    """A copy of the package and the shared tests, with all examples in it."""
+    folder = tmp_path_factory.mktemp("contributing")
+    for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/visibility/test_samplers.py",
+                 "tests/test_layers.py", "scenes", "pyproject.toml"):  # fmt: skip
+        place = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        place(ROOT / name, folder / name)
+    examples = EXAMPLE.findall((ROOT / "CONTRIBUTING.md").read_text())
+    assert len(examples) == 10
+    for name, kind, block in examples:
+        path = folder / name
+        if kind == "diff":
+            path.write_text(inserted(path.read_text(), block))
+        else:
+            assert not path.exists()
+            path.write_text(block)
+    run(folder, "ruff", "check", "--no-cache", "--fix", "--select", "I", "src")
+    return folder
+
+
+def run(folder: Path, *words: str) -> str:
+    """What a module of Python prints, run in the copy."""
+    environment = {**os.environ, "PYTHONPATH": str(folder / "src"), "ILLUM_CACHE": str(folder / "cache")}
+    command = [sys.executable, "-m", *words]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_examples_are_clean(copy):
+    files = [name for name, _, _ in EXAMPLE.findall((ROOT / "CONTRIBUTING.md").read_text())]
+    run(copy, "ruff", "check", "--no-cache", *files)
+    run(copy, "ruff", "format", "--no-cache", "--check", *files)
+
+
+@pytest.mark.parametrize(
+    ("tests", "names"),
+    [
+        ("tests/models", "LunarLambert or test_lunar_lambert"),
+        ("tests/visibility/test_samplers.py", "r2"),
+        ("tests/test_layers.py", "layer"),
+    ],
+)
+def test_examples_pass_the_shared_tests(copy, tests, names):
+    assert "passed" in run(copy, "pytest", tests, "-k", names, "-p", "no:cacheprovider")
+
+
+def test_a_scene_is_rendered_with_all_examples(copy):
+    (copy / "scene.yaml").write_text(SCENE)
+    (copy / "pyramid.off").write_text(OFF)
+    run(copy, "illumcli", "render", "scene.yaml")
+    (copy / "check.py").write_text(CHECK)
+    run(copy, "check")
+    assert "once, as in dark dust" in run(copy, "illumcli", "models", "lunar_lambert")
+    assert '"slope"' in run(copy, "illumcli", "schema")

@@ -51,7 +51,7 @@ LAMPS = ((3.0, 4.0, 2.0), (-3.0, 3.0, 3.0))
 def placed_bunny(folder: Path) -> Path:
     """The bunny as illum's `fit: 1` places it, as a PLY with smooth normals that everybody reads."""
     from illumcli.geometry import scene_geometry, transforms
-    from illumcli.geometry.normals import corner_normals
+    from illumcli.geometry.corner_normals import corner_normals
     from illumcli.geometry.shapes.teapot import Teapot
     from illumcli.mesh_files import read_mesh
     from illumcli.scene.spec import Transform

@@ -15,7 +15,7 @@ from illumcli.baking.sampling import BakeSampler
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
-from illumcli.geometry.normals import corner_normals
+from illumcli.geometry.corner_normals import corner_normals
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.render_graph.execute import Run, bands, run_once

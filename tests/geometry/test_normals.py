@@ -12,16 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import (
-    area_vectors,
-    corner_normals,
+from illumcli.geometry.polygon_normals import area_vectors, polygon_normals, reversed_polygons
+from illumcli.geometry.single_normals import (
     cross_normal,
     edge_average_normal,
     newell_plane,
     plane_solve,
-    polygon_normals,
-    reversed_polygons,
     vertex_normal,
 )
 

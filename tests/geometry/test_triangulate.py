@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import area_vectors
+from illumcli.geometry.polygon_normals import area_vectors
 from illumcli.geometry.triangulate import triangulate
 
 

@@ -238,7 +238,7 @@ def test_a_square_counts_as_flat_up_to_a_fold_of_2_to_the_minus_8(fold, is_flat)
 
 def test_what_crosses_itself_or_has_too_many_corners_or_three_is_left_to_triangles():
     bow = polygon([[0, 0], [1, 1], [1, 0], [0, 1]])
-    large = polygon(ring(np.ones(planar.MOST_CORNERS + 1)))
+    large = polygon(ring(np.ones(planar.MAX_CORNERS + 1)))
     three = polygon([[0, 0], [1, 0], [0, 1]])
     for mesh in (bow, large, three):
         assert planar_polygons(place_meshes([mesh], [np.eye(4)])) is None

@@ -9,8 +9,8 @@ import pytest
 
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
+from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import corner_normals
 from illumcli.geometry.scene_geometry import place_meshes, scene_normals
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.images.reader import read_image
@@ -158,7 +158,7 @@ def test_bodies_of_one_mesh_are_parts_of_their_own():
         np.concatenate([one.corners, one.corners + len(one.vertices)]),
     )
     a, b = np.zeros(count * 2, np.int32), np.arange(count * 2, dtype=np.int32)
-    np.testing.assert_array_equal(parts_of(two).joined(a, b), b < count)
+    np.testing.assert_array_equal(parts_of(two).are_joined(a, b), b < count)
 
 
 def test_a_seam_that_splits_vertices_does_not_split_the_part():
@@ -168,13 +168,13 @@ def test_a_seam_that_splits_vertices_does_not_split_the_part():
         one.vertices[one.corners], np.arange(len(one.corners)), normals=normals, corner_normals=one.corners
     )
     b = np.arange(len(one.corners) // 3, dtype=np.int32)
-    assert parts_of(split).joined(np.zeros_like(b), b).all()
+    assert parts_of(split).are_joined(np.zeros_like(b), b).all()
 
 
 def test_objects_that_touch_stay_apart():
     one = icosphere(1)
     b = np.arange(2 * len(one.corners) // 3, dtype=np.int32)
-    np.testing.assert_array_equal(parts_of(one, one).joined(np.zeros_like(b), b), b < len(b) // 2)
+    np.testing.assert_array_equal(parts_of(one, one).are_joined(np.zeros_like(b), b), b < len(b) // 2)
 
 
 def test_a_creased_edge_parts_the_surfaces_beside_it():
@@ -182,4 +182,4 @@ def test_a_creased_edge_parts_the_surfaces_beside_it():
     geometry = place_meshes([box], [np.eye(4)])
     sharp = SmoothParts(geometry, scene_normals(geometry, [corner_normals(box, crease=0.5)]))
     a, b = np.zeros(12, np.int32), np.arange(12, dtype=np.int32)
-    np.testing.assert_array_equal(sharp.joined(a, b), geometry.polygons == 0)
+    np.testing.assert_array_equal(sharp.are_joined(a, b), geometry.polygons == 0)

@@ -1,4 +1,4 @@
-"""Connected components of a graph, by arrays."""
+"""Connected components of a graph, computed on whole arrays."""
 
 from __future__ import annotations
 
@@ -8,18 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def components(first: NDArray[Any], second: NDArray[Any], count: int) -> NDArray[np.int64]:
-    """(count,) the lowest node that each node is connected to, by edges between `first` and `second`, (E,).
+def components(
+    first: NDArray[np.integer[Any]], second: NDArray[np.integer[Any]], count: int
+) -> NDArray[np.int64]:
+    """(count,) the lowest node that each of `count` nodes is connected to.
 
-    The larger of two roots that an edge joins is hooked below the smaller, then the trees are flattened,
-    until no edge joins two roots.
+    Where an edge joins two roots, the larger one is hooked below the smaller, then the trees are flattened;
+    repeated until no edge joins two roots.
+
+    Parameters
+    ----------
+    first, second : (E,) int
+        Nodes that each edge joins.
     """
     root = np.arange(count)
     while first.size:
         low, high = np.sort([root.take(first), root.take(second)], axis=0)
-        apart = low != high
-        np.minimum.at(root, high[apart], low[apart])
-        first, second = first[apart], second[apart]
+        is_joining = low != high
+        np.minimum.at(root, high[is_joining], low[is_joining])
+        first, second = first[is_joining], second[is_joining]
         while not np.array_equal(flatter := root.take(root), root):
             root = flatter
     return root

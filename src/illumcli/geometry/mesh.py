@@ -7,17 +7,17 @@ from dataclasses import field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from illumcli.geometry.repairs import Repairs
 from illumcli.records import Record, Value
 
 
 class Substitute(Value):
-    """What stands in for a texture of a mesh's own material that cannot be used."""
+    """The colour that replaces a texture, of a mesh's own material, that cannot be used."""
 
     value: tuple[float, ...]  # linear colour
-    first: str = ""  # where the file names the texture, as `Repair.first` has it
+    first: str = ""  # where the file names the texture, written as `Repair.first`
 
 
 class Mesh(Record):
@@ -30,7 +30,7 @@ class Mesh(Record):
     vertices: NDArray[np.float64]  # (V, 3) as read
     corners: NDArray[np.int32]  # (C,) vertex of each polygon corner
     starts: NDArray[np.int32]  # (P + 1,) first corner of each polygon, and the end
-    normals: NDArray[np.float64] | None = None  # (K, 3) as read, unit or not
+    normals: NDArray[np.float64] | None = None  # (K, 3) as read, of any length
     corner_normals: NDArray[np.int32] | None = None  # (C,) row of `normals`, -1 where the corner has none
     uvs: NDArray[np.float64] | None = None  # (U, 2), v upwards
     corner_uvs: NDArray[np.int32] | None = None  # (C,) row of `uvs`, -1 where the corner has none
@@ -38,18 +38,18 @@ class Mesh(Record):
     polygon_materials: NDArray[np.int32] | None = None  # (P,) index in `material_names`, -1 none
     group_names: tuple[str, ...] = ()
     polygon_groups: NDArray[np.int32] | None = None  # (P,) index in `group_names`, -1 none
-    polygon_smoothing: NDArray[np.int32] | None = None  # (P,) smoothing group, 0 off (facetted), -1 none said
+    polygon_smoothing: NDArray[np.int32] | None = None  # (P,) smoothing group, 0 off (facetted), -1 not given
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    """Per vertex, (V,) or (V, k), every property the file has; vertex colours are `color`, (V, 3) linear."""
+    """The file's properties per vertex, (V,) or (V, k); vertex colours are `color`, (V, 3) linear."""
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """Material name -> keys of a scene's material, as the file's own library describes them. The path of a
-    texture begins as that of the mesh; in a mesh that is kept between runs it starts at the mesh's folder."""
+    """Material name -> keys of a scene's material, from the file's own library. Paths of textures
+    begin with the mesh's folder; in a mesh that is kept between runs they are relative to it."""
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
-    """Material name -> key -> what stands in for the texture there; white where nothing is said."""
+    """Material name -> key -> what replaces the texture there; white by default."""
     material_repairs: Repairs = field(default_factory=dict)
-    """What of the library is not as the file says; told where a scene uses it."""
+    """What differs from the material library; reported where a scene uses the material."""
     repairs: Repairs = field(default_factory=dict)
-    """What was wrong and put right or left out while reading; places are relative to the mesh's file."""
+    """What was repaired or left out while reading; places are relative to the mesh's file."""
 
     def __post_init__(self) -> None:
         for array in [*vars(self).values(), *self.attributes.values()]:
@@ -61,8 +61,11 @@ class Mesh(Record):
         return len(self.starts) - 1
 
     @classmethod
-    def of_triangles(cls, vertices: Any, triangles: Any, **more: Any) -> Mesh:
-        """A mesh of (T, 3) triangles; per-corner index arrays in `more` are (T, 3) or flat."""
+    def of_triangles(cls, vertices: ArrayLike, triangles: ArrayLike, **more: Any) -> Mesh:
+        """A mesh of (T, 3) triangles over (V, 3) vertices.
+
+        Other fields are in `more`; arrays of an index per corner may be (T, 3) or flat.
+        """
         triangles = np.asarray(triangles, np.int32).reshape(-1, 3)
         for name in ("corner_normals", "corner_uvs"):
             if more.get(name) is not None:

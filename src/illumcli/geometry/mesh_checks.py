@@ -1,4 +1,4 @@
-"""What is wrong with a mesh's polygons and normals and can be lived with, counted per class."""
+"""Faults of a mesh's polygons and normals that rendering can cope with, counted per class."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import area_vectors, reversed_polygons
+from illumcli.geometry.polygon_normals import area_vectors, reversed_polygons
 from illumcli.geometry.repairs import Repair, Repairs
 
 Place: TypeAlias = Callable[[str, int], str]
-"""Where part ('vertex', 'face', 'normal', 'uv') number n, from 0, stands, as `Repair.first` has it."""
+"""The place of part ('vertex', 'face', 'normal', 'uv') number n, from 0, written as `Repair.first`."""
 
 
 def numbered(part: str, index: int) -> str:
@@ -22,22 +22,22 @@ def numbered(part: str, index: int) -> str:
 
 
 def faults(mesh: Mesh, place: Place = numbered) -> Repairs:
-    """What was put right already, then what rendering lives with.
+    """The repairs made while the mesh was read, then what rendering copes with.
 
     Faces without area are never hit, zero normals are replaced by computed ones, faces that run clockwise
-    about their normals are turned round, unused vertices count for nothing, not even for the scene's size.
+    about their normals are turned round, unused vertices are ignored, also for the scene's size.
     """
     used = np.zeros(len(mesh.vertices), np.bool_)
     used[mesh.corners] = True
-    wrong = {
+    wrong: dict[str, tuple[str, NDArray[np.bool_]]] = {
         "unused vertices": ("vertex", ~used),
         "faces without area": ("face", ~np.any(area_vectors(mesh), axis=1)),
     }
     if mesh.normals is not None:
-        sound = np.isfinite(mesh.normals).all(axis=1) & np.any(mesh.normals, axis=1)
-        wrong["normals not finite or of no length"] = ("normal", ~sound)
-    if (against := reversed_polygons(mesh)) is not None:
-        wrong["faces that run clockwise about their normals"] = ("face", against)
+        is_valid = np.isfinite(mesh.normals).all(axis=1) & np.any(mesh.normals, axis=1)
+        wrong["normals not finite or of no length"] = ("normal", ~is_valid)
+    if (reversed_ := reversed_polygons(mesh)) is not None:
+        wrong["faces that run clockwise about their normals"] = ("face", reversed_)
     return {**mesh.repairs, **_counted(wrong, place), **mesh.repairs}
 
 

@@ -1,4 +1,4 @@
-"""Planar polygons of more than three corners: what interpolation over a whole polygon needs, made once."""
+"""Planar polygons of more than three corners: what interpolation over a polygon needs, computed once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.bounds import transformed_vertices
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import area_vectors
+from illumcli.geometry.polygon_normals import area_vectors
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.records import Record
 
@@ -18,32 +18,33 @@ FLATNESS = 2.0**-10
 """How far corners may lie off the Newell plane, as a share of the polygon's mean width.
 
 A square folded along its diagonal by an angle f has its corners f / (4 sqrt 2) sides, a quarter of f mean
-widths, off the plane. So no fold of more than 2^-8 radians passes as flat, and less is no step of an 8-bit
-picture: Lambert's cosine changes by no more than the angle.
+widths, off the plane. So no fold of more than 2^-8 radians passes as flat, and a smaller one is less than one
+step of an 8-bit image: Lambert's cosine changes by no more than the angle.
 """
-CLEARLY_CONVEX = 1 / 64
-"""Of a quad's area: what each corner cuts off with its two neighbours, for inverse bilinear coordinates.
+MIN_CORNER_AREA = 1 / 64
+"""Share of a quad's area that every corner must cut off with its two neighbours, for inverse bilinear
+coordinates.
 
 The Jacobian of the bilinear map is 0 at a corner of 180 degrees, and coordinates are steep there.
 """
-MOST_CORNERS = 128
+MAX_CORNERS = 128
 """Work and memory of a hit go with the corners of its polygon; larger ones are interpolated by triangles."""
-ALIKE = 1e-6
-"""By components: unit normals nearer than this are one, rounded."""
-NEARLY_OWN = 1e-3
-"""[rad] A normal nearer than this to its polygon's own is that one, in the digits of a file."""
+EQUAL_NORMALS = 1e-6
+"""Difference per component up to which unit normals are equal but for rounding."""
+FLAT_NORMAL = 1e-3
+"""Angle to its polygon's own normal up to which a file's normal is that one, in few digits [rad]."""
 SAME_AREA = 1e-6
-"""Triangles of a simple polygon cover it once: their areas add up to its own but for this share."""
+"""Triangles of a simple polygon cover it once: their areas add up to its own, up to this share."""
 
 
 class PlanarPolygons(Record):
-    """The Q planar polygons of a World that have 4 to `MOST_CORNERS` corners. Arrays are read-only.
+    """The Q planar polygons of a scene that have 4 to `MAX_CORNERS` corners. Arrays are read-only.
 
-    Corners of a polygon follow each other in the World's numbers, and here.
+    Corners of a polygon are consecutive, in the scene's numbers as well as here.
     """
 
     row: NDArray[np.int32]  # (T,) polygon of each triangle, -1 where the triangle is interpolated alone
-    first_corner: NDArray[np.int32]  # (Q,) corner number, in the World, of each polygon's first corner
+    first_corner: NDArray[np.int32]  # (Q,) corner number, in the scene, of each polygon's first corner
     starts: NDArray[np.int32]  # (Q + 1,) first row in `flat` of each polygon, and the end
     flat: NDArray[np.float64]  # (K, 2) corners in the plane, from their mean; the farthest lies at distance 1
     padded: NDArray[np.int16]  # (Q,) corners rounded up to a power of 2; 0 for clearly convex quads
@@ -62,15 +63,15 @@ class PlanarPolygons(Record):
 
 
 def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
-    """The planar polygons of a World; None where all is triangles.
+    """The planar polygons of a scene; None if there are none.
 
-    Corners are taken in double precision as the meshes have them, before they are rounded for the ray core.
-    Polygons that cross themselves, or have no area, are left out.
+    Corners are those of the meshes in double precision, before they are rounded for the ray core. Polygons
+    that cross themselves, or have no area, are left out.
 
     Parameters
     ----------
     normals : CornerVectors, optional
-        Given where nothing but these is interpolated: polygons whose corners all have the polygon's own
+        Given if nothing but normals is interpolated: then polygons whose corners all have the polygon's own
         normal, as those of a box, are left out too.
     """
     first, size, points, vertices = _candidates(geometry)
@@ -92,21 +93,21 @@ def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = Non
         [dot(away, take_rows(along, owner)), dot(away, take_rows(cross(normal, along), owner))], axis=1
     )
 
-    # Which of them are flat, and covered once by their triangles.
-    off = np.maximum.reduceat(np.abs(dot(away, take_rows(normal, owner))), starts[:-1])
-    is_planar = (area > 0) & (off <= FLATNESS * area / 2)
+    # Which of them are flat, and covered exactly once by their triangles.
+    off_plane = np.maximum.reduceat(np.abs(dot(away, take_rows(normal, owner))), starts[:-1])
+    is_planar = (area > 0) & (off_plane <= FLATNESS * area / 2)
     triangle_row = _rows_of_triangles(geometry, first, size)
-    mine = np.flatnonzero(triangle_row >= 0)
-    own = triangle_row[mine]
-    a, b, c = (flat[geometry.corners[mine, k] - first[own] + starts[own]] for k in range(3))
-    covered = np.bincount(own, np.abs(_turn(b - a, c - a)) / 2, len(size))
+    triangle = np.flatnonzero(triangle_row >= 0)
+    polygon = triangle_row[triangle]
+    a, b, c = (flat[geometry.corners[triangle, k] - first[polygon] + starts[polygon]] for k in range(3))
+    covered = np.bincount(polygon, np.abs(_turn(b - a, c - a)) / 2, len(size))
     is_planar &= np.abs(covered - area) <= SAME_AREA * area
     if normals is not None:
         is_planar &= ~_is_flat(normals, first, size, normal)
     if not is_planar.any():
         return None
 
-    # The planar ones alone.
+    # Keep the planar ones, and renumber them.
     number = np.where(is_planar, np.cumsum(is_planar) - 1, -1)
     kept = is_planar[owner]
     size = size[is_planar]
@@ -114,39 +115,42 @@ def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = Non
     row = np.append(number, -1)[triangle_row].astype(np.int32)
     first, flat, vertices = first[is_planar].astype(np.int32), column_major(flat[kept]), vertices[kept]
     padded = np.where(
-        (size == 4) & (_smallest_corner(flat, starts, size) > CLEARLY_CONVEX * area[is_planar]),
+        (size == 4) & (_smallest_corner(flat, starts, size) > MIN_CORNER_AREA * area[is_planar]),
         0,
         2 ** np.ceil(np.log2(size)).astype(np.int64),
     )
-    triangle, u, v = _places(geometry, row, first, starts, flat)
+    of_triangle, u, v = _corner_weights(geometry, row, first, starts, flat)
     normal = column_major(normal[is_planar], F)
-    return PlanarPolygons(row, first, starts, flat, padded.astype(np.int16), triangle, u, v, vertices, normal)
+    return PlanarPolygons(
+        row, first, starts, flat, padded.astype(np.int16), of_triangle, u, v, vertices, normal
+    )
 
 
 def _candidates(geometry: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Vectors, NDArray[np.int32]]:
-    """First corner and size of polygons that may be planar; place, in radii, and vertex of their corners."""
-    firsts, sizes, places, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
+    """Polygons that may be planar: first corner and size, (Q,) each; positions [radii], (K, 3), and vertices,
+    (K,), of their corners."""
+    firsts, sizes, positions, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for placed in geometry.placed:
         mesh = placed.mesh
         if len(mesh.corners) == 3 * mesh.polygon_count:  # none has fewer
             continue
         size = np.diff(mesh.starts)
-        which = np.flatnonzero((size > 3) & (size <= MOST_CORNERS))
+        which = np.flatnonzero((size > 3) & (size <= MAX_CORNERS))
         size, first = size[which].astype(np.int64), mesh.starts[which].astype(np.int64)
         corner = np.repeat(first - np.cumsum(size) + size, size) + np.arange(size.sum())
         vertex = mesh.corners[corner]
         firsts.append(first + placed.first_corner)
         sizes.append(size)
-        places.append(
+        positions.append(
             geometry.render_space.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex))
         )
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64), places[0], vertices[0]
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), positions[0], vertices[0]
     return (
         np.concatenate(firsts),
         np.concatenate(sizes),
-        column_major(np.concatenate(places)),
+        column_major(np.concatenate(positions)),
         np.concatenate(vertices),
     )
 
@@ -158,27 +162,27 @@ def _is_flat(
     starts = np.cumsum(size) - size
     corner = np.repeat(first - starts, size) + np.arange(size.sum())
     n = take_rows(normals.values, normals.index.take(corner))
-    own = take_rows(n, starts)
-    apart = np.abs(n - take_rows(own, np.repeat(np.arange(len(size)), size))).max(axis=1)
-    upright = np.abs(dot(own, normal)) > 1 - NEARLY_OWN**2 / 2
-    return np.asarray((np.maximum.reduceat(apart, starts) <= ALIKE) & upright)
+    first_normal = take_rows(n, starts)
+    difference = np.abs(n - take_rows(first_normal, np.repeat(np.arange(len(size)), size))).max(axis=1)
+    is_own = np.abs(dot(first_normal, normal)) > 1 - FLAT_NORMAL**2 / 2
+    return np.asarray((np.maximum.reduceat(difference, starts) <= EQUAL_NORMALS) & is_own)
 
 
 def _across(normal: Vectors) -> Vectors:
-    """(Q, 3) a unit vector at right angles to each unit normal."""
+    """(Q, 3) a unit vector perpendicular to each unit normal."""
     axis = np.zeros_like(normal)
     axis[np.arange(len(axis)), np.argmin(np.abs(normal), axis=1)] = 1
     return unit(cross(axis, normal))
 
 
 def _turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) cross product in the plane."""
+    """(N,) cross product of vectors in the plane, (N, 2) each."""
     product: NDArray[np.float64] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return product
 
 
 def _rows_of_triangles(geometry: SceneGeometry, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
-    """(T,) which of the polygons with these ascending first corners each triangle belongs to, -1 none."""
+    """(T,) which of the polygons with these ascending first corners each triangle is part of, -1 none."""
     corner = geometry.corners[:, 0]
     row = np.searchsorted(first, corner, side="right") - 1
     inside = (row >= 0) & (corner < (first + size)[row])
@@ -188,37 +192,43 @@ def _rows_of_triangles(geometry: SceneGeometry, first: NDArray[Any], size: NDArr
 def _smallest_corner(
     flat: NDArray[np.float64], starts: NDArray[np.int32], size: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """(Q,) of each polygon's first four corners, the least area that one cuts off with its neighbours."""
+    """(Q,) the least area that any of each polygon's first four corners cuts off with its neighbours."""
     corner = [flat[starts[:-1] + k] for k in range(4)]
     cut = [_turn(corner[k - 3] - corner[k], corner[k - 1] - corner[k]) / 2 for k in range(4)]
     return np.minimum.reduce(cut)
 
 
-def _places(
+def _corner_weights(
     geometry: SceneGeometry,
     row: NDArray[np.int32],
     first: NDArray[np.int32],
     starts: NDArray[np.int32],
     flat: NDArray[np.float64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
-    """(K,) a triangle for each corner, and the weights of its corners 1 and 2 there.
+    """(K,) a triangle for each corner, and the weights of that triangle's corners 1 and 2 there.
 
-    A corner that the cut skipped, as on a straight edge, has its place on the plane of the first triangle.
+    A corner that triangulation skipped, as on a straight edge, gets its weights in the plane of the polygon's
+    first triangle.
     """
-    mine = np.flatnonzero(row >= 0)[::-1]  # of several triangles the first is written last
-    lowest = np.zeros(len(first), np.int32)
-    lowest[row[mine]] = mine
-    triangle = np.repeat(lowest, np.diff(starts))
-    named = np.full(len(flat), -1, np.int8)
+    # The first triangle of each polygon: written in reverse, so that it is written last.
+    inside = np.flatnonzero(row >= 0)[::-1]
+    first_triangle = np.zeros(len(first), np.int32)
+    first_triangle[row[inside]] = inside
+    triangle = np.repeat(first_triangle, np.diff(starts))
+
+    # Corners that are a triangle's corner k.
+    k_of_corner = np.full(len(flat), -1, np.int8)
     for k in range(3):
-        at = geometry.corners[mine, k] - first[row[mine]] + starts[row[mine]]
-        triangle[at], named[at] = mine, k
-    u, v = (named == 1).astype(np.float32), (named == 2).astype(np.float32)
-    if (lost := np.flatnonzero(named < 0)).size:
-        of, own = triangle[lost], row[triangle[lost]]
-        a, b, c = (flat[geometry.corners[of, k] - first[own] + starts[own]] for k in range(3))
-        whole = _turn(b - a, c - a)
-        whole = np.where(whole == 0, 1, whole)
-        u[lost] = _turn(flat[lost] - a, c - a) / whole
-        v[lost] = _turn(b - a, flat[lost] - a) / whole
+        corner = geometry.corners[inside, k] - first[row[inside]] + starts[row[inside]]
+        triangle[corner], k_of_corner[corner] = inside, k
+    u, v = (k_of_corner == 1).astype(np.float32), (k_of_corner == 2).astype(np.float32)
+
+    # Corners that are in no triangle.
+    if (skipped := np.flatnonzero(k_of_corner < 0)).size:
+        nearest, polygon = triangle[skipped], row[triangle[skipped]]
+        a, b, c = (flat[geometry.corners[nearest, k] - first[polygon] + starts[polygon]] for k in range(3))
+        area = _turn(b - a, c - a)
+        area = np.where(area == 0, 1, area)
+        u[skipped] = _turn(flat[skipped] - a, c - a) / area
+        v[skipped] = _turn(b - a, flat[skipped] - a) / area
     return triangle, u, v

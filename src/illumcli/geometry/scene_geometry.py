@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, column_major, take_rows
 from illumcli.geometry.bounds import object_bounds, transformed_vertices
+from illumcli.geometry.corner_normals import CornerNormals
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import CornerNormals, reversed_polygons
+from illumcli.geometry.polygon_normals import reversed_polygons
 from illumcli.geometry.transforms import cofactors
 from illumcli.geometry.triangulate import triangulate
 from illumcli.records import Record

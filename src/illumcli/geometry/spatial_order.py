@@ -1,4 +1,4 @@
-"""An order of points in which those that stand together lie together."""
+"""An order of points that keeps neighbours in space together in memory."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 BLOCK = 4096
-SMALLEST = 8
-BITS = 21  # per axis, three of which fill 63
+MIN_BOX = 8
+"""Points in the smallest boxes."""
+BITS = 21
+"""Of a Morton code per axis; three axes fill 63."""
 
 
 def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
-    """(N,) the points' numbers: along a Morton curve, every 4096 in a row halved again and again across the
-    longest side of their box.
+    """(N,) indices of the points in compact order.
 
-    So every 8, 16, ... 4096 in a row from the start are the points of one box. Rays of points in a row meet
-    the same triangles, and clusters of them are compact, which short stretches of a Morton curve are not.
+    Points are ordered along a Morton curve; then every `BLOCK` points in a row are halved again and again
+    across the longest side of their bounding box. So every 8, 16, ... 4096 in a row from the start are the
+    points of one box. Rays from consecutive points meet the same triangles, and clusters of them are compact,
+    which short stretches of a Morton curve are not.
 
     References
     ----------
@@ -26,23 +29,27 @@ def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
     count = len(points)
     if not count:
         return np.zeros(0, np.int64)
+
+    # Blocks along the curve; the last one is filled up with a point that is far out.
     size = min(BLOCK, 1 << max(count - 1, 1).bit_length())
-    padded = np.concatenate([along_curve(points), np.full(-count % size, count)])
+    order = np.concatenate([morton_order(points), np.full(-count % size, count)])
     low, high = points.min(axis=0), points.max(axis=0)
-    axes = np.vstack([points, high + (high - low)]).T.copy()  # (3, N + 1), the last one far out
-    while size > SMALLEST:
-        boxes = padded.reshape(-1, size)
-        own = axes.take(boxes, axis=1)
-        longest = np.argmax(own.max(axis=2) - own.min(axis=2), axis=0)
-        along = own[longest, np.arange(len(boxes))]
+    axes = np.vstack([points, high + (high - low)]).T.copy()  # (3, N + 1)
+
+    # Split every box at the median of its longest axis.
+    while size > MIN_BOX:
+        boxes = order.reshape(-1, size)
+        inside = axes.take(boxes, axis=1)
+        longest = np.argmax(inside.max(axis=2) - inside.min(axis=2), axis=0)
+        along = inside[longest, np.arange(len(boxes))]
         halves = np.argpartition(along, size // 2, axis=1)
-        padded = np.take_along_axis(boxes, halves, axis=1).ravel()
+        order = np.take_along_axis(boxes, halves, axis=1).ravel()
         size //= 2
-    return padded[padded < count]
+    return order[order < count]
 
 
-def along_curve(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
-    """(N,) the numbers of N > 0 points in Morton order (1966)."""
+def morton_order(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+    """(N,) indices of N > 0 points in Morton order (1966)."""
     low = points.min(axis=0)
     size = float(np.max(points.max(axis=0) - low)) or 1.0
     cell = ((np.asarray(points, np.float64) - low) / size * (2**BITS - 1)).astype(np.uint64)

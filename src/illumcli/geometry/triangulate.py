@@ -9,18 +9,21 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, cross, dot, take_rows
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import area_vectors, corner_crosses
+from illumcli.geometry.polygon_normals import area_vectors, corner_crosses
 from illumcli.records import Record
 
-CLEARLY = (
-    1 - 1e-9
-)  # a diagonal is shorter by more than rounding: the quads of a regular grid split all one way
-
-FLAT = 1e-9  # of the polygon's area: a corner that turns by less counts as straight
+SHORTER = 1 - 1e-9
+"""Ratio of squared lengths below which one diagonal is shorter than the other by more than rounding: the
+quads of a regular grid are all split the same way."""
+STRAIGHT = 1e-9
+"""Share of the polygon's area: a corner that turns by less counts as straight."""
 
 
 class Triangulation(Record):
-    """Triangles over the corners of a mesh, in the order and orientation of their polygons; read-only."""
+    """Triangles over the corners of a mesh, in the order and orientation of their polygons.
+
+    Arrays are read-only.
+    """
 
     corners: NDArray[np.int32]  # (T, 3) corner numbers
     polygon: NDArray[np.int32]  # (T,) the polygon each was cut from
@@ -33,9 +36,9 @@ class Triangulation(Record):
 def triangulate(mesh: Mesh) -> Triangulation:
     """The polygons as triangles that cover the same area; no vertex is added.
 
-    Triangles stay as they are. A quad is cut along its shorter diagonal, a concave one along the
-    inner one. Larger convex polygons become fans from their first corner, concave ones go through ear
-    clipping on their Newell plane. A polygon without area still gives triangles: nothing is lost unseen.
+    Triangles stay as they are. A quad is cut along its shorter diagonal, a concave one along the inner one.
+    Larger convex polygons become fans around their first corner, concave ones are cut by ear clipping on
+    their Newell plane. A polygon without area still gives triangles, so nothing is dropped silently.
     """
     size = np.diff(mesh.starts)
     if (size == 3).all():
@@ -43,6 +46,8 @@ def triangulate(mesh: Mesh) -> Triangulation:
         return Triangulation(
             np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.arange(count, dtype=np.int32)
         )
+
+    # Cut the polygons by their kind.
     triangles, quads, larger = (np.flatnonzero(which) for which in (size == 3, size == 4, size > 4))
     parts = [(mesh.starts[triangles][:, None] + np.arange(3), triangles)]
     if len(quads):
@@ -51,6 +56,8 @@ def triangulate(mesh: Mesh) -> Triangulation:
         concave = _concave(mesh, larger)
         parts.append(_fans(mesh, larger[~concave]))
         parts += [_ears(mesh, polygon) for polygon in larger[concave]]
+
+    # Back into the order of the polygons.
     corners = np.concatenate([part for part, _ in parts]).astype(np.int32)
     polygon = np.concatenate([of for _, of in parts]).astype(np.int32)
     order = np.argsort(polygon, kind="stable")
@@ -58,32 +65,30 @@ def triangulate(mesh: Mesh) -> Triangulation:
 
 
 def _quads(mesh: Mesh, quads: NDArray[np.intp]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """(2 Q, 3) corners of the halves, and (2 Q,) their polygons."""
+    """(2 Q, 3) corners of both halves of each quad, and (2 Q,) their polygons."""
     corners = mesh.starts[quads][:, None] + np.arange(4, dtype=np.int32)
     p = [take_rows(mesh.vertices, mesh.corners[corner]) for corner in corners.T]
     even, odd = p[2] - p[0], p[3] - p[1]
     normal = cross(even, odd)
-    turned = [
-        dot(cross(p[i - 3] - p[i], p[i - 1] - p[i]), normal) < 0 for i in range(4)
-    ]  # reflex at corner i
-    shorter = dot(odd, odd) < CLEARLY * dot(even, even)
-    from_odd = np.where(turned[0] | turned[2], False, turned[1] | turned[3] | shorter)
+    is_reflex = [dot(cross(p[i - 3] - p[i], p[i - 1] - p[i]), normal) < 0 for i in range(4)]
+    shorter = dot(odd, odd) < SHORTER * dot(even, even)
+    from_odd = np.where(is_reflex[0] | is_reflex[2], False, is_reflex[1] | is_reflex[3] | shorter)
     halves = np.where(from_odd[:, None], [0, 1, 3, 1, 2, 3], [0, 1, 2, 0, 2, 3])
     return np.take_along_axis(corners, halves, axis=1).reshape(-1, 3), np.repeat(quads, 2)
 
 
 def _concave(mesh: Mesh, polygons: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Which of the polygons have a reflex corner that cuts off more than rounding."""
-    part, _ = _part(mesh, polygons)
+    """(K,) True for polygons that have a reflex corner, by more than rounding."""
+    part, _ = _submesh(mesh, polygons)
     normals = area_vectors(part)
     turn = dot(
         corner_crosses(part), take_rows(normals, np.repeat(np.arange(len(polygons)), np.diff(part.starts)))
     )
-    return np.minimum.reduceat(turn, part.starts[:-1]) < -FLAT * dot(normals, normals)
+    return np.minimum.reduceat(turn, part.starts[:-1]) < -STRAIGHT * dot(normals, normals)
 
 
-def _part(mesh: Mesh, polygons: NDArray[np.intp]) -> tuple[Mesh, NDArray[np.int32]]:
-    """These polygons as a mesh with a vertex per corner, and the corners of `mesh` that it has."""
+def _submesh(mesh: Mesh, polygons: NDArray[np.intp]) -> tuple[Mesh, NDArray[np.int32]]:
+    """These polygons as a mesh of their own with a vertex per corner, and (C,) their corners in `mesh`."""
     size = np.diff(mesh.starts)[polygons]
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
     corners = np.arange(starts[-1], dtype=np.int32) + np.repeat(mesh.starts[polygons] - starts[:-1], size)
@@ -100,10 +105,13 @@ def _fans(mesh: Mesh, polygons: NDArray[np.intp]) -> tuple[NDArray[Any], NDArray
 
 
 def _ears(mesh: Mesh, polygon: np.intp) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The same of one concave polygon, by ear clipping; a fan where the polygon crosses itself beyond use."""
+    """(F, 3) corners of the triangles of one concave polygon, by ear clipping, and (F,) the polygon.
+
+    A fan where the polygon crosses itself so that ear clipping gives nothing.
+    """
     from mapbox_earcut import triangulate_float64
 
-    part, corners = _part(mesh, np.array([polygon]))
+    part, corners = _submesh(mesh, np.array([polygon]))
     flat = _on_plane(part.vertices, area_vectors(part)[0])
     cut = triangulate_float64(flat, np.array([len(flat)], np.uint32)).reshape(-1, 3).astype(np.int64)
     if not len(cut):

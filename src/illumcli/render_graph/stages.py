@@ -257,7 +257,7 @@ def corner_normals(how: tuple[Any, ...], meshes: tuple[Mesh, ...], geometry: Sce
     `how` says of each object whether they are its polygons' own (`flat`), what its file's description says
     (`Normals`), or the mesh's own (None).
     """
-    from illumcli.geometry.normals import corner_normals as of_mesh
+    from illumcli.geometry.corner_normals import corner_normals as of_mesh
 
     known: dict[tuple[int, str, bool], Any] = {}
     own = []
@@ -299,7 +299,7 @@ def polygon_normals(
     methods: tuple[Any, ...], meshes: tuple[Mesh, ...], geometry: SceneGeometry
 ) -> NDArray[np.float32]:
     """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
-    from illumcli.geometry.normals import polygon_normals as of_mesh
+    from illumcli.geometry.polygon_normals import polygon_normals as of_mesh
 
     parts = []
     for mesh, method, placed in zip(meshes, methods, geometry.placed, strict=True):

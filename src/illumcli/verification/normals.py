@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.geometry import formula, normals
+from illumcli.geometry import formula, single_normals
+from illumcli.geometry.corner_normals import Weights
 from illumcli.verification.inputs import Inputs
 
-WEIGHTS: dict[str, normals.Weights] = {"equal": "equal", "area": "area", "angle": "angle"}
+WEIGHTS: dict[str, Weights] = {"equal": "equal", "area": "area", "angle": "angle"}
 IMPLICIT = {
     "plane": "{a}*x + {b}*y + {c}*z",
     "ellipsoid": "(x/{a})**2 + (y/{b})**2 + (z/{c})**2",
@@ -27,24 +28,24 @@ PARAMETRIC = {
 
 
 def polygon_normal_cross(inputs: Inputs) -> NDArray[Any]:
-    return normals.cross_normal(inputs.vectors("vertices"), int(inputs.number("index")))
+    return single_normals.cross_normal(inputs.vectors("vertices"), int(inputs.number("index")))
 
 
 def polygon_normal_edge_average(inputs: Inputs) -> NDArray[Any]:
-    return normals.edge_average_normal(inputs.vectors("vertices"))
+    return single_normals.edge_average_normal(inputs.vectors("vertices"))
 
 
 def newell_plane(inputs: Inputs) -> NDArray[Any]:
-    return normals.newell_plane(inputs.vectors("vertices"))
+    return single_normals.newell_plane(inputs.vectors("vertices"))
 
 
 def plane_solve(inputs: Inputs) -> NDArray[Any]:
-    return normals.plane_solve(*(inputs.vectors(key)[0] for key in ("p1", "p2", "p3")))
+    return single_normals.plane_solve(*(inputs.vectors(key)[0] for key in ("p1", "p2", "p3")))
 
 
 def vertex_normal(inputs: Inputs) -> NDArray[Any]:
     weights = inputs.choose("weighting", WEIGHTS)
-    return normals.vertex_normal(
+    return single_normals.vertex_normal(
         inputs.vectors("vertex")[0], inputs.vectors("ring"), bool(inputs.value("closed")), weights
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors, column_major, unit
-from illumcli.geometry.normals import cross_normal
+from illumcli.geometry.single_normals import cross_normal
 from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.interaction import bend
 from illumcli.verification.inputs import Inputs

@@ -95,7 +95,7 @@ def _implied_reached(
     )
     hit = tracer.closest(own, _above(_at(l, curved), ng))
     near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
-    same = smooth.parts.joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
+    same = smooth.parts.are_joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
     reached = np.zeros(len(sample), np.bool_)
     reached[curved[(hit.distance >= near) | same]] = True
     return reached

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic_core import SchemaValidator, ValidationError
 
-from illumcli.geometry.normals import area_vectors, polygon_normals
+from illumcli.geometry.polygon_normals import area_vectors, polygon_normals
 from illumcli.geometry.shapes import AnyShape
 from illumcli.geometry.shapes._base import MAX_TRIANGLES
 from illumcli.geometry.triangulate import triangulate

@@ -5,7 +5,7 @@ import pytest
 from pydantic_core import ValidationError
 
 from illumcli.errors import InputError, LimitError
-from illumcli.geometry.normals import area_vectors, polygon_normals
+from illumcli.geometry.polygon_normals import area_vectors, polygon_normals
 from illumcli.geometry.shapes import implicit
 from illumcli.geometry.shapes.implicit import Implicit
 

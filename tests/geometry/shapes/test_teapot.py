@@ -35,7 +35,7 @@ def test_it_is_the_well_known_teapot_vertex_by_vertex():
 
 def test_normals_are_those_of_the_surface_not_of_the_facets():
     """Facets approach the exact normals with the resolution, everywhere at least linearly."""
-    from illumcli.geometry.normals import polygon_normals
+    from illumcli.geometry.polygon_normals import polygon_normals
 
     worst = []
     for resolution in (12, 24):

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.normals import corner_normals
 from illumcli.mesh_files import read_mesh
 
 

@@ -82,26 +82,26 @@ def problems(call):
 
 
 def test_every_vector_of_the_package_passes():
-    rows = job.run()
-    job.check(rows)
+    rows = job.verify()
+    job.refuse_failures(rows)
     assert sum(len(row.outcomes) for row in rows) == len(ENTRIES) == 1729
     assert {row.type for row in rows} == set(job.EVALUATORS)
 
 
 def test_float64_keeps_twelve_digits_wherever_the_inputs_do():
     exact = {entry["id"] for entry in ENTRIES if entry["rtol"] <= 1e-12}
-    rows = job.run(only=sorted(set(job.EVALUATORS) - set(CAST)))
+    rows = job.verify(only=sorted(set(job.EVALUATORS) - set(CAST)))
     errors = {o.case.id: o.error for row in rows for o in row.outcomes if o.case.id in exact}
     assert len(errors) > 1000
     assert max(errors.values()) <= 1e-12
 
 
 def test_a_wrong_expected_value_is_caught_in_every_type(write):
-    rows = job.run(write([changed(entry) for entry in one_per_type()]))
+    rows = job.verify(write([changed(entry) for entry in one_per_type()]))
     assert {row.type for row in rows} == set(job.EVALUATORS)
     assert [row.type for row in rows if not row.failed] == []
     with pytest.raises(ThresholdError, match="and 45 more"):
-        job.check(rows)
+        job.refuse_failures(rows)
 
 
 def test_status_is_0_within_tolerance_and_3_beyond(write, illum_verify):
@@ -120,7 +120,7 @@ def test_compressed_files_are_read_by_their_suffix(tmp_path, opener):
     path = tmp_path / f"v.json.{'gz' if opener is gzip.open else 'xz'}"
     with opener(path, "wt") as file:
         json.dump([LAMBERT], file)
-    assert not job.run(path)[0].failed
+    assert not job.verify(path)[0].failed
 
 
 def test_only_looks_at_these_types(illum_verify):
@@ -139,10 +139,10 @@ def test_an_unknown_type_names_its_cases(write):
             LAMBERT | {"id": "b", "model": "lambert_brfd"},
         ]
     )
-    assert problems(lambda: job.run(path)) == [
+    assert problems(lambda: job.verify(path)) == [
         f"{path}: no case type 'lambert_brfd' (a, b); did you mean 'lambert_brdf'?"
     ]
-    assert not job.run(path, ["lambert_brdf"])[0].failed
+    assert not job.verify(path, ["lambert_brdf"])[0].failed
 
 
 @pytest.mark.parametrize(
@@ -158,12 +158,12 @@ def test_an_unknown_type_names_its_cases(write):
 )
 def test_a_malformed_file_is_told_where_and_what(write, text, fact):
     path = write(text)
-    assert problems(lambda: job.run(path)) == [f"{path}{fact}"]
+    assert problems(lambda: job.verify(path)) == [f"{path}{fact}"]
 
 
 def test_all_problems_of_a_file_come_at_once(write):
     path = write([LAMBERT | {"rtol": -1, "expected": "much"}, {}, LAMBERT, LAMBERT | {"inputs": [1]}])
-    assert problems(lambda: job.run(path)) == [
+    assert problems(lambda: job.verify(path)) == [
         f"{path}: case 1 (mine): expected: must be a number or a list of numbers, is the text 'much'",
         f"{path}: case 1 (mine): rtol: must be a number of at least 0, is -1",
         f"{path}: case 2: lacks id, model, inputs, expected, rtol, atol",
@@ -182,14 +182,14 @@ def test_all_problems_of_a_file_come_at_once(write):
 )
 def test_inputs_that_a_formula_does_not_take(write, change, fact):
     path = write([LAMBERT | {"inputs": LAMBERT["inputs"] | change}])
-    assert f"{path}: mine: {fact}" in problems(lambda: job.run(path))
+    assert f"{path}: mine: {fact}" in problems(lambda: job.verify(path))
 
 
 def test_a_missing_input_and_an_unknown_kind(write):
     path = write([LAMBERT | {"inputs": {"albedo": 1.0}}])
-    assert problems(lambda: job.run(path)) == [f"{path}: mine: inputs lack 'n'"]
+    assert problems(lambda: job.verify(path)) == [f"{path}: mine: inputs lack 'n'"]
     path = write([LAMBERT | {"model": "attenuation", "inputs": {"kind": "inverse_sqare", "d": 1}}])
-    assert problems(lambda: job.run(path)) == [
+    assert problems(lambda: job.verify(path)) == [
         f"{path}: mine: no kind 'inverse_sqare'; did you mean 'inverse_square'?"
     ]
 
@@ -203,7 +203,7 @@ def test_a_file_that_is_not_there(tmp_path, illum_verify):
 def test_a_result_that_is_no_number_fails(write):
     endless = {"kind": "inverse_square", "d": 1e-200}
     path = write([LAMBERT | {"model": "attenuation", "inputs": endless, "expected": 1.0}])
-    rows = job.run(path)
+    rows = job.verify(path)
     assert rows[0].failed == ["mine"]
     assert "inf" in job.as_table(rows)
 
@@ -232,7 +232,7 @@ def test_single_precision_names_the_cause(write):
         "inputs": {"kind": "inverse_square", "d": 1e22},
         "expected": 1e-44,
     }
-    rows = job.run_single(write([sharp, far, LAMBERT]))
+    rows = job.verify_single(write([sharp, far, LAMBERT]))
     causes = {loss.outcome.case.id: loss for row in rows for loss in row.losses}
     assert set(causes) == {"sharp", "far"}
     assert causes["far"].cause == "range"
@@ -240,7 +240,7 @@ def test_single_precision_names_the_cause(write):
 
 
 def test_float32_arithmetic_itself_loses_next_to_nothing():
-    rows = job.run_single()
+    rows = job.verify_single()
     own = [loss for row in rows for loss in row.losses if loss.cause == "arithmetic"]
     assert len(own) <= 5
     assert max(loss.outcome.error for loss in own) < 3e-5

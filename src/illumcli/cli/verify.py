@@ -49,9 +49,9 @@ def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bo
 
     file = file or job.PACKAGED
     if precision == "single":
-        single = job.run_single(file, only)
+        single = job.verify_single(file, only)
         click.echo(json.dumps(job.single_data(single), indent=2) if as_json else job.single_table(single))
         return
-    rows = job.run(file, only)
-    click.echo(json.dumps(job.as_data(rows), indent=2) if as_json else job.as_table(rows))
-    job.check(rows)
+    results = job.verify(file, only)
+    click.echo(json.dumps(job.as_data(results), indent=2) if as_json else job.as_table(results))
+    job.refuse_failures(results)

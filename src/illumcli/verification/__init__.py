@@ -1,4 +1,4 @@
-"""Checks the renderer's own formulas against reference vectors."""
+"""Verification: the renderer's own formulas against reference vectors."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from illumcli.verification import (
     scanline,
 )
 from illumcli.verification.inputs import Inputs
-from illumcli.verification.outcome import Row, judge
+from illumcli.verification.outcome import Result, TypeResult, judge
 from illumcli.verification.report import as_data, as_table, single_data, single_table
-from illumcli.verification.single import SingleRow, single_row
+from illumcli.verification.single import SingleResult, single_result
 from illumcli.verification.vectors import PACKAGED, Case, read_cases, shorten
 
 __all__ = [
@@ -32,14 +32,14 @@ __all__ = [
     "PACKAGED",
     "as_data",
     "as_table",
-    "check",
-    "run",
-    "run_single",
+    "refuse_failures",
     "single_data",
     "single_table",
+    "verify",
+    "verify_single",
 ]
 
-EVALUATORS: dict[str, Callable[[Inputs], Any]] = {
+EVALUATORS: dict[str, Callable[[Inputs], Result]] = {
     **radiometry.CASES,
     **albedo.CASES,
     **phong.CASES,
@@ -50,47 +50,54 @@ EVALUATORS: dict[str, Callable[[Inputs], Any]] = {
     **measured.CASES,
     **obscurance.CASES,
 }
-"""Case type -> inputs to values, or to an Estimate."""
+"""Case type -> function from inputs to values, or to a Monte Carlo estimate."""
 
 
-def run(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[Row]:
-    """Every case of a vectors file in float64 beside what is expected, one row per type in the file's order.
+def verify(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[TypeResult]:
+    """The cases of a vectors file in float64 against what is expected, by type in the file's order.
 
     Parameters
     ----------
     file : Path
         By default the vectors that come with the package.
     only : sequence of str
-        Case types to look at; by default all.
+        Case types to verify; by default all.
 
     Raises
     ------
     InputError
-        The file is malformed, holds an unknown case type or inputs that a formula does not take.
+        The file is malformed, or holds an unknown case type or inputs that a formula does not accept.
     """
     groups = _by_type(read_cases(file, EVALUATORS, only))
     return [
-        Row(name, [judge(case, evaluate(file, case)) for case in cases]) for name, cases in groups.items()
+        TypeResult(name, [judge(case, evaluate(file, case)) for case in cases])
+        for name, cases in groups.items()
     ]
 
 
-def check(rows: Sequence[Row]) -> None:
-    """Raise ThresholdError where a case is beyond its tolerance."""
-    failed = [name for row in rows for name in row.failed]
+def refuse_failures(results: Sequence[TypeResult]) -> None:
+    """Raise ThresholdError if a case is beyond its tolerance."""
+    failed = [name for result in results for name in result.failed]
     if failed:
         raise ThresholdError(f"beyond their tolerance: {shorten(failed, 10)}")
 
 
-def run_single(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[SingleRow]:
-    """The same in float32: how far each type is off, and why. Types that cast rays, which are
-    always float32, are left out."""
+def verify_single(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[SingleResult]:
+    """The same in float32: how far each type is off, and why.
+
+    Types that cast rays, which are always float32, are left out.
+    """
     groups = _by_type(read_cases(file, EVALUATORS, only))
-    there = partial(evaluate, file)
-    return [single_row(name, cases, there) for name, cases in groups.items() if name not in obscurance.CAST]
+    evaluate_case = partial(evaluate, file)
+    return [
+        single_result(name, cases, evaluate_case)
+        for name, cases in groups.items()
+        if name not in obscurance.CAST
+    ]
 
 
-def evaluate(file: Path, case: Case, **precision: Any) -> Any:
-    """What the renderer makes of a case; `precision` sets fields of `Inputs`."""
+def evaluate(file: Path, case: Case, **precision: Any) -> Result:
+    """The renderer's result for a case; `precision` sets fields of `Inputs`."""
     place = f"{file}: {case.id}"
     inputs = Inputs(place, case.id, case.inputs, **precision)
     try:

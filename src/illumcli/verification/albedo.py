@@ -16,15 +16,17 @@ from illumcli.models.phong import Phong
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import response
 
-NODES = 24  # Gauss-Legendre nodes per panel
-HALVINGS = 24  # panels halve towards the normal, so that lobes of exponent 10^6 and more are resolved
+NODES = 24
+"""Gauss-Legendre nodes per panel."""
+HALVINGS = 24
+"""Panels halve towards the normal, so that lobes of exponent 10^6 and more are resolved."""
 RIGHT = np.pi / 2
 
 
 def directional_albedo(inputs: Inputs) -> NDArray[np.float64]:
     """The share of light from all directions that one lobe sends to the eye.
 
-    Lanes are evaluated in the precision asked for and summed in float64.
+    Responses are evaluated in the precision of the inputs and summed in float64.
     """
     kinds: dict[str, Callable[[], float]] = {
         "lambert": lambda: _eye_on_normal(Lambert(diffuse=inputs.color("albedo")), inputs),
@@ -50,7 +52,7 @@ def _eye_on_normal(
     inputs: Inputs,
     factor: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.ones_like,
 ) -> float:
-    """The integral where every azimuth is alike."""
+    """The integral where the response does not depend on the azimuth."""
     edges = np.concatenate([[0], RIGHT * 0.5 ** np.arange(HALVINGS, -1, -1)])
     theta, weight = _panels(edges)
     values = _response(model, inputs, theta, np.zeros_like(theta), 0.0)
@@ -82,10 +84,10 @@ def _response(
     l = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
     v = np.broadcast_to([np.sin(eye), 0, np.cos(eye)], l.shape)
     n = np.broadcast_to([0.0, 0, 1], l.shape)
-    lanes: dict[str, Vectors] = {
-        name: column_major(way, inputs.dtype) for name, way in (("n", n), ("l", l), ("v", v))
+    vectors: dict[str, Vectors] = {
+        name: column_major(vector, inputs.dtype) for name, vector in (("n", n), ("l", l), ("v", v))
     }
-    return response(model, **lanes)[:, 0].astype(np.float64)
+    return response(model, **vectors)[:, 0].astype(np.float64)
 
 
 CASES = {"directional_albedo": directional_albedo}

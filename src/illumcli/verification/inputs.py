@@ -1,4 +1,4 @@
-"""The inputs of one case as the renderer's functions take them: arrays of one lane, in a chosen precision."""
+"""The inputs of one case as the renderer's functions take them: arrays of length 1, in a chosen precision."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ T = TypeVar("T")
 class Inputs(Value):
     """The inputs of a case by key; what is missing or of the wrong kind is an InputError at `place`.
 
-    `dtype` is the precision of every array handed out. The keys in `rounded` pass through float32 first, so
+    `dtype` is the precision of every array returned. The keys in `rounded` pass through float32 first, so
     that float64 code can be run on the inputs that float32 code sees.
     """
 
@@ -44,8 +44,8 @@ class Inputs(Value):
         """A scalar, or None where the file has null."""
         return None if self.value(key) is None else self.number(key)
 
-    def lanes(self, key: str) -> Floats:
-        """(1,) a scalar as a lane."""
+    def scalars(self, key: str) -> Floats:
+        """(1,) a scalar as an array."""
         return self._array(key, ()).reshape(1)
 
     def color(self, key: str) -> tuple[float, float, float]:
@@ -77,9 +77,9 @@ class Inputs(Value):
 
     def between(self, start: str, end: str) -> Vectors:
         """(1, 3) unit direction from one point to another, in float64 before it is rounded."""
-        way = self._exact(end, (3,)) - self._exact(start, (3,))
+        vector = self._exact(end, (3,)) - self._exact(start, (3,))
         key = start if start in self.rounded else end
-        return column_major(self._round(key, way / np.linalg.norm(way)).reshape(1, 3))
+        return column_major(self._round(key, vector / np.linalg.norm(vector)).reshape(1, 3))
 
     def part(self, key: str) -> Inputs:
         """The inputs inside an object."""
@@ -93,7 +93,7 @@ class Inputs(Value):
         return [self._inside(key, each) for each in value]
 
     def choose(self, key: str, table: Mapping[str, T]) -> T:
-        """What `table` has for the word given."""
+        """The entry of `table` that the input names."""
         word = str(self.value(key))
         if word not in table:
             raise InputError(f"{self.place}: no {key} '{word}'; {suggestion(word, tuple(table))}")
@@ -105,6 +105,7 @@ class Inputs(Value):
         return replace(self, values=value, rounded=frozenset(value if key in self.rounded else ()))
 
     def _exact(self, key: str, *shapes: tuple[int | None, ...]) -> NDArray[np.float64]:
+        """The input in float64, of one of these shapes, where None stands for any length."""
         try:
             array = np.asarray(self.value(key))
         except ValueError:

@@ -21,12 +21,12 @@ from illumcli.verification.inputs import Inputs
 
 
 def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) -> Vectors:
-    """(N, 3) all lobes of the model; 0 on lanes that face away from the light, which never reach a model.
+    """(N, 3) sum of all lobes of the model; 0 where the surface faces away from the light.
 
     Parameters
     ----------
     more : (N, 3) or (3,)
-        Further words of the model: `v`, `t`, and `light`, the light's colour.
+        Further terms that the model reads: `v`, `t`, and `light`, the light's colour.
     """
     out = np.zeros_like(l)
     lit = np.flatnonzero(dot(n, l) > 0)
@@ -53,7 +53,7 @@ def facing(inputs: Inputs) -> bool:
 
 
 def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
-    """Terms of the renderer by name, from the case's n, l and v and `more` words."""
+    """Terms of the renderer by name, computed from the case's n, l and v and from `more`."""
     buffers: dict[str, Any] = {key: inputs.unit(key) for key in ("n", "l", "v")} | more
     for recipe in terms.steps(names, tuple(buffers)):
         buffers[recipe.output] = recipe.run(buffers)
@@ -74,13 +74,13 @@ def oren_nayar_bounces(inputs: Inputs) -> Floats:
     if not facing(inputs):
         return np.zeros(2, inputs.dtype)
     n_l, n_v, sin_l, sin_v, cos_phi = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "cos_phi")
-    one, two = oren_nayar_terms(n_l, n_v, sin_l, sin_v, cos_phi, inputs.lanes("sigma"))
-    rho = inputs.lanes("albedo")
+    one, two = oren_nayar_terms(n_l, n_v, sin_l, sin_v, cos_phi, inputs.scalars("sigma"))
+    rho = inputs.scalars("albedo")
     return np.concatenate([one * rho, two * rho * rho]) / np.pi
 
 
 def strauss(inputs: Inputs) -> Vectors:
-    """Light times response plus ambient light times what reflects it."""
+    """Light times response plus ambient light times the ambient reflectance."""
     model = Strauss(color=inputs.color("color"), **strauss_parameters(inputs))
     light, ambient = (np.asarray(inputs.color(key), inputs.dtype) for key in ("light", "ambient"))
     out = ambient * np.asarray(model.ambient_color(), inputs.dtype)
@@ -92,8 +92,8 @@ def strauss(inputs: Inputs) -> Vectors:
 def strauss_terms(inputs: Inputs) -> NDArray[Any]:
     """[r_d, r_n, F, G_i, G_r, r_j, r_s]."""
     white = Strauss(color=(1.0, 1.0, 1.0), **strauss_parameters(inputs))
-    s, t = inputs.lanes("smoothness"), inputs.lanes("transparency")
-    kj, kf, kg = (inputs.lanes(key) for key in ("kj", "kf", "kg"))
+    s, t = inputs.scalars("smoothness"), inputs.scalars("transparency")
+    kj, kf, kg = (inputs.scalars(key) for key in ("kj", "kf", "kg"))
     n_l, n_v, sin_l, sin_v, gap_rv = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "gap_rv")
     specular = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, kj, kf, kg)
     r_d = np.asarray(white.diffuse_color(), inputs.dtype)[:1]
@@ -106,11 +106,11 @@ def strauss_parameters(inputs: Inputs) -> dict[str, Any]:
 
 
 def fresnel_of_strauss(inputs: Inputs) -> Floats:
-    return strauss_fresnel(inputs.lanes("x"), inputs.lanes("kf"))
+    return strauss_fresnel(inputs.scalars("x"), inputs.scalars("kf"))
 
 
 def geometry_of_strauss(inputs: Inputs) -> Floats:
-    return strauss_geometry(1 - inputs.lanes("x"), inputs.lanes("kg"))
+    return strauss_geometry(1 - inputs.scalars("x"), inputs.scalars("kg"))
 
 
 def ward(inputs: Inputs) -> Floats:
@@ -134,7 +134,7 @@ def ashikhmin_shirley(inputs: Inputs) -> Floats:
 
 
 def kajiya_kay(inputs: Inputs) -> Floats:
-    """A strand on its own: no surface hides the light, so the lobes are asked directly."""
+    """A strand of hair: no surface hides the light, so the lobes are evaluated directly."""
     model = KajiyaKay(
         diffuse=inputs.color("kd"), specular=inputs.color("ks"), exponent=inputs.number("exponent")
     )

@@ -33,7 +33,7 @@ def angles(inputs: Inputs) -> tuple[Floats, Floats, Floats]:
 
 def merl_index(inputs: Inputs) -> NDArray[Any]:
     """Cell numbers along theta_h, theta_d, phi_d, and in the whole table."""
-    return np.concatenate(merl.merl_index(*(inputs.lanes(key) for key in ("theta_h", "theta_d", "phi_d"))))
+    return np.concatenate(merl.merl_index(*(inputs.scalars(key) for key in ("theta_h", "theta_d", "phi_d"))))
 
 
 CASES = {f.__name__: f for f in (rusinkiewicz, rusinkiewicz_theta, merl_index)}

@@ -48,7 +48,7 @@ def ndf(inputs: Inputs) -> Floats:
     n_s, length2 = terms.n_s(n, h), terms.s_s(h)
     cosine, sin2 = terms.n_h(n_s, length2), terms.sin2_h(terms.nxs(n, h), n_s, length2)
     if d.value("kind") == "beckmann_slope1d":
-        return _microfacet.beckmann_slope1d(cosine, sin2, d.lanes("m"))
+        return _microfacet.beckmann_slope1d(cosine, sin2, d.scalars("m"))
     distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
     return share * distribution.density(cosine, sin2, printed)
 
@@ -79,33 +79,33 @@ def cook_torrance(inputs: Inputs) -> Floats:
 
 
 def fresnel_dielectric(inputs: Inputs) -> Floats:
-    return _fresnel.dielectric(inputs.lanes("cos"), inputs.lanes("eta"))
+    return _fresnel.dielectric(inputs.scalars("cos"), inputs.scalars("eta"))
 
 
 def fresnel_conductor(inputs: Inputs) -> Floats:
-    return _fresnel.conductor(inputs.lanes("cos"), inputs.lanes("eta"), inputs.lanes("k"))
+    return _fresnel.conductor(inputs.scalars("cos"), inputs.scalars("eta"), inputs.scalars("k"))
 
 
 def fresnel_schlick(inputs: Inputs) -> Floats:
-    return _fresnel.schlick(inputs.lanes("cos"), inputs.lanes("f0"))
+    return _fresnel.schlick(inputs.scalars("cos"), inputs.scalars("f0"))
 
 
 def fresnel_sin_tan(inputs: Inputs) -> Floats:
     """The form by angles: the dielectric at c = cos(phi)."""
-    return _fresnel.dielectric(np.cos(inputs.lanes("phi")), inputs.lanes("mu"))
+    return _fresnel.dielectric(np.cos(inputs.scalars("phi")), inputs.scalars("mu"))
 
 
 def eta_from_f0(inputs: Inputs) -> Floats:
-    return _fresnel.eta_from_f0(inputs.lanes("f0"))
+    return _fresnel.eta_from_f0(inputs.scalars("f0"))
 
 
 def f0_from_eta(inputs: Inputs) -> Floats:
-    return _fresnel.f0_from_eta(inputs.lanes("eta"), inputs.lanes("k"))
+    return _fresnel.f0_from_eta(inputs.scalars("eta"), inputs.scalars("k"))
 
 
 def ct_color_shift(inputs: Inputs) -> NDArray[Any]:
     color0, color90 = (np.asarray(inputs.color(key), inputs.dtype) for key in ("color0", "color90"))
-    return _fresnel.color_shift(inputs.lanes("cos"), inputs.lanes("eta"), color0, color90)
+    return _fresnel.color_shift(inputs.scalars("cos"), inputs.scalars("eta"), color0, color90)
 
 
 CASES = {

@@ -59,7 +59,7 @@ def implicit_normal(inputs: Inputs) -> NDArray[Any]:
 def parametric_normal(inputs: Inputs) -> NDArray[Any]:
     """df/du x df/dv."""
     x, y, z = (parsed(text, inputs, ("u", "v")) for text in inputs.choose("surface", PARAMETRIC))
-    u, v = (inputs.lanes(key).astype(np.float64) for key in ("u", "v"))
+    u, v = (inputs.scalars(key).astype(np.float64) for key in ("u", "v"))
     return formula.parametric_normal(x, y, z, u, v)[0]
 
 

@@ -1,7 +1,7 @@
 """Evaluators of the obscurance cases: the falloff itself, and closed forms against the Monte Carlo estimator.
 
 A closed form is built as real geometry and estimated at its receiver by the same code that shades pixels. The
-estimate answers to its own standard error, from independent turns of the sampling pattern.
+estimate is compared by its own standard error, from independent turns of the sample pattern.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from illumcli.visibility.hemisphere import Hemispheres
 from illumcli.visibility.obscurance import Method, estimates
 
 PATTERNS = 128
-RAYS = 256  # per pattern
+RAYS = 256
+"""Per pattern."""
 RESOLUTION = 1 / (64 * RAYS)
-"""No estimate is taken to be better than this: the 16 phases of a pattern resolve r^2 to 1 / (32 RAYS)."""
+"""Least standard error of an estimate: the 16 phases of a pattern resolve r^2 to 1 / (32 RAYS)."""
 
 
 def exponential(inputs: Inputs) -> Exponential:
@@ -40,7 +41,7 @@ def exponential(inputs: Inputs) -> Exponential:
 
 def mu(inputs: Inputs) -> Floats:
     falloff = exponential(inputs)
-    return falloff.weight(inputs.lanes("x"), falloff.reach(1.0), 1.0)
+    return falloff.weight(inputs.scalars("x"), falloff.reach(1.0), 1.0)
 
 
 def ao_visible(inputs: Inputs) -> Estimate:
@@ -60,12 +61,15 @@ def obscured(inputs: Inputs) -> Estimate:
 
 def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
+    # One receiver for every pattern, at the origin of the scene.
     geometry = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     ng = column_major(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
     here = np.tile(geometry.render_space.from_world(np.zeros(3)), (PATTERNS, 1))
     corners = around.vertices[around.triangles[0]]
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / geometry.render_space.radius
     origins = offset_ray_origins(here, ng, np.full(PATTERNS, edge))
+
+    # A random turn and phase for each pattern.
     number = np.arange(PATTERNS, dtype=np.uint32)
     draws = np.stack(
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
@@ -73,8 +77,8 @@ def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     core = tracer(geometry.vertices, geometry.triangles)
     method = Method(RAYS, falloff, geometry.render_space.radius)
     w = estimates(core, Hemispheres(ng, origins), draws, method, errors=False).w.astype(np.float64)
-    spread = float(w.std(ddof=1)) / np.sqrt(PATTERNS)
-    return Estimate(float(w.mean()), float(np.hypot(spread, RESOLUTION)))
+    standard_error = float(w.std(ddof=1)) / np.sqrt(PATTERNS)
+    return Estimate(float(w.mean()), float(np.hypot(standard_error, RESOLUTION)))
 
 
 CAST: dict[str, Callable[[Inputs], Estimate]] = {

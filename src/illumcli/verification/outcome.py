@@ -1,9 +1,9 @@
-"""What came out of a case, and how a case type did as a whole."""
+"""The outcome of a case, and of all cases of a type."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,12 @@ class Estimate(Value):
     standard_error: float
 
 
+Result: TypeAlias = NDArray[Any] | Estimate
+"""What an evaluator returns: values of any shape, in the order of what is expected."""
+
+
 class Outcome(Record):
-    """A case's error, and the largest that passes, in the same unit."""
+    """A case's error, and the largest error that passes, in the same unit."""
 
     case: Case
     error: float
@@ -37,8 +41,8 @@ class Outcome(Record):
         return self.error <= self.allowed
 
 
-class Row(Record):
-    """One case type: its outcomes, summed up."""
+class TypeResult(Record):
+    """The outcomes of one case type."""
 
     type: str
     outcomes: Sequence[Outcome]
@@ -51,10 +55,7 @@ class Row(Record):
     @property
     def used(self) -> float:
         """The largest share of its own tolerance that a case needs; above 1 it fails."""
-        shares = [
-            o.error / o.allowed if o.allowed else (0.0 if o.error == 0 else np.inf) for o in self.outcomes
-        ]
-        return float(max(shares))
+        return float(max(_share(outcome.error, outcome.allowed) for outcome in self.outcomes))
 
     @property
     def failed(self) -> list[str]:
@@ -62,11 +63,18 @@ class Row(Record):
         return [outcome.case.id for outcome in self.outcomes if not outcome.passed]
 
 
-def judge(case: Case, result: Any) -> Outcome:
-    """A result beside what was expected."""
+def _share(error: float, allowed: float) -> float:
+    """Of the tolerance that an error needs; inf where nothing but 0 passes."""
+    if allowed:
+        return error / allowed
+    return 0.0 if error == 0 else float("inf")
+
+
+def judge(case: Case, result: Result) -> Outcome:
+    """The error of a result and what the case allows."""
     if isinstance(result, Estimate):
-        away = deviation(case, np.array([result.value]))
-        return Outcome(case, away / result.standard_error, STANDARD_ERRORS, statistical=True)
+        error = deviation(case, np.array([result.value]))
+        return Outcome(case, error / result.standard_error, STANDARD_ERRORS, statistical=True)
     return Outcome(case, deviation(case, result) / case.scale, case.allowed / case.scale)
 
 

@@ -36,10 +36,10 @@ def intensity(Lobe: Model, inputs: Inputs) -> Vectors:
     """(1, 3) from lights given by their directions."""
     model = surface(Lobe, inputs)
     n, v = inputs.unit("n"), inputs.unit("v")
-    total = own_light(inputs)
+    total = emitted_and_ambient(inputs)
     for light in inputs.parts("lights"):
         lit = response(model, n=n, l=light.unit("l"), v=v)
-        total += lit * light.lanes("f_d") * np.asarray(light.color("intensity"), total.dtype)
+        total += lit * light.scalars("f_d") * np.asarray(light.color("intensity"), total.dtype)
     return total
 
 
@@ -48,7 +48,7 @@ def phong_rgb_positional(inputs: Inputs) -> NDArray[np.floating]:
     model = surface(inputs.choose("lobe", LOBES), inputs)
     n, point = inputs.unit("n"), inputs.vectors("point")
     v = inputs.between("point", "eye")
-    total = own_light(inputs)
+    total = emitted_and_ambient(inputs)
     for light in inputs.parts("lights"):
         x, y, z = (float(c) for c in light.vectors("position")[0])
         lamp = Point(light="point", position=(x, y, z), attenuation=polynomial(inputs))
@@ -63,7 +63,7 @@ def surface(Lobe: Model, inputs: Inputs) -> Phong | BlinnPhong:
     return Lobe(diffuse=inputs.color("kd"), specular=inputs.color("ks"), exponent=inputs.number("exponent"))
 
 
-def own_light(inputs: Inputs) -> Vectors:
+def emitted_and_ambient(inputs: Inputs) -> Vectors:
     """(1, 3) Ie + Ia ka."""
     emitted, ambient, ka = (np.asarray(inputs.color(key), inputs.dtype) for key in ("Ie", "Ia", "ka"))
     return column_major((emitted + ambient * ka)[None])

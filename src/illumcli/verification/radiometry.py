@@ -30,7 +30,7 @@ def attenuation(inputs: Inputs) -> Floats:
         "inverse_square": lambda: InverseSquare(law="inverse_square"),
         "inverse_4pi_square": lambda: InverseSquareFlux(law="inverse_square_flux"),
     }
-    return inputs.choose("kind", laws)().factor(inputs.lanes("d"))
+    return inputs.choose("kind", laws)().factor(inputs.scalars("d"))
 
 
 def photometry_law(inputs: Inputs) -> Floats:
@@ -40,7 +40,7 @@ def photometry_law(inputs: Inputs) -> Floats:
         inputs.vectors("point"), HERE
     )
     cosine = np.maximum(dot(inputs.unit("n"), arriving.l), 0)
-    return inputs.lanes("intensity") * arriving.irradiance_scale * cosine
+    return inputs.scalars("intensity") * arriving.irradiance_scale * cosine
 
 
 def lambert_brdf(inputs: Inputs) -> Floats:
@@ -52,19 +52,19 @@ def lambert_radiance(inputs: Inputs) -> Floats:
     law = InverseSquare(law="inverse_square")
     n, l = inputs.unit("n"), inputs.unit("l")
     model = Lambert(diffuse=inputs.color("albedo"))
-    irradiance = inputs.lanes("intensity") * law.factor(inputs.lanes("distance"))
+    irradiance = inputs.scalars("intensity") * law.factor(inputs.scalars("distance"))
     return response(model, n=n, l=l)[:, 0] * irradiance
 
 
 def lighting_12_75(inputs: Inputs) -> Floats:
     """Ambient light times obscurance plus direct light: kept apart, or coupled as one text prints it."""
-    n, kd, w = inputs.unit("n"), inputs.lanes("kd"), inputs.lanes("w")
-    ambient = (inputs.lanes("ka") * inputs.lanes("Ia"))[:, None]
+    n, kd, w = inputs.unit("n"), inputs.scalars("kd"), inputs.scalars("w")
+    ambient = (inputs.scalars("ka") * inputs.scalars("Ia"))[:, None]
     law = InverseSquare(law="inverse_square")
     direct = np.zeros_like(kd)
     for light in inputs.parts("lights"):
-        irradiance = light.lanes("intensity") * law.factor(light.lanes("distance"))
-        direct += light.lanes("delta") * irradiance * np.maximum(dot(n, light.unit("l")), 0)
+        irradiance = light.scalars("intensity") * law.factor(light.scalars("distance"))
+        direct += light.scalars("delta") * irradiance * np.maximum(dot(n, light.unit("l")), 0)
     forms: dict[str, Callable[[], Vectors]] = {
         "corrected": lambda: ambient_light(ambient, WHITE, w) + kd * direct,
         "printed": lambda: coupled(ambient, WHITE, (kd * direct)[:, None], direct[:, None], w),

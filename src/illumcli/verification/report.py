@@ -1,4 +1,4 @@
-"""Prints verification as tables and as data for JSON."""
+"""Verification results as tables, and as data for JSON."""
 
 from __future__ import annotations
 
@@ -6,79 +6,91 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from illumcli.verification.outcome import STANDARD_ERRORS, Outcome, Row
-from illumcli.verification.single import FINE, SingleRow
+from illumcli.tables import aligned
+from illumcli.verification.outcome import STANDARD_ERRORS, Outcome, TypeResult
+from illumcli.verification.single import FINE, SingleResult
 
 
-def as_table(rows: Sequence[Row]) -> str:
+def as_table(results: Sequence[TypeResult]) -> str:
     """One line per case type, and a summary."""
     lines = [("type", "cases", "worst error", "in case", "tolerance", "used", "verdict")]
-    for row in rows:
-        worst = row.worst
-        verdict = f"{len(row.failed)} beyond" if row.failed else "ok"
-        numbers = (_error(worst, worst.error), worst.case.id, _error(worst, worst.allowed), f"{row.used:.2g}")
-        lines.append((row.type, str(len(row.outcomes)), *numbers, verdict))
-    return f"{_aligned(lines, left=(0, 3, 6))}\n\n{summary(rows)}"
+    for result in results:
+        worst = result.worst
+        verdict = f"{len(result.failed)} beyond" if result.failed else "ok"
+        numbers = (
+            _error(worst, worst.error),
+            worst.case.id,
+            _error(worst, worst.allowed),
+            f"{result.used:.2g}",
+        )
+        lines.append((result.type, str(len(result.outcomes)), *numbers, verdict))
+    return f"{_table(lines, right=(1, 2, 4, 5))}\n\n{summary(results)}"
 
 
-def summary(rows: Sequence[Row]) -> str:
-    """How many cases were looked at, and how many are beyond their tolerance."""
-    count = sum(len(row.outcomes) for row in rows)
-    statistical = sum(outcome.statistical for row in rows for outcome in row.outcomes)
-    failed = sum(len(row.failed) for row in rows)
+def summary(results: Sequence[TypeResult]) -> str:
+    """How many cases were verified, and how many are beyond their tolerance."""
+    count = sum(len(result.outcomes) for result in results)
+    statistical = sum(outcome.statistical for result in results for outcome in result.outcomes)
+    failed = sum(len(result.failed) for result in results)
     verdict = f"{failed} beyond their tolerance" if failed else "all within their tolerance"
-    told = f"{_counted(count, 'case')} of {_counted(len(rows), 'type')}: {verdict}"
+    text = f"{_counted(count, 'case')} of {_counted(len(results), 'type')}: {verdict}"
     if statistical:
-        told += f"; {statistical} by Monte Carlo, within {STANDARD_ERRORS} of its own standard errors (se)"
-    return told
+        text += f"; {statistical} by Monte Carlo, within {STANDARD_ERRORS} of its own standard errors (se)"
+    return text
 
 
-def as_data(rows: Sequence[Row]) -> dict[str, Any]:
-    """The same for JSON."""
+def as_data(results: Sequence[TypeResult]) -> dict[str, Any]:
+    """The results for JSON."""
     return {
         "precision": "double",
         "types": [
             {
-                "type": row.type,
-                "cases": len(row.outcomes),
-                "worst_error": _finite(row.worst.error),
-                "worst_case": row.worst.case.id,
-                "tolerance": row.worst.allowed,
-                "unit": "standard errors" if row.worst.statistical else "relative",
-                "used": _finite(row.used),
-                "failed": row.failed,
+                "type": result.type,
+                "cases": len(result.outcomes),
+                "worst_error": _finite(result.worst.error),
+                "worst_case": result.worst.case.id,
+                "tolerance": result.worst.allowed,
+                "unit": "standard errors" if result.worst.statistical else "relative",
+                "used": _finite(result.used),
+                "failed": result.failed,
             }
-            for row in rows
+            for result in results
         ],
-        "cases": sum(len(row.outcomes) for row in rows),
-        "failed": sum(len(row.failed) for row in rows),
+        "cases": sum(len(result.outcomes) for result in results),
+        "failed": sum(len(result.failed) for result in results),
     }
 
 
-def single_table(rows: Sequence[SingleRow]) -> str:
+def single_table(results: Sequence[SingleResult]) -> str:
     """Worst errors of float32 per type; then, for each type that loses digits, its worst case and why."""
     lines = [("type", "cases", "worst error", "in case", f"above {FINE:.0e}")]
     lines += [
-        (row.type, str(len(row.outcomes)), f"{row.worst.error:.1e}", row.worst.case.id, str(len(row.losses)))
-        for row in rows
+        (
+            result.type,
+            str(len(result.outcomes)),
+            f"{result.worst.error:.1e}",
+            result.worst.case.id,
+            str(len(result.losses)),
+        )
+        for result in results
     ]
-    text = _aligned(lines, left=(0, 3))
+    text = _table(lines, right=(1, 2, 4))
     lost = [("digits lost in", "error", "reason", "inputs")]
-    for row in rows:
-        if row.losses:
-            loss = max(row.losses, key=lambda each: each.outcome.error)
+    for result in results:
+        if result.losses:
+            loss = max(result.losses, key=lambda each: each.outcome.error)
             lost.append((loss.outcome.case.id, f"{loss.outcome.error:.1e}", loss.reason, loss.inputs))
     if len(lost) > 1:
-        text += "\n\n" + _aligned(lost, left=(0, 2, 3))
-    return f"{text}\n\n{single_summary(rows)}"
+        text += "\n\n" + _table(lost, right=(1,))
+    return f"{text}\n\n{single_summary(results)}"
 
 
-def single_summary(rows: Sequence[SingleRow]) -> str:
+def single_summary(results: Sequence[SingleResult]) -> str:
     """How many cases lost digits, by cause."""
-    count = sum(len(row.outcomes) for row in rows)
-    causes = Counter(loss.cause for row in rows for loss in row.losses)
+    count = sum(len(result.outcomes) for result in results)
+    causes = Counter(loss.cause for result in results for loss in result.losses)
     return (
-        f"{_counted(count, 'case')} of {_counted(len(rows), 'type')} in float32: "
+        f"{_counted(count, 'case')} of {_counted(len(results), 'type')} in float32: "
         f"{causes.total()} above {FINE:.0e}; "
         f"{causes['inputs']} because rounding the inputs alone does it, "
         f"{causes['range']} outside float32's range, "
@@ -86,16 +98,16 @@ def single_summary(rows: Sequence[SingleRow]) -> str:
     )
 
 
-def single_data(rows: Sequence[SingleRow]) -> dict[str, Any]:
-    """The same for JSON, with every case that lost digits."""
+def single_data(results: Sequence[SingleResult]) -> dict[str, Any]:
+    """The results for JSON, with every case that lost digits."""
     return {
         "precision": "single",
         "types": [
             {
-                "type": row.type,
-                "cases": len(row.outcomes),
-                "worst_error": _finite(row.worst.error),
-                "worst_case": row.worst.case.id,
+                "type": result.type,
+                "cases": len(result.outcomes),
+                "worst_error": _finite(result.worst.error),
+                "worst_case": result.worst.case.id,
                 "lost": [
                     {
                         "case": loss.outcome.case.id,
@@ -104,12 +116,12 @@ def single_data(rows: Sequence[SingleRow]) -> dict[str, Any]:
                         "reason": loss.reason,
                         "inputs": loss.inputs,
                     }
-                    for loss in row.losses
+                    for loss in result.losses
                 ],
             }
-            for row in rows
+            for result in results
         ],
-        "cases": sum(len(row.outcomes) for row in rows),
+        "cases": sum(len(result.outcomes) for result in results),
     }
 
 
@@ -125,12 +137,5 @@ def _finite(value: float) -> float | None:
     return value if value < float("inf") else None
 
 
-def _aligned(lines: Sequence[tuple[str, ...]], left: tuple[int, ...]) -> str:
-    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
-    return "\n".join(
-        "  ".join(
-            word.ljust(width) if column in left else word.rjust(width)
-            for column, (word, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )
+def _table(rows: Sequence[Sequence[str]], right: Sequence[int]) -> str:
+    return "\n".join(aligned(rows, right))

@@ -18,15 +18,15 @@ from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.rays.interaction import bend
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import response
-from illumcli.verification.phong import own_light, surface
+from illumcli.verification.phong import emitted_and_ambient, surface
 
 Point = NDArray[Any]  # (3,) or (2,)
 
 
 def lerp(inputs: Inputs) -> Floats:
     """The value at the distance a from v1 and b from v2."""
-    a, b = inputs.lanes("a"), inputs.lanes("b")
-    return (b * inputs.lanes("v1") + a * inputs.lanes("v2")) / (a + b)
+    a, b = inputs.scalars("a"), inputs.scalars("b")
+    return (b * inputs.scalars("v1") + a * inputs.scalars("v2")) / (a + b)
 
 
 def constant_shading(inputs: Inputs) -> Floats:
@@ -34,7 +34,7 @@ def constant_shading(inputs: Inputs) -> Floats:
     n = unit(column_major(cross_normal(inputs.vectors("vertices"), 0)[None], inputs.dtype))
     up = column_major(np.array([[0, 0, 1]], inputs.dtype))
     model = BlinnPhong(diffuse=inputs.color("kd"), specular=(0.0, 0.0, 0.0))
-    return (own_light(inputs) + inputs.lanes("Ii") * response(model, n=n, l=up, v=up))[:, 0]
+    return (emitted_and_ambient(inputs) + inputs.scalars("Ii") * response(model, n=n, l=up, v=up))[:, 0]
 
 
 def gouraud_triangle(inputs: Inputs) -> Floats:
@@ -50,13 +50,13 @@ def gouraud_quad(inputs: Inputs) -> Floats:
 
 
 def _gouraud(inputs: Inputs, *edges: tuple[Point, Point, str, str]) -> Floats:
-    y = inputs.lanes("y")
+    y = inputs.scalars("y")
     ends = []
     for start, end, first, last in edges:
         t = _along(y, start, end)
-        ends.append((_mix(start[:1], end[:1], t), _mix(inputs.lanes(first), inputs.lanes(last), t)))
+        ends.append((_mix(start[:1], end[:1], t), _mix(inputs.scalars(first), inputs.scalars(last), t)))
     (xa, ia), (xb, ib) = ends
-    return np.concatenate([ia, ib, _mix(ia, ib, (inputs.lanes("x") - xa) / (xb - xa))])
+    return np.concatenate([ia, ib, _mix(ia, ib, (inputs.scalars("x") - xa) / (xb - xa))])
 
 
 def phong_shading_normal(inputs: Inputs) -> Vectors:
@@ -65,7 +65,7 @@ def phong_shading_normal(inputs: Inputs) -> Vectors:
     n1, n2, n3 = (inputs.unit(key) for key in ("n1", "n2", "n3"))
     kinds: dict[str, Callable[..., Vectors]] = {"linear": linear, "quadratic": quadratic}
     between = inputs.choose("interpolation", kinds) if "interpolation" in inputs.values else linear
-    y, x = inputs.lanes("y"), inputs.lanes("x")
+    y, x = inputs.scalars("y"), inputs.scalars("x")
     ta, tb = _along(y, p1[0], p2[0]), _along(y, p1[0], p3[0])
     pa, pb = _mix(p1, p2, ta), _mix(p1, p3, tb)
     na, nb = between(n1, n2, p2 - p1, ta), between(n1, n3, p3 - p1, tb)
@@ -78,13 +78,13 @@ def phong_shading_normal(inputs: Inputs) -> Vectors:
 def phong_shading(inputs: Inputs) -> Floats:
     """I of a pixel by Blinn-Phong with the interpolated normal."""
     n, l, v = column_major(phong_shading_normal(inputs)), inputs.unit("l"), inputs.unit("v")
-    lit = inputs.lanes("Ii")[:, None] * response(surface(BlinnPhong, inputs), n=n, l=l, v=v)
-    return (own_light(inputs) + lit)[:, 0]
+    lit = inputs.scalars("Ii")[:, None] * response(surface(BlinnPhong, inputs), n=n, l=l, v=v)
+    return (emitted_and_ambient(inputs) + lit)[:, 0]
 
 
 def quadratic_normal(inputs: Inputs) -> Vectors:
     """n(s) along an edge, not unit."""
-    return quadratic(inputs.unit("n0"), inputs.unit("n1"), inputs.vectors("delta"), inputs.lanes("s"))
+    return quadratic(inputs.unit("n0"), inputs.unit("n1"), inputs.vectors("delta"), inputs.scalars("s"))
 
 
 def linear(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:

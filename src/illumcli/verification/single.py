@@ -1,22 +1,23 @@
-"""Where single precision loses digits, and why: the renderer's formulas in float32 beside the reference."""
+"""Where single precision loses digits, and why: the renderer's formulas in float32 against the reference."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from illumcli.records import Record
-from illumcli.verification.outcome import Outcome, judge
+from illumcli.verification.outcome import Outcome, Result, judge
 from illumcli.verification.vectors import Case
 
 FINE = 1e-5
 """Relative error that float32 keeps where nothing cancels."""
 DIRECTIONS = ("l", "v", "h", "t")
+"""Inputs that are shown by their cosine to the normal."""
 
-Evaluate = Callable[..., Any]
-"""Case and precision to values."""
+Evaluate: TypeAlias = Callable[..., Result]
+"""From a case and the fields `dtype` and `rounded` of `Inputs`."""
 
 
 class Loss(Record):
@@ -27,10 +28,10 @@ class Loss(Record):
     """`inputs` where rounding them explains it, `range` where float32 has no such number, or `arithmetic`."""
     reason: str
     inputs: str
-    """What matters of the case's inputs, in short."""
+    """The case's inputs, in short."""
 
 
-class SingleRow(Record):
+class SingleResult(Record):
     """One case type in float32."""
 
     type: str
@@ -42,15 +43,10 @@ class SingleRow(Record):
         return max(self.outcomes, key=lambda outcome: outcome.error)
 
 
-def single_row(type_: str, cases: Sequence[Case], evaluate: Evaluate) -> SingleRow:
-    """The cases of one type in float32; those that lost digits with their reason.
-
-    Parameters
-    ----------
-    evaluate : function of a case and the fields `dtype` and `rounded` of `Inputs`
-    """
+def single_result(type_: str, cases: Sequence[Case], evaluate: Evaluate) -> SingleResult:
+    """The cases of one type in float32; those that lost digits with the reason."""
     outcomes = [_outcome(case, evaluate, dtype=np.float32) for case in cases]
-    return SingleRow(type_, outcomes, [_loss(o, evaluate) for o in outcomes if o.error > FINE])
+    return SingleResult(type_, outcomes, [_loss(o, evaluate) for o in outcomes if o.error > FINE])
 
 
 def _outcome(case: Case, evaluate: Evaluate, **precision: Any) -> Outcome:
@@ -58,20 +54,25 @@ def _outcome(case: Case, evaluate: Evaluate, **precision: Any) -> Outcome:
 
 
 def _loss(outcome: Outcome, evaluate: Evaluate) -> Loss:
+    """Why a case lost digits, found by rounding its inputs to float32 in float64 code."""
     case, limits = outcome.case, np.finfo(np.float32)
     short = shortened(case.inputs)
     if not limits.tiny <= case.scale <= limits.max:
         return Loss(outcome, "range", f"{case.scale:.1e} is outside float32's range", short)
 
-    def rounded(*keys: str) -> float:
-        return _outcome(case, evaluate, rounded=frozenset(keys)).error
-
-    by_inputs = rounded(*case.inputs)
+    # Less than half of the error comes from rounding the inputs: it is the arithmetic.
+    by_inputs = _outcome(case, evaluate, rounded=frozenset(case.inputs)).error
     if by_inputs < outcome.error / 2:
         return Loss(outcome, "arithmetic", f"arithmetic; rounding the inputs makes {by_inputs:.1e}", short)
-    alone = {key: rounded(key) for key, value in case.inputs.items() if not isinstance(value, str | bool)}
-    key = max(alone, key=lambda name: alone[name])
-    return Loss(outcome, "inputs", f"rounding {key} alone makes {alone[key]:.1e}", short)
+
+    # Otherwise name the input whose rounding alone does most.
+    by_input = {
+        key: _outcome(case, evaluate, rounded=frozenset([key])).error
+        for key, value in case.inputs.items()
+        if not isinstance(value, str | bool)
+    }
+    key = max(by_input, key=lambda name: by_input[name])
+    return Loss(outcome, "inputs", f"rounding {key} alone makes {by_input[key]:.1e}", short)
 
 
 def shortened(inputs: Mapping[str, Any]) -> str:
@@ -85,6 +86,7 @@ def shortened(inputs: Mapping[str, Any]) -> str:
         elif isinstance(value, dict):
             parts.append(f"{key}({shortened(value)})")
         elif key in DIRECTIONS and "n" in inputs:
-            n, way = np.array(inputs["n"], float), np.array(value, float)
-            parts.append(f"n.{key}={n @ way / np.linalg.norm(n) / np.linalg.norm(way):.4g}")
+            n, vector = np.array(inputs["n"], float), np.array(value, float)
+            cosine = n @ vector / np.linalg.norm(n) / np.linalg.norm(vector)
+            parts.append(f"n.{key}={cosine:.4g}")
     return " ".join(parts)

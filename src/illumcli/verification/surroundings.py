@@ -1,9 +1,9 @@
 """The geometry of the obscurance cases as real triangles around a receiver at the origin that faces +z.
 
-What the closed forms take as endless is built so large that what is missing lets through less than 10^-5 of
-the light. Round shapes are polygons of the same area, or have their corners raised until facets lie at the
-right distance on average; either leaves an error of second order, below 10^-5. Flat receivers lie on a floor,
-so a ray that hits the surface it started from would show.
+What the closed forms take as infinite is built so large that the rest would block less than 10^-5 of the
+light. Round shapes are polygons of the same area, or have their corners raised until facets lie at the right
+distance on average; either leaves an error of second order, below 10^-5. Flat receivers lie on a floor, so
+that rays which hit the surface they start from are noticed.
 """
 
 from __future__ import annotations
@@ -16,10 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from illumcli.records import Record
 from illumcli.verification.inputs import Inputs
 
-ENDLESS = 1e5  # size of walls without an end, in distances to the wall
-LONG = 1e2  # length of walls of a finite height: what is missing shrinks with the third power
-WIDE = 3e2  # half width of plates without an end, in heights; they get side walls
-SIDES = 256  # corners of the polygon that stands for a circle
+ENDLESS = 1e5
+"""Size of infinite walls, in distances to the wall."""
+LONG = 1e2
+"""Length of infinite walls of a finite height, in heights or distances: the error falls with its cube."""
+WIDE = 3e2
+"""Half width of infinite plates, in heights; they get side walls."""
+SIDES = 256
+"""Corners of the polygon that stands for a circle."""
 
 
 class Surroundings(Record):
@@ -41,7 +45,7 @@ class Surroundings(Record):
 
 
 def surroundings(inputs: Inputs) -> Surroundings:
-    """What the case's `geometry` names, with a floor where the receiver is flat."""
+    """The geometry that the case names, with a floor where the receiver is flat."""
     return inputs.choose("geometry", GEOMETRIES)(inputs)
 
 
@@ -60,16 +64,19 @@ def floor(size: float) -> Surroundings:
 
 
 def on_floor(size: float, *parts: Surroundings) -> Surroundings:
-    """The parts, and a floor of this size under the receiver: the larger, the further off it rays start."""
-    whole = floor(size)
+    """The parts, and a floor of this size under the receiver; rays start farther off a larger one."""
+    scene = floor(size)
     for part in parts:
-        whole = whole + part
-    return whole
+        scene = scene + part
+    return scene
 
 
 def upright(start: ArrayLike, end: ArrayLike, height: float) -> Surroundings:
-    """A vertical wall over the line from `start` to `end`; it goes on as far below the floor, which
-    keeps the scene's centre, and with it the best precision, at the receiver."""
+    """A vertical wall over the line from `start` to `end`.
+
+    It reaches as far below the floor as above, which keeps the scene's centre, where precision is best, at
+    the receiver.
+    """
     (x0, y0), (x1, y1) = np.asarray(start, float), np.asarray(end, float)
     return patch([[x0, y0, -height], [x1, y1, -height], [x1, y1, height], [x0, y0, height]])
 
@@ -81,7 +88,7 @@ def circle(radius: float, sides: int = SIDES) -> NDArray[np.float64]:
     return radius * np.sqrt(step / np.sin(step)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def turned(profile: NDArray[np.float64], sides: int) -> Surroundings:
+def revolved(profile: NDArray[np.float64], sides: int) -> Surroundings:
     """A surface of revolution about z through (distance from the axis, height) pairs."""
     around = circle(1.0, sides)
     rings = len(profile)
@@ -100,7 +107,7 @@ def raised_arc(angles: NDArray[np.float64], sides: int) -> NDArray[np.float64]:
     """(k, 2) profile of a ball of radius 1 about the origin at these angles from +z, for facets that lie at
     distance 1 on average.
 
-    Over a facet of angular steps p and q the sagitta takes off (p^2 + q^2) / 12 on average. `turned` widens
+    Over a facet of angular steps p and q the sagitta takes off (p^2 + q^2) / 12 on average. `revolved` widens
     circles about the axis to polygons of the same area, which is taken back here.
     """
     step = np.gradient(angles)
@@ -111,7 +118,7 @@ def raised_arc(angles: NDArray[np.float64], sides: int) -> NDArray[np.float64]:
 
 
 def wall(inputs: Inputs) -> Surroundings:
-    """An endless wall at x = a."""
+    """An infinite wall at x = a."""
     a, height = inputs.number("a"), _height_or_none(inputs)
     along, up = _reach(a, height)
     return on_floor(a / 2, upright([a, -along], [a, along], up))
@@ -124,7 +131,7 @@ def wall_finite(inputs: Inputs) -> Surroundings:
 
 
 def corner(inputs: Inputs) -> Surroundings:
-    """Two endless walls at x = a and y = b; what lies behind the other wall is not seen."""
+    """Two infinite walls at x = a and y = b; each hides the rest of the other."""
     a, b, height = inputs.number("a"), inputs.number("b"), _height_or_none(inputs)
     along, up = _reach(max(a, b), height)
     return on_floor(min(a, b) / 2, upright([a, -along], [a, along], up), upright([-along, b], [along, b], up))
@@ -139,7 +146,7 @@ def disc(inputs: Inputs) -> Surroundings:
 def well(inputs: Inputs) -> Surroundings:
     """A cylindrical well, seen from the centre of its bottom."""
     radius, depth = inputs.number("radius"), inputs.number("depth")
-    return on_floor(min(radius, depth) / 2, turned(np.array([[radius, -depth], [radius, depth]]), SIDES))
+    return on_floor(min(radius, depth) / 2, revolved(np.array([[radius, -depth], [radius, depth]]), SIDES))
 
 
 def sphere(inputs: Inputs) -> Surroundings:
@@ -162,8 +169,8 @@ def rectangle(inputs: Inputs) -> Surroundings:
 
 def polygon(inputs: Inputs) -> Surroundings:
     """A convex polygon above the floor."""
-    whole = patch(inputs.vectors("vertices"))
-    return on_floor(whole.size / 100, whole)
+    ceiling = patch(inputs.vectors("vertices"))
+    return on_floor(ceiling.size / 100, ceiling)
 
 
 def vgroove(inputs: Inputs) -> Surroundings:
@@ -176,20 +183,20 @@ def vgroove(inputs: Inputs) -> Surroundings:
 
 
 def dome(inputs: Inputs) -> Surroundings:
-    """A half ball around the receiver; it goes on below the floor."""
+    """A hemisphere around the receiver; it continues below the floor."""
     radius = inputs.number("radius")
-    return on_floor(radius / 2, turned(radius * raised_arc(np.linspace(0, 0.55 * np.pi, 71), 64), 64))
+    return on_floor(radius / 2, revolved(radius * raised_arc(np.linspace(0, 0.55 * np.pi, 71), 64), 64))
 
 
 def sphere_inside(inputs: Inputs) -> Surroundings:
     """The receiver on the inner wall of a ball; rings lie closer near the receiver."""
     arc = raised_arc(np.pi * (1 - np.linspace(1, 0, 193) ** 1.5), 32)
-    ball = turned(inputs.number("radius") * arc, 32)
+    ball = revolved(inputs.number("radius") * arc, 32)
     return Surroundings(ball.vertices - ball.vertices[-1], ball.triangles)
 
 
 def plate(inputs: Inputs) -> Surroundings:
-    """An endless plate parallel to the floor; side walls stand where it is cut off."""
+    """An infinite plate parallel to the floor; side walls stand where it is cut off."""
     h = inputs.number("height")
     half = max(WIDE * h, 3 * (inputs.number_or_none("d_max") or 0))
     return on_floor(h, _room(-half, half, -half, half, h))
@@ -210,21 +217,24 @@ def nothing(inputs: Inputs) -> Surroundings:
 def _room(x0: float, x1: float, y0: float, y1: float, height: float) -> Surroundings:
     """Four walls and a ceiling."""
     feet = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
-    whole = patch([[x, y, height] for x, y in feet])
+    room = patch([[x, y, height] for x, y in feet])
     for start, end in zip(feet, feet[1:] + feet[:1], strict=True):
-        whole = whole + upright(start, end, height)
-    return whole
+        room = room + upright(start, end, height)
+    return room
 
 
 def _ball(radius: float, centre: NDArray[np.float64]) -> Surroundings:
     """A ball whose outline, seen from the origin, is a polygon with the area of its true outline.
 
-    The axis points at the receiver and one ring of corners lies where the sight lines touch the ball.
+    The axis points at the receiver; one ring of corners is where tangents from the receiver touch the ball.
     """
+    # Rings from the pole that faces the receiver, one of them on the outline.
     away = float(np.linalg.norm(centre))
-    touched = max(float(np.arccos(min(radius / away, 1.0))), 1e-3)
-    angles = np.unique(np.concatenate([[0, touched], np.linspace(touched, np.pi, 12)]))
-    ball = turned(radius * np.stack([np.sin(angles), np.cos(angles)], axis=1), SIDES)
+    tangent = max(float(np.arccos(min(radius / away, 1.0))), 1e-3)
+    angles = np.unique(np.concatenate([[0, tangent], np.linspace(tangent, np.pi, 12)]))
+    ball = revolved(radius * np.stack([np.sin(angles), np.cos(angles)], axis=1), SIDES)
+
+    # Turn the pole to the receiver.
     z = -centre / away
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)

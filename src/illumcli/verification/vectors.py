@@ -26,14 +26,15 @@ PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
 """The vectors that come with the package, computed at 50 digits."""
 
 KEYS = ("id", "model", "inputs", "expected", "rtol", "atol")
-SHOWN = 10
-MOST_BYTES = 1 << 28
-"""Of a file once it is unpacked."""
+MAX_SHOWN = 10
+"""Problems, or cases, that a message lists."""
+MAX_BYTES = 1 << 28
+"""Largest size of a file once it is unpacked."""
 OPENERS: dict[str, Callable[..., Any]] = {".xz": lzma.open, ".gz": gzip.open}
 
 
 class Case(Record):
-    """One set of inputs and what must come out."""
+    """One set of inputs and what is expected of them."""
 
     id: str
     type: str
@@ -44,7 +45,7 @@ class Case(Record):
 
     @property
     def scale(self) -> float:
-        """max |e_i|, what relative errors are relative to; 1 where nothing but 0 is expected."""
+        """max |e_i|, the denominator of relative errors; 1 where only 0 is expected."""
         return float(np.abs(self.expected).max()) or 1.0
 
     @property
@@ -59,7 +60,7 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
     Parameters
     ----------
     known : collection of str
-        The case types there is an evaluator for.
+        Case types that have an evaluator.
     only : collection of str
         Keep these types alone; by default all.
 
@@ -69,13 +70,13 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
         The file cannot be read, a case is malformed, a type is unknown or has no case: all of it at once.
     """
     table = sorted(known)
-    strange = [
+    unknown = [
         f"--only {name}: no such case type; {suggestion(name, tuple(table))}"
         for name in only
         if name not in known
     ]
-    if strange:
-        raise InputError(strange)
+    if unknown:
+        raise InputError(unknown)
     entries = _entries(path)
     problems: list[str] = []
     cases = [
@@ -96,9 +97,9 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
 def _entries(path: Path) -> list[Any]:
     try:
         with OPENERS.get(path.suffix, open)(path, "rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise LimitError(f"{path}: more than {MOST_BYTES >> 20} MiB of text; check its cases in parts")
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise LimitError(f"{path}: more than {MAX_BYTES >> 20} MiB of text; check its cases in parts")
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start})") from None
@@ -158,13 +159,13 @@ def _case(path: Path, number: int, entry: Any, problems: list[str]) -> Case | No
 
 
 def _unknown(path: Path, cases: Iterable[Case], known: list[str]) -> list[str]:
-    strange: dict[str, list[str]] = {}
+    by_type: dict[str, list[str]] = {}
     for case in cases:
         if case.type not in known:
-            strange.setdefault(case.type, []).append(case.id)
+            by_type.setdefault(case.type, []).append(case.id)
     return [
-        f"{path}: no case type '{name}' ({shorten(ids, SHOWN)}); {suggestion(name, tuple(known))}"
-        for name, ids in strange.items()
+        f"{path}: no case type '{name}' ({shorten(ids, MAX_SHOWN)}); {suggestion(name, tuple(known))}"
+        for name, ids in by_type.items()
     ]
 
 
@@ -175,9 +176,9 @@ def shorten(names: list[str], count: int) -> str:
 
 
 def _shortened(path: Path, problems: list[str]) -> list[str]:
-    if len(problems) <= SHOWN:
+    if len(problems) <= MAX_SHOWN:
         return problems
-    return [*problems[:SHOWN], f"{path}: {len(problems) - SHOWN} more problems"]
+    return [*problems[:MAX_SHOWN], f"{path}: {len(problems) - MAX_SHOWN} more problems"]
 
 
 def _is_number(value: Any) -> bool:

@@ -1,26 +1,26 @@
-"""How a scene is recentred and scaled to unit radius before any ray is cast."""
+"""Render space: the scene recentred and scaled to unit radius, in which all rays are cast."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from illumcli.records import Value
 
 
 class RenderSpace(Value):
-    """The scene's centre and radius: inside the renderer every position is in radii from the centre.
+    """The scene's centre and radius; in render space positions are in radii from the centre.
 
-    Float32 rays then lose the same few ulp whatever the scale and place of a scene.
+    Rays in float32 then lose the same few ulp whatever the size and position of the scene.
     """
 
     centre: tuple[float, float, float]  # [scene units]
     radius: float  # [scene units]
 
-    def from_world(self, position: object) -> NDArray[np.float64]:
-        """Positions of the scene, (3,) or (N, 3), in radii from its centre."""
+    def from_world(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Positions in the scene, (3,) or (N, 3) [scene units], as positions in render space [radii]."""
         return (np.asarray(position, np.float64) - self.centre) / self.radius
 
-    def to_world(self, position: object) -> NDArray[np.float64]:
-        """Positions in radii from the centre as positions of the scene."""
+    def to_world(self, position: ArrayLike) -> NDArray[np.float64]:
+        """Positions in render space, (3,) or (N, 3) [radii], as positions in the scene [scene units]."""
         return np.asarray(position, np.float64) * self.radius + self.centre

@@ -1,9 +1,9 @@
 """Formulas typed into a scene: arithmetic on named variables, their values and exact derivatives.
 
 The text is parsed with `ast` and only a short list of nodes is accepted, so a formula can compute and do
-nothing else. Every number is a double and every operation one numpy call: there are no big integers to
-grow. Derivatives come from forward-mode differentiation: each operation carries d/d(variable) beside its
-value, exact up to rounding, never a difference.
+nothing else. Every number is a double and every operation one numpy call, so no big integers arise.
+Derivatives come from forward-mode differentiation: each operation carries d/d(variable) beside its value,
+exact up to rounding, never a difference.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _GLUED = re.compile(r"(?<![\w.])(?>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]
 
 
 class Dual(Value):
-    """A value and its derivatives; a variable that is missing from `slopes` has derivative 0."""
+    """A value and its derivatives; a variable that is missing in `slopes` has derivative 0."""
 
     value: NDArray[np.float64]
     slopes: Mapping[str, NDArray[np.float64]]
@@ -117,18 +117,21 @@ def parse(text: str, variables: tuple[str, ...]) -> Formula:
     """
     if len(text) > MAX_LENGTH:
         raise ValueError(f"formula has {len(text)} characters, at most {MAX_LENGTH} are allowed")
+    # Characters and glued names that Python's own parser would explain badly.
     line = re.sub(r"\s", " ", text)
     if foreign := _FOREIGN.search(line):
-        way = (
+        hint = (
             "; a power is written **"
             if foreign[0] == "^"
             else f"; there are {ALLOWED} {', '.join(FUNCTIONS)}"
         )
-        raise _refusal(foreign.start(), f"'{foreign[0]}' is not part of a formula{way}")
+        raise _refusal(foreign.start(), f"'{foreign[0]}' is not part of a formula{hint}")
     if glued := _GLUED.search(line):
         raise _refusal(
             glued.end(), f"'{line[glued.end()]}' follows the number {glued[0]}; a product is written *"
         )
+
+    # The expression tree, of accepted nodes only.
     indent = len(line) - len(line.lstrip())
     try:
         tree = ast.parse(line.strip(), mode="eval").body
@@ -141,7 +144,7 @@ def parse(text: str, variables: tuple[str, ...]) -> Formula:
 
 
 def checked(text: str, variables: tuple[str, ...]) -> str:
-    """The text itself once `parse` takes it; for fields of a scene."""
+    """The text itself, if `parse` accepts it; for fields of a scene."""
     parse(text, variables)
     return text
 

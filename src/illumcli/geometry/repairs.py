@@ -1,4 +1,4 @@
-"""What is wrong with an input and can be lived with: counted per class, with the first place."""
+"""Repairs: faults of an input that rendering can cope with, counted per class with the first place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HARMLESS = frozenset(
         "rows of other elements left out",
     }
 )
-"""Classes that change nothing that is seen: in the report, told with -v alone, refused under --strict."""
+"""Classes without any visible effect: in the report, printed only with -v, refused under --strict."""
 
 NORMALS_OF_FILE = "objects whose normals' crease or weights are not used: the file has normals, see source"
 NO_GRAIN = "objects whose material has a grain that nothing directs: give the object a grain, or its mesh uv"
@@ -30,16 +30,16 @@ APPROXIMATED = frozenset(
         NOT_ASKED,
     }
 )
-"""Classes that no file is to blame for: told, and not refused under --strict."""
+"""Classes that are no fault of a file: printed, and not refused under --strict."""
 
 
 class Repair(Value):
-    """How often something of one class was mended or left out."""
+    """How often something of one class was repaired or left out."""
 
     count: int
     first: str = ""
-    """Where it occurs first. While a mesh file is read this is what follows the file's name (``:12`` for a
-    line, ``: face 3``, nothing for the whole file), or a place in a file beside it (``a.mtl:3``)."""
+    """The place of the first one. While a mesh file is read it is what follows the file's name (``:12`` for a
+    line, ``: face 3``, nothing for the file itself), or a place in a file beside it (``a.mtl:3``)."""
 
 
 Repairs: TypeAlias = Mapping[str, Repair]
@@ -53,18 +53,18 @@ class MeshRepairs(Value):
 
 
 def note(repairs: MutableMapping[str, Repair], what: str, first: str = "", count: int = 1) -> None:
-    """Count `count` more of the class `what`; `first` is kept where it is the first of its class."""
+    """Count `count` more of the class `what`; `first` is kept if it is the first of its class."""
     known = repairs.get(what)
     repairs[what] = Repair(count, first) if known is None else Repair(known.count + count, known.first)
 
 
 def located(repairs: Repairs, file: str) -> Repairs:
-    """The repairs of a mesh file, each place with the path of its file.
+    """The repairs of a mesh file, each place prefixed with the path of its file.
 
     Parameters
     ----------
     file : str
-        Path of the mesh, or the name of what is no file.
+        Path of the mesh, or the name of a mesh that has no file.
     """
     return {what: Repair(each.count, path_of(each.first, file)) for what, each in repairs.items()}
 
@@ -75,9 +75,9 @@ def path_of(place: str, file: str) -> str:
 
 
 def joined(parts: Iterable[Repairs]) -> Repairs:
-    """All of them together: counts added, the first place of each class."""
-    found: dict[str, Repair] = {}
+    """The repairs of several inputs together: counts are added, the first place of each class is kept."""
+    total: dict[str, Repair] = {}
     for repairs in parts:
         for what, each in repairs.items():
-            note(found, what, each.first, each.count)
-    return found
+            note(total, what, each.first, each.count)
+    return total

@@ -87,7 +87,7 @@ def test_a_crease_and_a_singular_point_stay_finite_and_closed():
 
 def test_layers_evaluated_apart_give_the_same_surface(monkeypatch):
     whole = made(TORUS, resolution=16)
-    monkeypatch.setattr(implicit, "LANES", 1)
+    monkeypatch.setattr(implicit, "NODES_AT_ONCE", 1)
     np.testing.assert_array_equal(made(TORUS, resolution=16).vertices, whole.vertices)
 
 

@@ -9,9 +9,9 @@ from illumcli.schema.description import Description
 from illumcli.schema.fields import Whole
 
 MAX_TRIANGLES = 20_000_000
-"""No shape makes more; the ranges below keep to it."""
+"""Largest number of triangles of a shape; the ranges below keep to it."""
 TRIANGLE_BYTES = 640
-"""What a triangle takes while it is made, placed and handed to the ray core: measured, 530 to 700 [bytes]."""
+"""Memory per triangle while a mesh is made, placed and given to the ray core; measured 530 to 700 [bytes]."""
 
 Segments: TypeAlias = Annotated[int, Whole(ge=3, le=4096)]
 Rings: TypeAlias = Annotated[int, Whole(ge=1, le=2048)]
@@ -27,5 +27,5 @@ class Shape(Description):
         raise NotImplementedError
 
     def triangles(self) -> int:
-        """How many triangles the mesh has at most: known before it is made."""
+        """Upper bound on the number of triangles, known before the mesh is made."""
         raise NotImplementedError

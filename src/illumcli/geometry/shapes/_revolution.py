@@ -20,7 +20,7 @@ class Profile(Record):
 
 
 def profile(radius: ArrayLike, height: ArrayLike, normal: ArrayLike, flat: bool = False) -> Profile:
-    """A profile; one number stands for all the same."""
+    """A profile; a single number is used for all points."""
     r, y = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(height, np.float64))
     return Profile(r, y, np.broadcast_to(np.asarray(normal, np.float64), (len(r), 2)), flat)
 
@@ -36,6 +36,7 @@ def lathed(profiles: list[Profile], segments: int, closed: bool = False) -> Mesh
     closed : bool
         The last point is the first one again.
     """
+    # One curve of all profiles; points where it does not move are one row of vertices.
     radius = np.concatenate([each.radius for each in profiles])
     height = np.concatenate([each.height for each in profiles])
     normal = np.concatenate([each.normal for each in profiles])
@@ -45,12 +46,16 @@ def lathed(profiles: list[Profile], segments: int, closed: bool = False) -> Mesh
     row = np.concatenate([[0], np.cumsum(moves)])
     if closed:
         row[-1] = 0
+
+    # Turns of the columns, at poles those of the middles between them.
     pole = radius == 0
     turn = np.arange(segments + 1) + np.zeros((len(radius), 1))
     turn[pole] += np.where(np.arange(len(radius)) == 0, -0.5, 0.5)[pole, None]
     # the sine and cosine of the first and the last column are the same doubles
     angle = 2 * np.pi * np.where(turn == segments, 0, turn) / segments
     cosine, sine = np.cos(angle), np.sin(angle)
+
+    # Positions, normals, and uv around and along or, on caps, of the disc.
     points = np.stack(
         np.broadcast_arrays(radius[:, None] * cosine, height[:, None], -radius[:, None] * sine), -1
     )

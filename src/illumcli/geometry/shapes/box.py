@@ -32,6 +32,7 @@ class Box(Shape):
 
     def mesh(self) -> Mesh:
         """Quads, each face with uv from 0 to 1."""
+        # Nodes of the six faces as whole steps from the lowest corner; equal ones are one vertex.
         n = self.resolution
         j, i = np.indices((n + 1, n + 1))[..., None]
         right, up = np.array(FACES)[:, :, None, None].swapaxes(0, 1)
@@ -39,6 +40,8 @@ class Box(Shape):
         steps = (n * (1 + out) + (2 * i - n) * right + (2 * j - n) * up) // 2  # (6, n + 1, n + 1, 3), 0 to n
         numbers = (steps[..., 0] * (n + 1) + steps[..., 1]) * (n + 1) + steps[..., 2]
         _, first, vertex = np.unique(numbers, return_index=True, return_inverse=True)
+
+        # Quads between the nodes of each face.
         nodes = np.arange(numbers.size).reshape(numbers.shape)
         quads = np.stack(
             [nodes[:, :-1, :-1], nodes[:, :-1, 1:], nodes[:, 1:, 1:], nodes[:, 1:, :-1]], axis=-1

@@ -30,10 +30,14 @@ from illumcli.schema.description import checks
 from illumcli.schema.fields import After, Text, Vector, Whole
 
 XYZ = ("x", "y", "z")
-LANES = 2**20  # grid nodes evaluated at once
-CONVERGED = 1e-13  # of a cell's edge
-OFF = 0.1180339887  # of a cell's edge, no simple fraction
-NEWTON_STEPS = 12  # quadratic convergence: four are usual, creases of f take more
+NODES_AT_ONCE = 2**20
+"""Grid nodes that are evaluated together."""
+CONVERGED = 1e-13
+"""Length of the last Newton step, in edges of a cell."""
+NODE_OFFSET = 0.1180339887
+"""By which inner nodes are off round numbers, in edges of a cell; no simple fraction."""
+MAX_NEWTON_STEPS = 12
+"""Convergence is quadratic: four steps are usual, creases of f take more."""
 
 FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=XYZ))]
 
@@ -56,7 +60,7 @@ class Implicit(Shape):
             raise ValueError(f"must be above low, {list(low)}, along every axis, is {list(high)}")
 
     def triangles(self) -> int:
-        """Those of a surface that crosses the box several times; a wilder one is counted while it is made."""
+        """An estimate, for surfaces that cross the box several times; others are counted as they are made."""
         return min(24 * self.resolution**2, MAX_TRIANGLES)
 
     def mesh(self) -> Mesh:
@@ -69,6 +73,7 @@ class Implicit(Shape):
         LimitError
             The surface would have more than 2e7 triangles.
         """
+        # The quads of the surface net.
         f = parse(self.f, XYZ)
         low, high = np.array(self.low), np.array(self.high)
         edge = (high - low).max() / self.resolution
@@ -80,27 +85,30 @@ class Implicit(Shape):
                 f"implicit: {self.f} does not change its sign in the box from {list(self.low)} to"
                 f" {list(self.high)}; move the box or raise `resolution`"
             )
+
+        # A vertex per cell, moved onto the surface.
         corners = np.unique(cells, return_inverse=True)[1].ravel().astype(np.int32)
         sums = [np.bincount(corners, np.repeat(crossing, 4)) for crossing in crossings.T]
         points = _onto_surface(f, np.stack(sums, axis=1) / np.bincount(corners)[:, None], edge)
         normals = np.asarray(unit(_value_and_gradient(f, points)[1]), np.float64)
-        some = np.any(normals, axis=1)
+        has_normal = np.any(normals, axis=1)
         return Mesh(
             vertices=points,
             corners=corners,
             starts=np.arange(0, len(corners) + 1, 4, dtype=np.int32),
             normals=normals,
-            corner_normals=np.where(some[corners], corners, -1).astype(np.int32),
+            corner_normals=np.where(has_normal[corners], corners, -1).astype(np.int32),
         )
 
 
 def _nodes(low: float, high: float, count: int) -> NDArray[np.float64]:
-    """(count + 1,) places of the grid's nodes, the inner ones a little off.
+    """(count + 1,) coordinates of the grid's nodes, the inner ones a little off round numbers.
 
-    Planes of symmetry and the like lie at round numbers; a surface that meets nodes exactly pinches quads.
+    Planes of symmetry and the like are at round numbers, and quads of a surface that meets nodes exactly are
+    pinched.
     """
     nodes = np.linspace(low, high, count + 1)
-    nodes[1:-1] += OFF * (high - low) / count
+    nodes[1:-1] += NODE_OFFSET * (high - low) / count
     return nodes
 
 
@@ -109,18 +117,21 @@ def _net(f: Formula, axes: list[NDArray[np.float64]]) -> tuple[Vectors, NDArray[
 
     The cells run counter-clockwise seen from where f is above 0.
     """
+    # Inner edges along each axis whose ends are on different sides of the surface.
     inside = _inside(f, axes)
     shape = [len(axis) - 1 for axis in axes]
-    found: list[tuple[tuple[NDArray[Any], ...], tuple[int, int, int]]] = []
+    crossed: list[tuple[tuple[NDArray[Any], ...], tuple[int, int, int]]] = []
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         inner = inside.transpose(a, b, c)[:, 1:-1, 1:-1]
-        found.append((np.nonzero(np.not_equal(inner[1:], inner[:-1])), (a, b, c)))
-    count = 2 * sum(len(where[0]) for where, _ in found)
+        crossed.append((np.nonzero(np.not_equal(inner[1:], inner[:-1])), (a, b, c)))
+    count = 2 * sum(len(where[0]) for where, _ in crossed)
     if count > MAX_TRIANGLES:
         raise LimitError(f"implicit: {count} triangles, at most {MAX_TRIANGLES} are made; lower `resolution`")
     refuse_beyond(TRIANGLE_BYTES * count, f"implicit: {count} triangles", "lower `resolution`")
+
+    # Where the surface crosses each of them, and the four cells around it.
     crossings, cells = [], []
-    for (i, j, k), (a, b, c) in found:
+    for (i, j, k), (a, b, c) in crossed:
         grows = inside.transpose(a, b, c)[i, j + 1, k + 1, None]
         near = np.empty((len(i), 3))
         near[:, a], near[:, b], near[:, c] = axes[a][i], axes[b][j + 1], axes[c][k + 1]
@@ -140,7 +151,7 @@ def _inside(f: Formula, axes: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
     """Whether f is below 0 at each node of the grid; a few layers at a time, to keep only the answers."""
     x, y, z = axes
     inside = np.empty((len(x), len(y), len(z)), bool)
-    layers = max(1, LANES // (len(y) * len(z)))
+    layers = max(1, NODES_AT_ONCE // (len(y) * len(z)))
     for first in range(0, len(x), layers):
         part = slice(first, first + layers)
         inside[part] = f.value(x[part, None, None], y[:, None], z) < 0
@@ -148,7 +159,7 @@ def _inside(f: Formula, axes: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
 
 
 def _crossing(near: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where on an edge the straight line between both values is 0; the middle where they are not finite."""
+    """Root of the linear interpolation between both values, from 0 to 1; 0.5 where they are not finite."""
     with np.errstate(all="ignore"):
         share = near / (near - far)
     return np.clip(np.where(np.isfinite(share), share, 0.5), 0, 1)
@@ -157,13 +168,12 @@ def _crossing(near: NDArray[np.float64], far: NDArray[np.float64]) -> NDArray[np
 def _onto_surface(f: Formula, start: NDArray[np.float64], edge: float) -> NDArray[np.float64]:
     """(N, 3) the points moved to f = 0 by Newton steps along the gradient.
 
-    A point stays where it was if that leads further than a cell or not nearer to 0: where f jumps.
+    A point keeps its place if the steps lead farther than a cell, or not closer to 0, as where f jumps.
     """
     points = start.copy()
     active = np.arange(len(points))
-    for _ in range(NEWTON_STEPS):
-        at = points[active]
-        value, gradient = _value_and_gradient(f, at)
+    for _ in range(MAX_NEWTON_STEPS):
+        value, gradient = _value_and_gradient(f, points[active])
         steepness = dot(gradient, gradient)
         with np.errstate(all="ignore"):
             step = gradient * (value / steepness)[:, None]

@@ -22,9 +22,12 @@ from illumcli.schema.description import checks
 from illumcli.schema.fields import After, Number, Text
 
 UV = ("u", "v")
-WELD = 1e-9  # of the surface's extent: nodes on a seam or at a pole that are as near are one vertex
-FAINT = 1e-12  # of the longest normal: no direction left
-INWARDS = 1e-7  # of a parameter's range: where the limit of the normal at a pole is read
+WELD = 1e-9
+"""Distance up to which nodes on a seam or at a pole are one vertex, in extents of the surface."""
+MIN_NORMAL = 1e-12
+"""Length below which a normal has no direction, in lengths of the longest one."""
+POLE_OFFSET = 1e-7
+"""Distance from a pole at which the limit of the normal is evaluated, in ranges of the parameter."""
 
 FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=UV))]
 Range: TypeAlias = tuple[Number, Number]
@@ -64,11 +67,14 @@ class Parametric(Shape):
             A formula is not finite somewhere on the surface, or all of it is one line.
         """
         x, y, z = (parse(text, UV) for text in (self.x, self.y, self.z))
+        # The nodes, and which of them are one vertex.
         columns, rows = self.resolution
         s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
         points = np.stack([f.value(self._u(s), self._v(t)) for f in (x, y, z)], axis=-1)
         self._refuse_holes(points, s, t)
         column_is_point, row_is_point, vertex = _welded(points)
+
+        # Normals from the derivatives, at poles from beside them.
         at_s, at_t = _beside_poles(s, t, column_is_point, row_is_point)
         normals = parametric_normal(x, y, z, self._u(at_s).ravel(), self._v(at_t).ravel())
         uvs = np.stack([s + (at_s - s) * row_is_point[:, None], t + (at_t - t) * column_is_point], axis=-1)
@@ -79,7 +85,7 @@ class Parametric(Shape):
         return mesh
 
     def _u(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """u at shares of its range; both ends exactly."""
+        """u at fractions of its range, exact at both ends."""
         return (1 - s) * self.u[0] + s * self.u[1]
 
     def _v(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,19 +104,21 @@ class Parametric(Shape):
 def _welded(
     points: NDArray[np.float64],
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
-    """Which columns and rows are single points, and the (R, C) vertex numbers with seams welded."""
+    """(C,) and (R,) which columns and rows are single points, and (R, C) vertex numbers with seams welded."""
     rows, columns = (count - 1 for count in points.shape[:2])
     reach = WELD * np.ptp(points.reshape(-1, 3), axis=0).max()
 
-    def same(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def is_same(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.bool_]:
         return np.asarray(np.abs(a - b).max(axis=-1) <= reach)
 
-    column_is_point = np.all(same(points, points[:1]), axis=0)
-    row_is_point = np.all(same(points, points[:, :1]), axis=1)
+    column_is_point = np.all(is_same(points, points[:1]), axis=0)
+    row_is_point = np.all(is_same(points, points[:, :1]), axis=1)
     across = (
-        around(columns) if columns > 2 and same(points[:, 0], points[:, -1]).all() else np.arange(columns + 1)
+        around(columns)
+        if columns > 2 and is_same(points[:, 0], points[:, -1]).all()
+        else np.arange(columns + 1)
     )
-    up = around(rows) if rows > 2 and same(points[0], points[-1]).all() else np.arange(rows + 1)
+    up = around(rows) if rows > 2 and is_same(points[0], points[-1]).all() else np.arange(rows + 1)
     return column_is_point, row_is_point, vertex_numbers(up, across, row_is_point, column_is_point)
 
 
@@ -120,18 +128,20 @@ def _beside_poles(
     column_is_point: NDArray[np.bool_],
     row_is_point: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where normals are read: at the nodes; at a border that is a point, just inside, amid its triangle.
+    """Parameters at which normals are evaluated.
+
+    They are those of the nodes; at a border that is a point, just inside, in the middle of its triangle.
 
     The triangle keeps the node on its right at the bottom and on the left, the other one at the top and on
     the right (`woven`).
     """
     s, t = s.copy(), t.copy()
     rows, columns = (count - 1 for count in s.shape)
-    for row, half, inwards in ((0, -0.5, INWARDS), (-1, 0.5, -INWARDS)):
+    for row, half, inwards in ((0, -0.5, POLE_OFFSET), (-1, 0.5, -POLE_OFFSET)):
         if row_is_point[row]:
             s[row] += half / columns
             t[row] += inwards
-    for column, half, inwards in ((0, 0.5, INWARDS), (-1, -0.5, -INWARDS)):
+    for column, half, inwards in ((0, 0.5, POLE_OFFSET), (-1, -0.5, -POLE_OFFSET)):
         if column_is_point[column]:
             t[:, column] += half / rows
             s[:, column] += inwards
@@ -139,8 +149,8 @@ def _beside_poles(
 
 
 def _directions(normals: Vectors) -> Vectors:
-    """The normals made unit; zero where the derivatives give none."""
+    """The normals made unit; zero where the derivatives vanish."""
     size = length(normals)
     finite = np.isfinite(size)
-    some = finite & (size > FAINT * size.max(where=finite, initial=0.0))
-    return unit(np.where(some[:, None], normals, 0.0))
+    is_valid = finite & (size > MIN_NORMAL * size.max(where=finite, initial=0.0))
+    return unit(np.where(is_valid[:, None], normals, 0.0))

@@ -22,7 +22,7 @@ from illumcli.geometry.shapes._base import Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, vertex_numbers, woven
 from illumcli.schema.fields import Positive, Whole
 
-# control points (radius, height), the outside to the right
+# control points (radius, height); the outside is on the right
 POT = (
     *((0, 0), (1.425, 0), (1.5, 0.075), (1.5, 0.15)),  # bottom
     *((1.5, 0.225), (2, 0.45), (2, 0.9), (2, 1.35), (1.75, 1.875), (1.5, 2.4)),  # body
@@ -47,7 +47,7 @@ SPOUT = (
     (0.66, 0.66, 0.25, 0.25, 0.25, 0.15, 0.15),
 )
 
-LEFT, RIGHT, HEIGHT = -3.0, 3.4340751254711073, 3.15  # the handle, the lip of the spout, the knob
+LEFT, RIGHT, HEIGHT = -3.0, 3.4340751254711073, 3.15  # handle, lip of the spout, knob
 
 
 class Teapot(Shape):
@@ -96,19 +96,24 @@ def _mirrored_half(inner: ArrayLike, outer: ArrayLike, width: ArrayLike) -> NDAr
 
 def _strip(net: NDArray[np.float64], resolution: int) -> Lattice:
     """The patches of a net that closes around its columns, `resolution` quads along each of their sides."""
+    # Positions and both derivatives at the nodes.
     along, rising = _bernstein(len(net), resolution)
     across, turning = _bernstein(net.shape[1], resolution)
 
-    def mixed(up: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    def bezier(up: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.einsum("ra,abx,cb->rcx", up, net, right, optimize=True)
 
-    points, right, up = mixed(along, across), mixed(along, turning), mixed(rising, across)
+    points, right, up = bezier(along, across), bezier(along, turning), bezier(rising, across)
+
+    # Normals.
     row_is_point = np.zeros(len(points), bool)
     row_is_point[[0, -1]] = (net == net[:, :1]).all(axis=(1, 2))[[0, -1]]
-    # where a row shrinks to a point, d/du is 0 and its limit points along d2/du dv, backwards at the last row
-    right[row_is_point] = mixed(rising, turning)[row_is_point]
+    # where a row shrinks to a point, d/du is 0 and its limit is along d2/du dv, backwards at the last row
+    right[row_is_point] = bezier(rising, turning)[row_is_point]
     right[-1] *= -1 if row_is_point[-1] else 1
     normals = unit(cross(right.reshape(-1, 3), up.reshape(-1, 3))).reshape(points.shape)
+
+    # uv, at poles of the middles between columns.
     v, u = np.meshgrid(np.linspace(0, 1, len(along)), np.linspace(0, 1, len(across)), indexing="ij")
     u[0] -= row_is_point[0] * 0.5 / (len(across) - 1)
     u[-1] += row_is_point[-1] * 0.5 / (len(across) - 1)

@@ -7,7 +7,7 @@ import pytest
 from illumcli.commands.models import page, table
 from illumcli.errors import InputError
 from illumcli.schema.docs import field_docs
-from illumcli.schema.families import members, tags
+from illumcli.schema.families import members, tag_of, tags
 
 MODELS = members("illumcli.models")
 
@@ -22,10 +22,10 @@ def test_the_table_has_every_model_with_parameters_and_claims():
 
 @pytest.mark.parametrize("Model", MODELS, ids=lambda Model: Model.__name__)
 def test_a_page_has_formula_source_and_every_parameter(Model):
-    text = page(Model.model)
+    text = page(tag_of(Model))
     assert "response = " in text
     assert "References" in text
-    for name in Model.fields():
+    for name in Model.model_fields:
         assert name == "model" or f"\n{name}: " in text
         assert name == "model" or field_docs(Model)[name]
 

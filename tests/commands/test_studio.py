@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
@@ -301,7 +301,7 @@ def test_the_lights_are_the_same_to_every_format(tmp_path):
 @pytest.mark.parametrize("exponent", [1, 30, 1000])
 def test_a_highlight_of_mtl_has_the_middle_it_says(exponent):
     """Under the studio's lights, pi times as strong as those of the texts."""
-    mtl = BlinnPhong.validated({"model": "blinn_phong", "specular": [0.2, 0.5, 1], "exponent": exponent})
+    mtl = BlinnPhong.model_validate({"model": "blinn_phong", "specular": [0.2, 0.5, 1], "exponent": exponent})
     n_l, gap = np.ones(1), np.zeros(1)
     np.testing.assert_allclose(
         np.pi * as_meant(mtl).specular_lobe(n_l, gap), mtl.specular_lobe(n_l, gap), rtol=1e-12
@@ -320,7 +320,7 @@ def test_a_scene_may_fall_back_too(tmp_path):
     with pytest.raises(InputError, match="fallback=clayy: no material 'clayy'; did you mean 'clay'"):
         load(tmp_path / "s.yaml", ["objects.0.fallback=clayy"])
     with pytest.raises(ValidationError):
-        Scene.validated({"version": 1, "objects": [{"mesh": "a.obj", "fallback": "none"}]})
+        Scene.model_validate({"version": 1, "objects": [{"mesh": "a.obj", "fallback": "none"}]})
 
 
 def test_faults_of_the_mesh_name_its_file(illum, tmp_path):

@@ -16,7 +16,7 @@ ANGLES = (1e-6, 1e-4, 0.01, 0.1, 1.0, 30.0, 89.0)  # degrees
 def cone(angle: float, softness: float, theta: np.ndarray) -> np.ndarray:
     """(N,) strength on the floor below a spot, at angles to its axis [rad]."""
     light = {"light": "spot", "position": [0, HEIGHT, 0], "attenuation": {"law": "none"}}
-    spot = Spot.validated({**light, "angle": angle, "softness": softness})
+    spot = Spot.model_validate({**light, "angle": angle, "softness": softness})
     floor = np.zeros((len(theta), 3), np.float32, order="F")
     floor[:, 0] = HEIGHT * np.tan(theta)
     return spot.sample_at(floor, FRAME).irradiance_scale
@@ -44,4 +44,4 @@ def test_soft_rim_is_a_smooth_step_in_the_cosine(angle, softness):
 def test_cone_of_180_degrees_is_everything():
     every = {"light": "spot", "position": [0, 1, 0], "angle": 180, "softness": 0}
     points = np.array([[0, 0, 0], [5, 1, 0], [0, 9, 0], [0.1, 9, 0.3]], np.float32, order="F")
-    assert (Spot.validated(every).sample_at(points, FRAME).irradiance_scale > 0).all()
+    assert (Spot.model_validate(every).sample_at(points, FRAME).irradiance_scale > 0).all()

@@ -43,7 +43,7 @@ def test_illum_chooses_the_terms(tmp_path: Path) -> None:
     assert mesh.materials["illum 0"]["emission"] == (0.4, 0.5, 0.6)
     assert all(mesh.materials["illum 0"][key] == (0, 0, 0) for key in ("diffuse", "specular", "ambient"))
     for material in mesh.materials.values():
-        BlinnPhong.validated(dict(material))
+        BlinnPhong.model_validate(dict(material))
 
 
 def test_what_a_material_leaves_out_is_left_to_the_model(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_a_texture_replaces_the_colour(tmp_path: Path) -> None:
     mesh = mesh_of(tmp_path, "newmtl a\nKd 1 1 1\nmap_Kd -clamp on images\\my wood.png\n")
     texture = mesh.materials["a"]["diffuse"]
     assert texture == {"texture": str(tmp_path / "images" / "my wood.png"), "wrap": "clamp"}
-    BlinnPhong.validated(dict(mesh.materials["a"]))
+    BlinnPhong.model_validate(dict(mesh.materials["a"]))
 
 
 def test_what_the_model_has_no_word_for_is_counted_with_its_line(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def parameters(Model, choices=True, gentle=False):
     `gentle` keeps lobes wide enough for a quadrature.
     """
     schema = schema_of(Model)
-    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.validated)
+    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.model_validate)
 
 
 def _object(schema, defs, choices, gentle):
@@ -196,7 +196,7 @@ def test_without_grain_turning_about_the_normal_changes_nothing(Model, data, see
     ],
 )
 def test_parameters_say_whether_there_is_a_grain(keys, grain):
-    assert member("illumcli.models", keys["model"]).validated(keys).has_grain() is grain
+    assert member("illumcli.models", keys["model"]).model_validate(keys).has_grain() is grain
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -215,7 +215,7 @@ def test_parameters_say_whether_there_is_a_grain(keys, grain):
 def test_an_exponent_of_zero_gives_one_at_any_angle(keys, expected, dtype):
     """0^0 = 1: max(0, cos)^0 is 1 behind the horizon of the lobe too, for all lanes or for single ones."""
     given = directions(5, 600, dtype)
-    flat = member("illumcli.models", keys["model"]).validated(
+    flat = member("illumcli.models", keys["model"]).model_validate(
         {"specular": [1.0, 1.0, 1.0], **keys, "exponent": 0.0}
     )
     want = expected(dot(given["n"], given["l"]))[:, None]
@@ -258,7 +258,7 @@ def varied(part, count, prefix=""):
     """Path -> the parameter once per lane, of every parameter that may vary over the surface."""
     found = {}
     for name, value in part:
-        annotation = str(type(part).fields()[name].kind)
+        annotation = str(type(part).model_fields[name].annotation)
         if isinstance(value, float | tuple) and "VertexValues" in annotation:
             found[prefix + name] = (
                 column_major(np.tile(value, (count, 1)))
@@ -271,7 +271,7 @@ def varied(part, count, prefix=""):
 
 
 @pytest.mark.parametrize(
-    "Model", [Model for Model in MODELS if "file" not in Model.fields()], ids=lambda Model: Model.__name__
+    "Model", [Model for Model in MODELS if "file" not in Model.model_fields], ids=lambda Model: Model.__name__
 )
 def test_single_precision_follows_double(Model):
     given = directions(1, 5000, np.float32, least=0.02)
@@ -335,7 +335,7 @@ def turned(given, angle):
 
 @pytest.mark.parametrize(
     "Model",
-    [Model for Model in MODELS if Model.isotropic and "file" not in Model.fields()],  # tables jump
+    [Model for Model in MODELS if Model.isotropic and "file" not in Model.model_fields],  # tables jump
     ids=lambda Model: Model.__name__,
 )
 @settings(max_examples=40, deadline=None)
@@ -363,7 +363,7 @@ def test_a_skipped_lobe_is_black(Model, data, seed):
     for method, names in Model.scales.items():
         for name in names if hasattr(Model, method) else ():
             value = getattr(model, name)
-            zero = model.replaced(**{name: (0.0, 0.0, 0.0) if isinstance(value, tuple) else 0.0})
+            zero = model.model_copy(update={name: (0.0, 0.0, 0.0) if isinstance(value, tuple) else 0.0})
             lobe = method.removesuffix("_lobe")
             assert lobe not in zero.lobes()
             assert not evaluate({lobe: getattr(zero, method)}, given)[lobe].any()
@@ -374,7 +374,7 @@ def test_a_skipped_lobe_is_black(Model, data, seed):
 
 @every_model
 def test_the_file_is_named_after_the_tag(Model):
-    tag = Model.model
+    tag = Model.model_fields["model"].default
     assert Model.__module__ == f"illumcli.models.{tag}"
     assert tag in tags("illumcli.models")
 

@@ -22,7 +22,7 @@ FRESNEL = {
 
 
 def model_of(i):
-    return CookTorrance.validated(
+    return CookTorrance.model_validate(
         {
             "diffuse": i["albedo"],
             "diffuse_weight": i["kd"],

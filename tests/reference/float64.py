@@ -150,7 +150,7 @@ def render(setup):
     alone = (near < 0) | (near // body == number // body)
     delta = (lit & ((own < 0) | ((height > 0) & (implied < 0) & (way < 0) & alone))).astype(float)
 
-    model = Scene.validated({"version": 1, "materials": {"m": setup.material}}).materials["m"]
+    model = Scene.model_validate({"version": 1, "materials": {"m": setup.material}}).materials["m"]
     given = {name: np.asfortranarray(value[lit]) for name, value in (("n", n), ("l", l), ("v", -d))}
     lobes = evaluate(model.lobes(), given)
     light = {}

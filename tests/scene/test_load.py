@@ -635,11 +635,10 @@ def test_what_yaml_takes_for_no_text_is_refused(problems, character):
 
 
 def test_a_pattern_of_a_plug_in_is_said_as_it_stands():
-    from illumcli.schema.faults import fact
+    from illumcli.schema.messages import sentence
 
-    assert (
-        fact("string_pattern_mismatch", "a", {"pattern": "^[0-9]$"}, "") == "must match ^[0-9]$, is text 'a'"
-    )
+    fact = sentence("string_pattern_mismatch", {"pattern": "^[0-9]$"}, "a")
+    assert fact == "must match ^[0-9]$, is text 'a'"
 
 
 @pytest.mark.parametrize(

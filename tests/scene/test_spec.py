@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.commands.schema import schema_of
 from illumcli.layers import NAMES
@@ -23,7 +23,7 @@ SCHEMA = schema_of(Scene)
 
 
 def scene(**parts: Any) -> Scene:
-    return Scene.validated({"version": 1, **parts})
+    return Scene.model_validate({"version": 1, **parts})
 
 
 def test_a_scene_of_one_mesh():
@@ -183,12 +183,12 @@ def test_scenes_from_the_schema_are_accepted_and_survive_a_round_trip(data):
     name = data.draw(st.sampled_from(sorted(parts)))
     tree = {"version": 1, name: data.draw(parts[name])}
     try:
-        made = Scene.validated(tree)
+        made = Scene.model_validate(tree)
     except ValidationError as error:
         kinds = {each["type"] for each in error.errors(include_url=False)}
         assume(not kinds <= RELATIONS)
         raise
-    assert Scene.validated(json.loads(json.dumps(made, default=dict))) == made
+    assert Scene.model_validate(json.loads(json.dumps(made, default=dict))) == made
 
 
 def test_planning_a_scene_loads_no_ray_tracer_and_no_image_library():

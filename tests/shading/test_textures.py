@@ -92,7 +92,7 @@ def test_ranges_are_those_of_the_parameters():
     assert parameter_range(OrenNayar(), "sigma") == Range(1, 0, 1.5708)
     assert parameter_range(OrenNayar(), "diffuse") == Range(3, 0, 1)
     assert parameter_range(OrenNayar(), "ambient") == Range(3, 0, 1e18)
-    model = CookTorrance.validated({"model": "cook_torrance", "distribution": {"D": "ggx"}})
+    model = CookTorrance.model_validate({"model": "cook_torrance", "distribution": {"D": "ggx"}})
     assert parameter_range(model, "distribution.alpha") == Range(1, 1e-4, 10)
 
 

@@ -123,7 +123,7 @@ def test_frames_are_orthonormal_for_every_normal():
 @pytest.mark.parametrize("Falloff", members("illumcli.visibility.falloffs"), ids=lambda c: c.__name__)
 def test_every_falloff_rises_from_0_at_contact_to_1_out_of_reach(Falloff):
     tag = Falloff.__module__.rpartition(".")[2]
-    falloff = Falloff.validated({"falloff": tag, "max_distance": 2.0})
+    falloff = Falloff.model_validate({"falloff": tag, "max_distance": 2.0})
     x = np.array([0, 1e-9, 0.1, 0.5, 1, 1.9, 2, 3, np.inf])
     for dtype in (np.float32, np.float64):
         mu = falloff.weight(x.astype(dtype), falloff.reach(1.0), 1.0)

@@ -94,7 +94,7 @@ def measure_convergence(
     settings = settings or ConvergenceSettings()
     loaded = load(path, settings.overrides)
     if settings.seed is not None:
-        loaded = replace(loaded, scene=loaded.scene.replaced(seed=settings.seed))
+        loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": settings.seed}))
     scene = loaded.scene
 
     # what is varied, of which layer, and how far

@@ -72,8 +72,8 @@ class SampledLayer(Record):
         update: dict[str, Any] = {"seed": sampling.seed}
         if self.scene.obscurance is not None:
             finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
-            update["obscurance"] = self.scene.obscurance.replaced(**finer)
-        graph = build(self.scene.replaced(**update), self.loaded)
+            update["obscurance"] = self.scene.obscurance.model_copy(update=finer)
+        graph = build(self.scene.model_copy(update=update), self.loaded)
         outputs = outputs_of(graph.scene, [self.layer.name])
         refuse_rays(graph, outputs)
         plan = schedule(graph, outputs, replace(self.view, samples=sampling.pixel))

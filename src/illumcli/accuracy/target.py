@@ -132,7 +132,7 @@ def choose_sampling(
     # the layer, and whether it casts obscurance rays
     loaded = load(path, overrides)
     if seed is not None:
-        loaded = replace(loaded, scene=loaded.scene.replaced(seed=seed))
+        loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": seed}))
     graph, outputs = build(loaded.scene, loaded), outputs_of(loaded.scene, only)
     refuse_rays(graph, outputs)
     means = [layer for layer in outputs if not layer.data]

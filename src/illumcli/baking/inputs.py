@@ -107,7 +107,7 @@ def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
     """A scene of one mesh file and nothing else, not placed on a floor."""
     scene_file = load(path, overrides)
     description = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
-    return replace(scene_file, scene=Scene.validated(description))
+    return replace(scene_file, scene=Scene.model_validate(description))
 
 
 def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:

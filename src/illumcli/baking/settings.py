@@ -28,7 +28,7 @@ class BakeSettings(Value):
 
     def obscurance(self) -> Obscurance:
         """The same as a scene describes it."""
-        return Obscurance.validated(
+        return Obscurance.model_validate(
             {
                 "samples": self.samples,
                 "falloff": dict(self.falloff),

@@ -8,18 +8,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.brdf import views
 from illumcli.brdf.plot import PLOT, VIEWS, Plot
 from illumcli.errors import InputError, OutputError
 from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
 from illumcli.models._base import IlluminationModel
+from illumcli.scene.faults import faults
 from illumcli.scene.override import Override, parse
 from illumcli.scene.source import Problem
 from illumcli.schema.description import Description
-from illumcli.schema.families import member, suggestion
-from illumcli.schema.faults import faults
+from illumcli.schema.families import member, tag_of
+from illumcli.schema.messages import suggestion
 
 __all__ = ["PLOT", "VIEWS", "Plot", "described", "draw_brdfs", "slices_table"]
 
@@ -89,7 +90,7 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
             problems.append(f"no model '{name}'; {error}")
             applied |= {text for text, change in changes if change.steps[0] in (name, str(place))}
             continue
-        parameters += [name for name in Model.fields() if name != "model"]
+        parameters += [name for name in Model.model_fields if name != "model"]
         mine = [(text, own) for text, change in changes if (own := _for(change, name, place, Model, names))]
         applied |= {text for text, _ in mine}
         made, found = _described(Model, mine)
@@ -113,7 +114,7 @@ def _for(
     first, *rest = change.steps
     if first in (name, str(place)) and rest:
         return tuple(rest), change.value.plain()
-    if first in Model.fields() and first != "model" and first not in names:
+    if first in Model.model_fields and first != "model" and first not in names:
         return change.steps, change.value.plain()
     return None
 
@@ -122,7 +123,7 @@ def _described(
     Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
 ) -> tuple[IlluminationModel | None, list[str]]:
     """The model with its changes, or None and what is wrong, after the override that it comes from."""
-    keys: dict[str, Any] = {"model": Model.model}
+    keys: dict[str, Any] = {"model": tag_of(Model)}
     said: dict[tuple[str, ...], str] = {}
     for text, (steps, value) in changes:
         here = keys
@@ -134,12 +135,11 @@ def _described(
                 ]
         here[steps[-1]] = value
         said[steps] = text
-    classes: dict[int, type[Description]] = {}
     try:
-        return Model.validated(keys, classes), []
+        return Model.model_validate(keys), []
     except ValidationError as error:
         found = []
-        for path, fact in faults(error, keys, classes):
+        for path, fact in faults(error, Model, keys):
             where = ".".join(map(str, path))
             given = [text for steps, text in said.items() if path[: len(steps)] == steps]
             found.append(f"-D {given[-1]}: {fact}" if given else f"{where}: {fact}" if where else fact)

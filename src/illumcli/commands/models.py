@@ -10,7 +10,7 @@ from typing import Any
 
 from illumcli.commands.schema import schema_of
 from illumcli.errors import InputError
-from illumcli.schema.families import member, members
+from illumcli.schema.families import member, members, tag_of
 
 PACKAGE = "illumcli.models"
 CLAIMS = {
@@ -26,9 +26,9 @@ def table() -> str:
     """Tag, parameters and claims of every model, one line each."""
     rows = [("model", "parameters", "claims")]
     for Model in members(PACKAGE):
-        names = [name for name in Model.fields() if name not in ("model", *SHARED)]
+        names = [name for name in Model.model_fields if name not in ("model", *SHARED)]
         claims = [claim for claim in CLAIMS if getattr(Model, claim)]
-        rows.append((Model.model, ", ".join(names), ", ".join(claims)))
+        rows.append((tag_of(Model), ", ".join(names), ", ".join(claims)))
     first, second = (max(len(row[i]) for row in rows) for i in (0, 1))
     return "\n".join(f"{a:{first}}  {b:{second}}  {c}".rstrip() for a, b, c in rows)
 

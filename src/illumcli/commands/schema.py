@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core import core_schema
 
 from illumcli.scene.spec import Scene
 from illumcli.schema.description import Description
 from illumcli.schema.docs import choices, field_docs, summary
-from illumcli.schema.families import members
-from illumcli.schema.fields import HEX, color, spread
 
 EXTENDS = {
     "description": "Scenes that this one extends, by path from its own folder: mappings merge, anything else "
@@ -21,11 +18,6 @@ EXTENDS = {
     "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
 }
 
-SRGB = {
-    "type": "string",
-    "pattern": HEX,
-    "description": "A colour in sRGB, made linear: '#rrggbb', or '#rgb' for equal digits.",
-}
 NULL = {"type": "null"}
 REFERENCE = "#/$defs/"
 MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
@@ -94,17 +86,7 @@ class _Partial:
 
 def schema_of(cls: type[Description]) -> dict[str, Any]:
     """The schema of one description; those it is made of are under `$defs`."""
-    return _Schema().generate(_named(cls.core_schema()))
-
-
-def _named(part: Any) -> Any:
-    """A schema of pydantic's core in which every description has a name to be referred to by."""
-    if isinstance(part, list):
-        return [_named(each) for each in part]
-    if not isinstance(part, dict):
-        return part
-    made = {key: value if key == "metadata" else _named(value) for key, value in part.items()}
-    return {**made, "ref": made["cls"].__name__} if "cls" in made else made
+    return cls.model_json_schema(schema_generator=_Schema)
 
 
 def _describe_choices(part: dict[str, Any], text: str) -> None:
@@ -117,38 +99,33 @@ def _describe_choices(part: dict[str, Any], text: str) -> None:
 class _Schema(GenerateJsonSchema):
     """pydantic's schema with our texts, without titles that only repeat a key."""
 
-    def typed_dict_schema(self, schema: core_schema.TypedDictSchema) -> JsonSchemaValue:
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+    def model_schema(self, schema: Any) -> JsonSchemaValue:
+        """A description with the texts of its class and fields."""
         cls = schema["cls"]
         docs = field_docs(cls)
-        properties, required = {}, []
-        for name, field in schema["fields"].items():
-            part = properties[name] = self.generate_inner(field)
+        made = super().model_schema(schema)
+        required = set(made.pop("required", ()))
+        for name, part in made["properties"].items():
             if text := docs.get(name) or ("const" in part and summary(cls)):
                 part["description"] = text
                 _describe_choices(part, text)
             if part.get("default") == {}:  # what is described by all its defaults
                 del part["default"]
-            says_what = isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT
-            if says_what:
+            if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:
                 part.pop("default", None)
-            if says_what or field["required"]:
-                required.append(name)
-        made: JsonSchemaValue = {
-            "type": "object",
-            "title": cls.__name__,
-            "description": summary(cls),
-            "properties": properties,
-            "additionalProperties": False,
-        }
-        return {**made, "required": required} if required else made
+                required.add(name)
+        about = {"type": "object", "title": cls.__name__, "description": summary(cls)}
+        made = {**about, "properties": made["properties"], "additionalProperties": False}
+        return (
+            {**made, "required": [name for name in made["properties"] if name in required]}
+            if required
+            else made
+        )
 
-    def function_plain_schema(self, schema: core_schema.PlainValidatorFunctionSchema) -> JsonSchemaValue:
-        """Any member of an open family."""
-        family = schema["metadata"]["family"]
-        choices = [self.generate_inner(_named(each.core_schema())) for each in members(family.package)]
-        return {"oneOf": choices, "discriminator": {"propertyName": family.tag}}
-
-    def tuple_schema(self, schema: core_schema.TupleSchema) -> JsonSchemaValue:
+    def tuple_schema(self, schema: Any) -> JsonSchemaValue:
         """A list of equal parts says so once."""
         made = super().tuple_schema(schema)
         parts = made.get("prefixItems", [])
@@ -157,22 +134,7 @@ class _Schema(GenerateJsonSchema):
             made["items"] = parts[0]
         return made
 
-    def dict_schema(self, schema: core_schema.DictSchema) -> JsonSchemaValue:
+    def dict_schema(self, schema: Any) -> JsonSchemaValue:
         """Keys that are no names are refused."""
         made = super().dict_schema(schema)
         return {**made, "additionalProperties": False} if "patternProperties" in made else made
-
-    def function_before_schema(self, schema: core_schema.BeforeValidatorFunctionSchema) -> JsonSchemaValue:
-        """One number may stand for three, or a text for a colour."""
-        made = super().function_before_schema(schema)
-        if schema["function"]["function"] is spread:
-            return {"anyOf": [made["items"], made]}
-        if schema["function"]["function"] is color:
-            return {"anyOf": [made["items"], SRGB, made]}
-        return made
-
-    def function_after_schema(self, schema: core_schema.AfterValidatorFunctionSchema) -> JsonSchemaValue:
-        """A text of a form."""
-        made = super().function_after_schema(schema)
-        form = schema.get("metadata", {}).get("form")
-        return {**made, "pattern": form} if form else made

@@ -83,7 +83,7 @@ def prepared(job: RenderJob) -> Work:
 def work_of(job: RenderJob, loaded: SceneFile) -> Work:
     """The same for a scene that was loaded already."""
     options = job.options
-    scene = loaded.scene if options.seed is None else loaded.scene.replaced(seed=options.seed)
+    scene = loaded.scene if options.seed is None else loaded.scene.model_copy(update={"seed": options.seed})
     graph, outputs = build(scene, loaded), outputs_of(scene, options.only)
     refuse_rays(graph, outputs)
     targets = image_set(job, loaded, graph, outputs)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import InputError
-from illumcli.schema.families import suggestion
+from illumcli.schema.messages import suggestion
 
 LONGEST = 4096
 """Letters of a path; no system takes more."""

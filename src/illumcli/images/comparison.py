@@ -16,7 +16,7 @@ from illumcli.images.channels import group_by_layer
 from illumcli.images.flip import flip
 from illumcli.images.reader import Image, read_image
 from illumcli.records import Value
-from illumcli.schema.families import suggestion
+from illumcli.schema.messages import suggestion
 
 
 class LayerDifference(Value):

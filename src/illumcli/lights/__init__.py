@@ -5,6 +5,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.lights._base import Light
-from illumcli.schema.families import Tagged
+from illumcli.schema.families import Family
 
-AnyLight: TypeAlias = Annotated[Light, Tagged("illumcli.lights", "light")]
+AnyLight: TypeAlias = Annotated[Light, Family("illumcli.lights", "light")]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
+from pydantic import Discriminator, model_validator
 
 from illumcli.arrays import Floats
 from illumcli.schema.description import Description
-from illumcli.schema.fields import By, NonNegative, Positive
+from illumcli.schema.fields import NonNegative, Positive
 
 
 class NoLaw(Description):
@@ -32,10 +33,11 @@ class Polynomial(Description):
     c3: NonNegative = 0.0
     """What it grows by per squared scene unit."""
 
-    def check(self) -> None:
-        """Something must divide."""
+    @model_validator(mode="after")
+    def _something_divides(self) -> Self:
         if not (self.c1 or self.c2 or self.c3):
             raise ValueError("c1, c2 and c3 must not all be 0")
+        return self
 
     def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / (c1 + c2 d + c3 d^2)."""
@@ -78,4 +80,6 @@ class Windowed(Description):
         return np.square(1 - np.square(np.square(share))) / np.square(distance)
 
 
-Law: TypeAlias = Annotated[NoLaw | Polynomial | InverseSquare | InverseSquareFlux | Windowed, By("law")]
+Law: TypeAlias = Annotated[
+    NoLaw | Polynomial | InverseSquare | InverseSquareFlux | Windowed, Discriminator("law")
+]

@@ -41,7 +41,7 @@ class Light(Description):
 
     def without_color(self) -> Self:
         """This light with neither colour nor name: all that `sample_at` depends on."""
-        return self.replaced(**{self.emission_field: (1.0, 1.0, 1.0), "name": None, "shadows": True})
+        return self.model_copy(update={self.emission_field: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
     def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
         """Light at `position` [(N, 3), radii from the scene's centre]."""

@@ -10,7 +10,7 @@ from illumcli.arrays import Vectors
 from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Light, LightSample, towards
 from illumcli.render_space import RenderSpace
-from illumcli.schema.description import written
+from illumcli.schema.description import default_of
 from illumcli.schema.fields import Color, Vector
 
 
@@ -20,7 +20,7 @@ class Point(Light):
     """Where it is [scene units]."""
     intensity: Color = (1.0, 1.0, 1.0)
     """[W/sr] under the inverse square; a plain factor under the other laws."""
-    attenuation: Law = written({"law": "inverse_square"})
+    attenuation: Law = default_of({"law": "inverse_square"})
     """Distance law."""
 
     emission_field: ClassVar[str] = "intensity"

@@ -6,13 +6,14 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from illumcli.arrays import Vectors, dot, unit
 from illumcli.lights._attenuation import Law
 from illumcli.lights._base import Light, LightSample, towards
 from illumcli.render_space import RenderSpace
-from illumcli.schema.description import written
-from illumcli.schema.fields import Color, Share, Vector, Within
+from illumcli.schema.description import default_of
+from illumcli.schema.fields import Color, Share, Vector
 
 
 class Spot(Light):
@@ -21,13 +22,13 @@ class Spot(Light):
     """Where it is [scene units]."""
     target: Vector = (0.0, 0.0, 0.0)
     """A point on the axis [scene units]."""
-    angle: Annotated[float, Within(gt=0, le=180)] = 30.0
+    angle: Annotated[float, Field(gt=0, le=180)] = 30.0
     """Half the cone's opening: nothing arrives beyond it [degrees]."""
     softness: Share = 0.2
     """Share of the cone over which the intensity falls smoothly to 0 at the rim."""
     intensity: Color = (1.0, 1.0, 1.0)
     """On the axis [W/sr]."""
-    attenuation: Law = written({"law": "inverse_square"})
+    attenuation: Law = default_of({"law": "inverse_square"})
     """Distance law."""
 
     emission_field: ClassVar[str] = "intensity"

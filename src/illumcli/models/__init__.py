@@ -5,6 +5,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.models._base import IlluminationModel
-from illumcli.schema.families import Tagged
+from illumcli.schema.families import Family
 
-AnyModel: TypeAlias = Annotated[IlluminationModel, Tagged("illumcli.models", "model")]
+AnyModel: TypeAlias = Annotated[IlluminationModel, Family("illumcli.models", "model")]

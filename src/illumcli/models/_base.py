@@ -102,4 +102,4 @@ def _placed(part: D, values: Mapping[str, Any]) -> D:
             path.removeprefix(f"{name}."): v for path, v in values.items() if path.startswith(f"{name}.")
         }
         here[name] = _placed(getattr(part, name), inner)
-    return part.replaced(**here)
+    return part.model_copy(update=here)

@@ -15,12 +15,12 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Discriminator
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._lobes import channels
 from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
 from illumcli.schema.description import Description
-from illumcli.schema.fields import By
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -199,4 +199,6 @@ class Constant(Description):
         return channels(c, self.value)
 
 
-Fresnel: TypeAlias = Annotated[Dielectric | Conductor | Schlick | Material | Shifted | Constant, By("F")]
+Fresnel: TypeAlias = Annotated[
+    Dielectric | Conductor | Schlick | Material | Shifted | Constant, Discriminator("F")
+]

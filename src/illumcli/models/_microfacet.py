@@ -21,12 +21,12 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from pydantic import Discriminator
 
 from illumcli.arrays import Floats, as_dtype_of
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
 from illumcli.schema.description import Description
-from illumcli.schema.fields import By
 
 
 def gaussian(n_h: Any, sin2_h: Any, m: Any) -> Any:
@@ -208,5 +208,5 @@ class GGX(Description):
 
 Distribution: TypeAlias = Annotated[
     Gaussian | Beckmann | Blinn | PowerCosine | TorranceSparrow | TrowbridgeReitz | GGX,
-    By("D"),
+    Discriminator("D"),
 ]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
+from pydantic import Discriminator, Field, Tag
+
 from illumcli.schema import fields as values
 from illumcli.schema.description import Description
-from illumcli.schema.fields import By, Tag, Three, Within, spread
+from illumcli.schema.fields import Shorthand, Triple, spread
 
 
 class Texture(Description):
@@ -53,7 +55,7 @@ def _kind(value: Any) -> str:
 T = TypeVar("T")
 Varying: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
-    By(_kind),
+    Discriminator(_kind),
 ]
 
 Color: TypeAlias = Varying[values.Color]
@@ -63,14 +65,16 @@ Positive: TypeAlias = Varying[values.Positive]
 NonNegative: TypeAlias = Varying[values.NonNegative]
 
 # a slope; below 1e-4 single precision holds no lobe
-Roughness: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=10)]]
+Roughness: TypeAlias = Varying[Annotated[float, Field(ge=1e-4, le=10)]]
 # an angle in radians, less than a quarter turn
-HalfHeight: TypeAlias = Varying[Annotated[float, Within(ge=1e-4, le=1.57)]]
+HalfHeight: TypeAlias = Varying[Annotated[float, Field(ge=1e-4, le=1.57)]]
 # the spread of facet slopes, an angle in radians up to a quarter turn
-Spread: TypeAlias = Varying[Annotated[float, Within(ge=0, le=1.5708)]]
+Spread: TypeAlias = Varying[Annotated[float, Field(ge=0, le=1.5708)]]
 # indices of refraction
-Index: TypeAlias = Varying[Annotated[float, Within(ge=0.01, le=1e3)]]
-IndexColor: TypeAlias = Varying[Annotated[tuple[float, float, float], Three(Within(ge=0.01, le=1e3), spread)]]
+Index: TypeAlias = Varying[Annotated[float, Field(ge=0.01, le=1e3)]]
+IndexColor: TypeAlias = Varying[
+    Annotated[Triple[Annotated[float, Field(ge=0.01, le=1e3)]], Shorthand(spread)]
+]
 ExtinctionColor: TypeAlias = Varying[
-    Annotated[tuple[float, float, float], Three(Within(ge=0, le=1e3), spread)]
+    Annotated[Triple[Annotated[float, Field(ge=0, le=1e3)]], Shorthand(spread)]
 ]

@@ -30,7 +30,7 @@ from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
 from illumcli.models._microfacet import Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Albedo, Share
-from illumcli.schema.description import Description, written
+from illumcli.schema.description import Description, default_of
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -43,9 +43,9 @@ class CookTorrance(IlluminationModel):
     """kd, the share of diffuse reflection; left out, 1 - ks."""
     specular_weight: Share = 0.5
     """ks, the share of specular reflection."""
-    distribution: Distribution = written({"D": "beckmann"})
+    distribution: Distribution = default_of({"D": "beckmann"})
     """D, how facets are spread about the normal."""
-    fresnel: Fresnel = written({"F": "dielectric"})
+    fresnel: Fresnel = default_of({"F": "dielectric"})
     """F, what a facet reflects at each angle."""
     convention: Literal["microfacet", "printed"] = "microfacet"
     """Constants. `microfacet`: a normalised D over 4 n_l n_v. `printed`: those of the texts over pi n_l

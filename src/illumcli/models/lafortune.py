@@ -18,14 +18,14 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
 from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
-from illumcli.schema.fields import Within
 
-Weight = Varying[Annotated[float, Within(ge=-1, le=1)]]
+Weight = Varying[Annotated[float, Field(ge=-1, le=1)]]
 
 
 class Lafortune(IlluminationModel):

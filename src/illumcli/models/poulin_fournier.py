@@ -22,14 +22,14 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
 from illumcli.models._parameters import Albedo, NonNegative, Varying
-from illumcli.schema.fields import Within
 
-Slope = Varying[Annotated[float, Within(ge=1e-3, le=1.57)]]
+Slope = Varying[Annotated[float, Field(ge=1e-3, le=1.57)]]
 
 NODES = {np.dtype(np.float32): (14, 12.0), np.dtype(np.float64): (64, 40.0)}
 """Per precision: quadrature nodes, and the fall, as an exponent, at which a highlight is negligible."""

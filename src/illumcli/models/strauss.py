@@ -27,14 +27,14 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import channels, lobe, tint, weighed
 from illumcli.models._parameters import Albedo, Share
-from illumcli.schema.fields import Within
 
-Offset = Annotated[float, Within(ge=1.001, le=10)]
+Offset = Annotated[float, Field(ge=1.001, le=10)]
 
 
 def strauss_fresnel(x: Any, kf: Any) -> Any:
@@ -58,7 +58,7 @@ class Strauss(IlluminationModel):
     """m: 0 highlights of the light's colour, 1 of the surface's."""
     transparency: Share = 0.0
     """t: 0 opaque, 1 nothing reflected but the highlight at grazing."""
-    kj: Annotated[float, Within(ge=0, le=1)] = 0.1
+    kj: Annotated[float, Field(ge=0, le=1)] = 0.1
     """k_j, how much rough surfaces shine off the mirror direction."""
     kf: Offset = 1.12
     """k_f, pole of F; the nearer to 1, the later F rises."""

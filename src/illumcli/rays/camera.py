@@ -66,7 +66,9 @@ def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
     right, up, forward = axes(camera)
     position = centre + eye_x * right + eye_y * up + eye_z * forward
     target = position - eye_z * forward
-    return camera.replaced(position=_tuple(position), target=_tuple(target), fit=None, **changes)
+    return camera.model_copy(
+        update={"position": _tuple(position), "target": _tuple(target), "fit": None, **changes}
+    )
 
 
 CLOSEST = 1e-3

@@ -22,7 +22,7 @@ from illumcli.render_graph import stages
 from illumcli.render_graph.replicates import error_recipes
 from illumcli.scene.load import resolve
 from illumcli.scene.spec import MeshFile, Normals, Object, Obscurance, Scene, default_material
-from illumcli.schema.families import suggestion
+from illumcli.schema.messages import suggestion
 from illumcli.shading.materials import DEFAULT, Choice, Token
 from illumcli.shading.rates import AT_SAMPLES
 from illumcli.shading.terms import words

@@ -30,4 +30,7 @@ def placed(view: View, place: Placement) -> View:
     """The view with its camera at a place."""
     position, target, extent = place
     more = {} if extent is None else {"extent": extent}
-    return replace(view, camera=view.camera.replaced(position=position, target=target, fit=None, **more))
+    return replace(
+        view,
+        camera=view.camera.model_copy(update={"position": position, "target": target, "fit": None, **more}),
+    )

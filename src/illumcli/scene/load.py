@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.errors import InputError
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.blame import Applied, PlacedFault, blamed
+from illumcli.scene.faults import faults
 from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.references import reference_faults
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
@@ -25,8 +26,7 @@ from illumcli.scene.spec import Scene
 from illumcli.scene.studio import SETTINGS, STUDIO, Settings, arranged
 from illumcli.scene.unused import lacking, unused
 from illumcli.schema.description import Description
-from illumcli.schema.families import suggestion
-from illumcli.schema.faults import faults, shown
+from illumcli.schema.messages import describe, suggestion
 
 MAX_EXTENDS = 8  # files, one extending the next
 MAX_FILES = 64
@@ -190,7 +190,7 @@ class _Reading:
         self.problems += problems
         if tree is None or not isinstance(tree.value, dict):
             if tree is not None:
-                fact = f"a scene is a mapping, this is {shown(tree.value)}; begin with `version: 1`"
+                fact = f"a scene is a mapping, this is {describe(tree.value)}; begin with `version: 1`"
                 self.problems.append(Problem(tree.place, (), fact))
             return None
         self.nodes += tree.size
@@ -222,7 +222,7 @@ class _Reading:
     def against(self, node: Node, path: Path, above: tuple[Path, ...]) -> str | None:
         """What is wrong with the file that `path` extends."""
         if not isinstance(node.value, str):
-            return f"must be the path of a scene, is {shown(node.value)}"
+            return f"must be the path of a scene, is {describe(node.value)}"
         found = _inside(node.value, path.parent, self.roots)
         if isinstance(found, str):
             return found
@@ -276,11 +276,10 @@ def _validated(
 def _judged(kind: type[D], tree: Node) -> tuple[D | None, list[PlacedFault]]:
     """The description that a tree writes, or None and what is wrong with it."""
     plain = tree.plain()
-    classes: dict[int, type[Description]] = {}
     try:
-        return kind.validated(plain, classes), []
+        return kind.model_validate(plain), []
     except ValidationError as error:
-        found = [*faults(error, plain, classes), *(reference_faults(plain) if kind is Scene else ())]
+        found = [*faults(error, kind, plain), *(reference_faults(plain) if kind is Scene else ())]
     return None, [
         PlacedFault((tree.find(path) or tree).at, path, fact) for path, fact in dict.fromkeys(found)
     ]

@@ -8,8 +8,7 @@ from typing import Any
 from illumcli.records import Value
 from illumcli.scene import source
 from illumcli.scene.source import MAX_DEPTH, Node, Place, Problem
-from illumcli.schema.families import suggestion
-from illumcli.schema.faults import shown
+from illumcli.schema.messages import describe, suggestion
 
 NAMED = {
     "materials": "material",
@@ -70,7 +69,7 @@ def _put(node: Node | None, path: tuple[str, ...], steps: tuple[str, ...], value
     if node and isinstance(here, list):
         return _put_in_list(here, node, path, steps, value)
     name = ".".join(path)
-    raise _NoSuchPart(f"nothing is inside {name}, which is {shown(here)}; give it whole, as -D {name}=...")
+    raise _NoSuchPart(f"nothing is inside {name}, which is {describe(here)}; give it whole, as -D {name}=...")
 
 
 def _new(path: tuple[str, ...], steps: tuple[str, ...]) -> dict[str, Node]:

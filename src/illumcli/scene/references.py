@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.layers import owner_of
+from illumcli.scene.faults import Fault, faults
 from illumcli.scene.source import Path
 from illumcli.schema.description import Description
-from illumcli.schema.families import member, suggestion
-from illumcli.schema.faults import Fault, faults
+from illumcli.schema.families import member
+from illumcli.schema.messages import suggestion
 
 
 def reference_faults(scene: Any) -> Iterator[Fault]:
@@ -82,12 +83,11 @@ def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:
         model = member("illumcli.models", base["model"])
     except (LookupError, TypeError):
         return
-    classes: dict[int, type[Description]] = {}
     merged = {**base, **override}
     try:
-        model.validated(merged, classes)
+        model.model_validate(merged)
     except ValidationError as error:
-        for path, fact in faults(error, merged, classes):
+        for path, fact in faults(error, model, merged):
             if path[:1] and path[0] in override:
                 yield path, fact
 

@@ -15,6 +15,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import yaml
 
+from illumcli.schema.messages import short
+
 MAX_BYTES = 2**20
 MAX_DEPTH = 32
 MAX_NODES = 100_000
@@ -348,9 +350,3 @@ def _syntax(error: yaml.MarkedYAMLError) -> str:
     said = " ".join(f"{error.problem or ''} {error.context or ''}".split())
     way = next((way for words, way in _WAYS_OUT if words in said), "correct the text here or just above")
     return f"not YAML: {short(said, 160)}; {way}"
-
-
-def short(text: str, most: int = 40) -> str:
-    """`text` on one line, cut where it is long."""
-    line = " ".join(text.split())
-    return line if len(line) <= most else f"{line[: most - 1]}…"

@@ -5,40 +5,47 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
-from illumcli.geometry.shapes import AnyShape
+from illumcli.geometry.shapes import AnyShape, Shape
 from illumcli.layers import NAMES
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
 from illumcli.scene.references import reference_faults
-from illumcli.schema.description import Description, checks, written
+from illumcli.schema.description import DEFAULTS, Description, default_of
 from illumcli.schema.fields import (
-    Before,
-    By,
+    COLOR,
     Color,
     Direction,
-    Many,
+    ListOf,
     Name,
     NonNegative,
     Number,
     Positive,
     Share,
-    Tag,
+    Shorthand,
     Vector,
-    Whole,
-    Within,
     spread,
 )
+from illumcli.schema.messages import describe
 from illumcli.visibility.falloffs import AnyFalloff
 from illumcli.visibility.samplers import SAMPLERS
 
 Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
-Count: TypeAlias = Annotated[int, Whole(ge=1, le=2**31 - 1)]
-Row: TypeAlias = tuple[Number, Number, Number, Number]
+Count: TypeAlias = Annotated[int, Field(ge=1, le=2**31 - 1)]
+Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Strict(False)]
+Matrix: TypeAlias = Annotated[tuple[Row, Row, Row, Row], Strict(False)]
 
 # names of tables
 if TYPE_CHECKING:
@@ -47,8 +54,6 @@ if TYPE_CHECKING:
 else:
     Layer = Literal[NAMES]
     Sampler = Literal[tuple(SAMPLERS)]
-
-NOTHING: Any = written({})  # a mapping without a key: a description with all its defaults
 
 
 class Normals(Description):
@@ -60,7 +65,7 @@ class Normals(Description):
     weights: Literal["angle", "area", "equal"] = "angle"
     """What each polygon counts for in a vertex normal. `angle`: its angle at the vertex, so that it does not
     matter how faces are cut into polygons. `area`: its area. `equal`: as much as any other."""
-    crease: Annotated[float, Within(ge=0, le=180)] | None = None
+    crease: Annotated[float, Field(ge=0, le=180)] | None = None
     """Polygons that meet at more than this keep their edge sharp [degrees]; 180: none. By default the file's
     smoothing groups say so, and 40 degrees where it has none."""
     polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
@@ -74,7 +79,7 @@ class MeshFile(Description):
 
     file: str
     """Path, from the scene's folder."""
-    normals: Normals = NOTHING
+    normals: Normals = DEFAULTS
     """Where the normals that shading interpolates come from."""
     materials: bool = False
     """True: import the materials that the file's own library describes."""
@@ -83,24 +88,20 @@ class MeshFile(Description):
 
 
 def _mesh_kind(value: Any) -> str:
-    return (
-        "shape"
-        if isinstance(value, dict) and "shape" in value
-        else "file"
-        if not hasattr(value, "mesh")
-        else "shape"
-    )
+    """A mesh is read from a file unless it names a shape."""
+    is_shape = "shape" in value if isinstance(value, dict) else isinstance(value, Shape)
+    return "shape" if is_shape else "file"
 
 
 MeshSource: TypeAlias = Annotated[
-    Annotated[MeshFile, Tag("file")] | Annotated[AnyShape, Tag("shape")], By(_mesh_kind)
+    Annotated[MeshFile, Tag("file")] | Annotated[AnyShape, Tag("shape")], Discriminator(_mesh_kind)
 ]
 
 
 class Transform(Description):
     """Where an object stands: scaled, rotated, fitted, translated, in this order, then the matrix."""
 
-    scale: Annotated[Vector, Before(spread)] = (1.0, 1.0, 1.0)
+    scale: Annotated[Vector, Shorthand(spread)] = (1.0, 1.0, 1.0)
     """One factor, or one per axis; negative ones mirror."""
     rotate: Vector = (0.0, 0.0, 0.0)
     """About x, then y, then z [degrees]."""
@@ -109,17 +110,19 @@ class Transform(Description):
     centred on the y axis [scene units]."""
     translate: Vector = (0.0, 0.0, 0.0)
     """By how much it is moved along x, y and z [scene units]."""
-    matrix: tuple[Row, Row, Row, Row] | None = None
+    matrix: Matrix | None = None
     """Four rows, applied last to column vectors; the last one is 0 0 0 1."""
 
-    @checks("matrix")
-    def _affine(matrix: tuple[Row, ...] | None, before: Mapping[str, Any]) -> None:
+    @field_validator("matrix")
+    @classmethod
+    def _is_affine(cls, matrix: Matrix | None) -> Matrix | None:
         if matrix is not None and matrix[3] != (0, 0, 0, 1):
             last = ", ".join(f"{value:g}" for value in matrix[3])
             raise ValueError(
                 f"the last of its four rows must be 0, 0, 0, 1, is {last}; where its numbers stand column by "
                 "column, write it transposed"
             )
+        return matrix
 
 
 class Grain(Description):
@@ -133,15 +136,15 @@ class Grain(Description):
 
 NameOrMesh: TypeAlias = Annotated[
     Annotated[str, Tag("name")] | Annotated[MeshSource, Tag("mesh")],
-    By(lambda value: "name" if isinstance(value, str) else "mesh"),
+    Discriminator(lambda value: "name" if isinstance(value, str) else "mesh"),
 ]
 NameOrMaterial: TypeAlias = Annotated[
     Annotated[str, Tag("name")] | Annotated[AnyModel, Tag("material")],
-    By(lambda value: "name" if isinstance(value, str) else "material"),
+    Discriminator(lambda value: "name" if isinstance(value, str) else "material"),
 ]
 AnyGrain: TypeAlias = Annotated[
     Annotated[Direction, Tag("direction")] | Annotated[Grain, Tag("radial")],
-    By(lambda value: "radial" if isinstance(value, dict | Grain) else "direction"),
+    Discriminator(lambda value: "radial" if isinstance(value, dict | Grain) else "direction"),
 ]
 
 
@@ -159,9 +162,9 @@ class Object(Description):
     """Where no `material` is given: show the materials, textures and vertex colours that the mesh file itself
     describes, whatever the scene calls its own, and this material, by name or in place, where it has none.
     What MTL calls intensities are shares of the light then, and ambient light leaves by diffuse colours."""
-    override: dict[str, Any] = NOTHING
+    override: dict[str, Any] = DEFAULTS
     """Parameters of the material that this object has otherwise."""
-    transform: Transform = NOTHING
+    transform: Transform = DEFAULTS
     """Where it stands, and how large."""
     shading: Rate | None = None
     """How often its material is evaluated; by default as often as the scene says. `constant`: once per
@@ -189,17 +192,18 @@ class _Camera(Description):
     samples: Count | None = None
     """Samples per pixel; by default the film's."""
 
-    def check(self) -> None:
-        """The line of sight must have a direction."""
+    @model_validator(mode="after")
+    def _has_a_line_of_sight(self) -> Self:
         if self.position == self.target:
             raise ValueError("position and target must differ")
+        return self
 
 
 class Perspective(_Camera):
     """A pinhole camera."""
 
     projection: Literal["perspective"] = "perspective"
-    fov: Annotated[float, Within(gt=0, le=None, lt=180)] = 35.0
+    fov: Annotated[float, Field(gt=0, lt=180)] = 35.0
     """Vertical field of view [degrees]."""
 
 
@@ -213,13 +217,14 @@ class Orthographic(_Camera):
 
 Camera: TypeAlias = Annotated[
     Annotated[Perspective, Tag("perspective")] | Annotated[Orthographic, Tag("orthographic")],
-    By(
+    Discriminator(
         lambda value: (
             value.get("projection", "perspective")
             if isinstance(value, dict)
             else getattr(value, "projection", "perspective")
         ),
-        unknown="no such projection; there are: perspective, orthographic",
+        custom_error_type="unknown_projection",
+        custom_error_message="no such projection; there are: perspective, orthographic",
     ),
 ]
 
@@ -243,12 +248,17 @@ class Adaptive(Description):
 
     first: Count = 4
     """Samples that every pixel gets."""
-    difference: Annotated[float, Within(gt=0, le=1)] = 0.1
+    difference: Annotated[float, Field(gt=0, le=1)] = 0.1
     """How far light may differ among them, as a share of the brightest."""
 
 
 def _adaptive(value: Any) -> Any:
     return {"first": value} if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+AdaptiveOrCount: TypeAlias = Annotated[
+    Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)
+]
 
 
 class Film(Description):
@@ -260,14 +270,16 @@ class Film(Description):
     """Height of the picture [pixels]."""
     samples: Count = 4
     """Per pixel; 1 looks through the pixel's centre."""
-    adaptive: Annotated[Adaptive, Before(_adaptive, written=Adaptive | Count)] | None = None
+    adaptive: (
+        Annotated[Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)] | None
+    ) = None
     """Take all samples only where fewer differ; a number says how many every pixel gets. By default every
     pixel gets all."""
-    filter: Filter = NOTHING
+    filter: Filter = DEFAULTS
     """From which part of and around a pixel its samples come."""
     background: Color | None = None
     """Behind everything; by default nothing, with alpha 0."""
-    exposure: Annotated[float, Within(ge=-64, le=64)] = 0.0
+    exposure: Annotated[float, Field(ge=-64, le=64)] = 0.0
     """Of 8-bit pictures [stops]; EXR keeps the light as it is."""
 
 
@@ -275,7 +287,7 @@ def _ambient(value: Any) -> Any:
     if value in FORMS:
         return {"form": value, "color": 1.0}
     if isinstance(value, str) and not value.startswith("#"):
-        raise PydanticCustomError("ambient", "neither a form nor a colour")
+        raise ValueError(f"must be {COLOR}, or a form (separate, coupled), is {describe(value)}")
     return {"color": value} if isinstance(value, str | int | float | list | tuple) else value
 
 
@@ -313,18 +325,19 @@ class DepthCue(Description):
     color: Color = (0.0, 0.0, 0.0)
     """What it fades into: black, or the background's colour, as haze does."""
 
-    def check(self) -> None:
-        """Something must lie between."""
+    @model_validator(mode="after")
+    def _fades_somewhere(self) -> Self:
         if self.near >= self.far:
             raise ValueError(f"near must be below far, is {self.near:g} with far {self.far:g}")
+        return self
 
 
 class Obscurance(Description):
     """w(p) by Monte Carlo: how open each point is to the ambient light."""
 
-    samples: Annotated[int, Whole(ge=1, le=65536)] = 64
+    samples: Annotated[int, Field(ge=1, le=65536)] = 64
     """Rays per pixel sample."""
-    falloff: AnyFalloff = written({"falloff": "step"})
+    falloff: AnyFalloff = default_of({"falloff": "step"})
     """By default every occluder counts fully: ambient occlusion."""
     sampler: Sampler = "spiral"
     """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
@@ -340,7 +353,7 @@ class Obscurance(Description):
 class Outputs(Description):
     """What is written."""
 
-    layers: Annotated[tuple[Layer, ...], Many(least=1)] = ("beauty",)
+    layers: Annotated[ListOf[Layer], Field(min_length=1)] = ("beauty",)
     """What is made of the scene. `beauty`: the picture. `ambient`: its ambient light alone. `diffuse`: the
     diffuse lobes under all lights. `specular`: the highlights under all lights. `emission`: what surfaces
     emit. `lights`: the light of every lamp by itself, a layer each. `shadows`: 1 where a lamp reaches, 0 in
@@ -349,7 +362,7 @@ class Outputs(Description):
     the one that is shaded with. `geometric_normal`: the polygon's own. `uv`: texture coordinates.
     `object_id`: number of the object, from 1. `material_id`: number of the material, from 1. `triangle_id`:
     number of the triangle, from 1. `error`: one standard error of the pixel's luminance."""
-    files: Annotated[tuple[str, ...], Many(least=1)] = ("{scene}.{camera}.png",)
+    files: Annotated[ListOf[str], Field(min_length=1)] = ("{scene}.{camera}.png",)
     """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
     file per layer (`{layer}` in its name when there are several): light as sRGB, all else as plain numbers;
     text in the file says how to read them."""
@@ -365,9 +378,9 @@ class Scene(Description):
     """Version of the scene format."""
     camera: Camera | None = None
     """The one camera, named `main`."""
-    cameras: dict[Name, Camera] = NOTHING
+    cameras: dict[Name, Camera] = DEFAULTS
     """Several cameras by name; instead of `camera`."""
-    film: Film = NOTHING
+    film: Film = DEFAULTS
     """Size and sampling of the picture."""
     shading: Rate = "phong"
     """How often the model is evaluated. `constant`: once per polygon. `gouraud`: once per vertex, intensities
@@ -376,7 +389,7 @@ class Scene(Description):
     terminator: Literal["smooth", "none"] = "smooth"
     """Where shadows of smooth shading begin. `smooth`: on the surface that the normals imply, so that coarse
     polygons cast no shadow on its lit side. `none`: on the polygons themselves."""
-    ambient: Annotated[Ambient, Before(_ambient, written=AmbientText)] = NOTHING
+    ambient: Annotated[Ambient, BeforeValidator(_ambient, json_schema_input_type=AmbientText)] = DEFAULTS
     """Colour, form or both of the light from everywhere. `separate`: it is added to the direct light.
     `coupled`: it is weighed together with it, as one text prints it."""
     obscurance: Obscurance | None = None
@@ -384,27 +397,30 @@ class Scene(Description):
     it."""
     depth_cue: DepthCue | None = None
     """Fade the beauty with the distance from the eye; by default not."""
-    meshes: dict[Name, MeshSource] = NOTHING
+    meshes: dict[Name, MeshSource] = DEFAULTS
     """Files and shapes by name, for objects to share."""
-    materials: dict[Name, AnyModel] = NOTHING
+    materials: dict[Name, AnyModel] = DEFAULTS
     """Illumination models with their parameters by name, for objects and mesh files to select."""
-    objects: tuple[Object, ...] = ()
+    objects: ListOf[Object] = ()
     """What is seen: meshes with their material and place."""
-    lights: tuple[AnyLight, ...] = ()
+    lights: ListOf[AnyLight] = ()
     """Lamps and suns; without any, what is lit is lit by ambient light alone."""
-    outputs: Outputs = NOTHING
+    outputs: Outputs = DEFAULTS
     """Layers and files that are written."""
-    seed: Annotated[int, Whole(ge=0, le=2**32 - 1)] = 0
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
     """Of every random number: the same seed makes the same picture."""
 
-    def check(self) -> None:
-        """Names must lead somewhere."""
-        found = [
-            InitErrorDetails(type=PydanticCustomError("name", "{fact}", {"fact": fact}), loc=path, input=None)
-            for path, fact in reference_faults(self)
-        ]
-        if found:
-            raise ValidationError.from_exception_data("Scene", found)
+    @model_validator(mode="after")
+    def _names_lead_somewhere(self) -> Self:
+        if faults := list(reference_faults(self)):
+            raise ValidationError.from_exception_data(
+                "Scene",
+                [
+                    {"type": "value_error", "loc": path, "input": None, "ctx": {"error": ValueError(fact)}}
+                    for path, fact in faults
+                ],
+            )
+        return self
 
     def material_of(self, thing: Object) -> AnyModel | None:
         """The object's own material with its overrides; None where the mesh selects materials."""
@@ -413,7 +429,7 @@ class Scene(Description):
         if not thing.override:
             return model
         base = model or self.fallback_of(thing) or default_material()
-        return type(base).validated({**dict(base), **thing.override})
+        return type(base).model_validate({**dict(base), **thing.override})
 
     def fallback_of(self, thing: Object) -> AnyModel | None:
         """The object's fallback; None where it has a material or asks for no other."""

@@ -11,24 +11,25 @@ from math import atan2, cos, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
+from pydantic import Field, Strict
+
 from illumcli.scene.override import Override, assign
 from illumcli.scene.source import Node, Place, Problem
-from illumcli.schema.description import Description, written
-from illumcli.schema.fields import Within
+from illumcli.schema.description import DEFAULTS, Description
 
 STUDIO = Path(__file__).with_name("studio.yaml")
 SETTINGS = "studio"
 """First step of the overrides that set what a `Studio` holds: `-D studio.view=[90,10]`."""
 
+Azimuth: TypeAlias = Annotated[float, Field(ge=-360, le=360)]
+Elevation: TypeAlias = Annotated[float, Field(ge=-90, le=90)]
 Up: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
 class Studio(Description):
     """How the studio shows its mesh."""
 
-    view: tuple[Annotated[float, Within(ge=-360, le=360)], Annotated[float, Within(ge=-90, le=90)]] | None = (
-        None
-    )
+    view: Annotated[tuple[Azimuth, Elevation], Strict(False)] | None = None
     """Azimuth and elevation [degrees]; by default those of the studio's camera, about 24 and 13."""
     up: Up = "y"
     """The axis of the mesh's file that points up."""
@@ -37,7 +38,7 @@ class Studio(Description):
 class Settings(Description):
     """What overrides may say besides the scene."""
 
-    studio: Studio = written({})
+    studio: Studio = DEFAULTS
 
 
 ROTATIONS: Mapping[str, tuple[float, float, float]] = {

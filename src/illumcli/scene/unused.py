@@ -10,11 +10,11 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from illumcli.models._parameters import Texture
+from illumcli.scene.faults import Fault
 from illumcli.scene.source import Path
 from illumcli.scene.spec import MeshFile, Object, Scene
+from illumcli.schema.annotations import field_annotation, number_range
 from illumcli.schema.description import Description
-from illumcli.schema.faults import Fault
-from illumcli.schema.fields import Three, marks
 
 
 def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:
@@ -160,5 +160,5 @@ def _colored_by(model: Any) -> Iterator[str]:
         owner: Description = model
         for part in parts:
             owner = getattr(owner, part)
-        if isinstance(value, Texture) and any(isinstance(m, Three) for m in marks(owner.fields()[last].kind)):
+        if isinstance(value, Texture) and number_range(field_annotation(type(owner), last)).width == 3:
             yield name

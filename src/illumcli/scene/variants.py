@@ -15,7 +15,8 @@ import numpy as np
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.formula import parse as formula
 from illumcli.records import Value
-from illumcli.scene.source import MAX_DEPTH, short
+from illumcli.scene.source import MAX_DEPTH
+from illumcli.schema.messages import short
 
 MAX_VARIANTS = 100_000
 MAX_TABLE_BYTES = 2**26

@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, reduce
 from importlib import import_module
-from typing import Any, get_args
+from operator import or_
+from typing import Any
 
-from pydantic_core import (
-    CoreSchema,
-    InitErrorDetails,
-    PydanticCustomError,
-    ValidationError,
-    core_schema,
-)
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, TypeAdapter, ValidationError
 
-from illumcli.records import Value
 from illumcli.schema.description import Description
+from illumcli.schema.messages import nearest, suggestion
 
 
 @cache
@@ -71,83 +67,60 @@ def member(package: str, tag: str) -> type[Any]:
     return classes[0]
 
 
+def tag_of(cls: type[Any]) -> str:
+    """The tag of a member: the name of its module."""
+    return cls.__module__.rpartition(".")[2]
+
+
 def members(package: str) -> tuple[type[Any], ...]:
     """Every class of a family, by tag."""
     return tuple(member(package, tag) for tag in tags(package))
 
 
-def suggestion(word: str, known: tuple[str, ...]) -> str:
-    """The way out of a misspelling: the nearest known word, or all of them where none is near."""
-    import difflib
-
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
-
-
-class Tagged(Value):
-    """Annotation of a field that takes any member of a family, told apart by its key `tag`."""
+@dataclass(frozen=True)
+class Family:
+    """Annotation of a field that takes any member of a family, which its key `tag` names."""
 
     package: str
     tag: str
 
-    def schema(self, of: Any) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validated, metadata={"family": self})
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        """Nothing is known of the members before a scene names one: each is validated by itself."""
+        return PlainValidator(self._validated).__get_pydantic_core_schema__(Any, handler)
 
-    def _validated(self, value: Any, info: Any) -> Any:
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        every: Any = reduce(or_, members(self.package))
+        choices = handler(TypeAdapter(every).core_schema)["anyOf"]
+        return {"oneOf": choices, "discriminator": {"propertyName": self.tag}}
+
+    def _validated(self, value: Any) -> Description:
         if isinstance(value, Description):
             return value
         if not isinstance(value, dict):
-            raise PydanticCustomError("mapping", "must be a mapping with the key '{tag}'", {"tag": self.tag})
+            raise ValueError(f"must be a mapping with the key '{self.tag}'")
         name = value.get(self.tag)
         if not isinstance(name, str):
-            known = ", ".join(tags(self.package))
-            raise PydanticCustomError(
-                "tag_missing", "must name its {tag}: {known}", {"tag": self.tag, "known": known}
-            )
+            raise ValueError(f"must name its {self.tag}: {', '.join(tags(self.package))}")
         try:
             chosen = member(self.package, name)
         except LookupError as error:
-            facts = {"tag": self.tag, "name": name, "way": str(error)}
-            unknown = PydanticCustomError("tag_unknown", "no {tag} '{name}'; {way}", facts)
-            details = [InitErrorDetails(type=unknown, loc=(self.tag,), input=name)]
-            details += self._other_faults(value, name, info.context)
-            raise ValidationError.from_exception_data(self.tag, details) from None
-        return chosen.validated(value, info.context)
+            unknown = UnknownMember(f"no {self.tag} '{name}'; {error}", self)
+            raise ValidationError.from_exception_data(
+                self.tag,
+                [{"type": "value_error", "loc": (self.tag,), "input": name, "ctx": {"error": unknown}}],
+            ) from None
+        return chosen.model_validate(value)
 
-    def _other_faults(self, value: dict[Any, Any], name: str, context: Any) -> list[InitErrorDetails]:
-        """What else is wrong with a mapping whose tag is misspelt: by the member that is meant.
-
-        Where none is near, a key that every member that has it refuses.
-        """
-        import difflib
-
-        near = difflib.get_close_matches(name, tags(self.package), n=1)
-        if near:
-            meant = member(self.package, near[0])
-            if context is not None:
-                context[id(value)] = meant
-            return self._faults_as(near[0], value, context)
-        refused: dict[str, list[list[InitErrorDetails]]] = {key: [] for key in value if key != self.tag}
-        for tag, each in zip(tags(self.package), members(self.package), strict=True):
-            faults = self._faults_as(tag, value, None)
-            for key in refused.keys() & each.fields():
-                refused[key].append([fault for fault in faults if fault["loc"][:1] == (key,)])
-        return [
-            fault for by_member in refused.values() if by_member and all(by_member) for fault in by_member[0]
-        ]
-
-    def _faults_as(self, tag: str, value: dict[Any, Any], context: Any) -> list[InitErrorDetails]:
-        """What is wrong with a mapping as the member of this tag."""
-        try:
-            member(self.package, tag).validated({**value, self.tag: tag}, context)
-        except ValidationError as error:
-            return [_details(fault) for fault in error.errors(include_url=False)]
-        return []
+    def meant(self, value: Any) -> type[Description] | None:
+        """The member that a mapping names or most likely means; None where there is none."""
+        name = value.get(self.tag) if isinstance(value, dict) else None
+        near = nearest(name, tags(self.package)) if isinstance(name, str) else None
+        return member(self.package, near) if near else None
 
 
-def _details(fault: Any) -> InitErrorDetails:
-    """A fault, to be raised again."""
-    kind: str | PydanticCustomError = fault["type"]
-    if kind not in get_args(core_schema.ErrorType):
-        kind = PydanticCustomError(fault["type"], fault["msg"], fault.get("ctx"))
-    return InitErrorDetails(type=kind, loc=fault["loc"], input=fault["input"], ctx=fault.get("ctx", {}))
+class UnknownMember(ValueError):
+    """A mapping names no member of a family."""
+
+    def __init__(self, text: str, family: Family) -> None:
+        super().__init__(text)
+        self.family = family

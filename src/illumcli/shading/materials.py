@@ -189,15 +189,17 @@ def as_meant(model: IlluminationModel) -> IlluminationModel:
         middle = (e + 2) * (e + 4) / (8 * (e + 2.0 ** (-e / 2)))  # pi times models.blinn_phong's C
         share = 1 / middle if e > 0 else 0.0
         changes |= {"normalised": True, "specular": tuple(share * each for each in specular)}
-    return model.replaced(**changes) if changes else model
+    return model.model_copy(update=changes) if changes else model
 
 
 def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> IlluminationModel:
     """The model with vertex colours in place of a diffuse colour that does not vary, or times that colour."""
-    if "diffuse" not in model.fields() or "diffuse" in model.varying():
+    if "diffuse" not in model.model_fields or "diffuse" in model.varying():
         return model
     own = dict(model)["diffuse"] if is_factor else (1.0, 1.0, 1.0)
-    return model.replaced(diffuse=VertexValues(vertex="color", factor=own)) if any(own) else model
+    return (
+        model.model_copy(update={"diffuse": VertexValues(vertex="color", factor=own)}) if any(own) else model
+    )
 
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:
@@ -205,7 +207,7 @@ def imported_model(description: Mapping[str, Any], folder: Path) -> Illumination
     from illumcli.schema.families import member
 
     keys = textures_at(description, lambda path: str(folder / path))
-    return member("illumcli.models", str(keys["model"])).validated(keys)
+    return member("illumcli.models", str(keys["model"])).model_validate(keys)
 
 
 def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> dict[str, Any]:

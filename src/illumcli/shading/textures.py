@@ -23,7 +23,8 @@ from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays import interaction as surface
 from illumcli.rays.corner_weights import CornerWeights
 from illumcli.records import Record, Value
-from illumcli.schema.fields import LARGEST, Three, Within, marks
+from illumcli.schema.annotations import field_annotation, number_range
+from illumcli.schema.fields import LARGEST
 from illumcli.shading.materials import Materials, colors_at
 
 Floats: TypeAlias = NDArray[np.float32]
@@ -106,10 +107,9 @@ def parameter_range(model: IlluminationModel, path: str) -> Range:
     owner: Any = model
     for part in parts:
         owner = getattr(owner, part)
-    found = next(mark for mark in marks(type(owner).fields()[name].kind) if isinstance(mark, Within | Three))
-    width, number = (3, found.each) if isinstance(found, Three) else (1, found)
+    number = number_range(field_annotation(type(owner), name))
     low = (number.gt or 0.0) + float(np.finfo(F).tiny) if number.ge is None else number.ge
-    return Range(width, low, LARGEST if number.le is None else number.le)
+    return Range(number.width, low, LARGEST if number.le is None else number.le)
 
 
 class Attribute(Record):

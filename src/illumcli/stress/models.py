@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema import schema_of
-from illumcli.schema.families import members
+from illumcli.schema.families import members, tag_of
 from illumcli.shading.terms import evaluate
 from illumcli.stress.sandbox import CheckResult
 
@@ -22,7 +22,7 @@ MEASURED = "file"
 def check_models(quick: bool) -> list[CheckResult]:
     """A result per model."""
     lanes, draws = (256, 20) if quick else (4096, 400)
-    models = [Model for Model in members("illumcli.models") if MEASURED not in Model.fields()]
+    models = [Model for Model in members("illumcli.models") if MEASURED not in Model.model_fields]
     return [_row(Model, lanes, draws) for Model in models]
 
 
@@ -31,7 +31,7 @@ def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
     wrong: list[str] = []
     values = sets = 0
     for description in parameters(Model, random, draws):
-        model = Model.validated(description)
+        model = Model.model_validate(description)
         sets += 1
         for dtype in (np.float32, np.float64):
             given = directions(sets, lanes, dtype)
@@ -48,7 +48,7 @@ def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
                     bad = np.count_nonzero(~np.isfinite(lobe) | (lobe < 0))
                     wrong.append(f"{description}: {name} wrong in {bad} values of {dtype.__name__}")
     check = f"{sets} sets of parameters, {values:,} values: finite, not negative"
-    return CheckResult(f"model: {Model.model}", check, wrong[0] if wrong else "-", not wrong)
+    return CheckResult(f"model: {tag_of(Model)}", check, wrong[0] if wrong else "-", not wrong)
 
 
 def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Iterator[dict[str, Any]]:
@@ -56,7 +56,7 @@ def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Ite
     fields drawn at once from ends, middles and choices."""
     schema = schema_of(Model)
     defs = schema.get("$defs", {})
-    tag = {"model": Model.model}
+    tag = {"model": tag_of(Model)}
     fields = {
         name: field
         for name, field in schema["properties"].items()

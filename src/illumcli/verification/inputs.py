@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 from illumcli.arrays import Floats, Vectors, column_major
 from illumcli.errors import InputError
 from illumcli.records import Value
-from illumcli.schema.families import suggestion
+from illumcli.schema.messages import suggestion
 
 T = TypeVar("T")
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError, LimitError
 from illumcli.records import Record
-from illumcli.schema.families import suggestion
+from illumcli.schema.messages import suggestion
 
 PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
 """The vectors that come with the package, computed at 50 digits."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.polygon_normals import area_vectors, polygon_normals
@@ -13,7 +13,7 @@ TORUS = "(sqrt(x*x + z*z) - 0.6)**2 + y*y - 0.09"
 
 
 def made(f, **scene):
-    return Implicit.validated({"f": f, **scene}).mesh()
+    return Implicit.model_validate({"f": f, **scene}).mesh()
 
 
 def edges(mesh):

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.errors import InputError
 from illumcli.geometry.shapes.parametric import Parametric
@@ -18,7 +18,7 @@ SPHERE = {
 
 
 def made(**scene):
-    return Parametric.validated(scene).mesh()
+    return Parametric.model_validate(scene).mesh()
 
 
 def corners(mesh):

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic_core import ValidationError
+from pydantic import ValidationError
 
 from illumcli.geometry.shapes.polygons import Polygons
 
@@ -10,7 +10,7 @@ ROOF = {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]], "faces": [[0
 
 
 def test_the_faces_come_out_as_written():
-    mesh = Polygons.validated(ROOF).mesh()
+    mesh = Polygons.model_validate(ROOF).mesh()
     assert mesh.corners.tolist() == [0, 1, 2, 3, 0, 2, 1]
     assert mesh.starts.tolist() == [0, 4, 7]
     np.testing.assert_array_equal(mesh.vertices, ROOF["vertices"])
@@ -19,7 +19,7 @@ def test_the_faces_come_out_as_written():
 
 def test_normals_belong_to_vertices():
     normals = [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 0, 2]]
-    mesh = Polygons.validated(ROOF | {"normals": normals}).mesh()
+    mesh = Polygons.model_validate(ROOF | {"normals": normals}).mesh()
     np.testing.assert_array_equal(mesh.normals[mesh.corner_normals], np.array(normals)[mesh.corners])
 
 
@@ -37,4 +37,4 @@ def test_normals_belong_to_vertices():
 )
 def test_faults_are_named(change, message):
     with pytest.raises(ValidationError, match=message):
-        Polygons.validated(ROOF | change)
+        Polygons.model_validate(ROOF | change)

@@ -8,6 +8,6 @@ from __future__ import annotations
 from typing import Annotated, TypeAlias
 
 from illumcli.geometry.shapes._base import Shape
-from illumcli.schema.families import Tagged
+from illumcli.schema.families import Family
 
-AnyShape: TypeAlias = Annotated[Shape, Tagged("illumcli.geometry.shapes", "shape")]
+AnyShape: TypeAlias = Annotated[Shape, Family("illumcli.geometry.shapes", "shape")]

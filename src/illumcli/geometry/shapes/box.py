@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
-from illumcli.schema.fields import Positive, Whole
+from illumcli.schema.fields import Positive, Triple
 
 FACES = (  # direction to the right and upwards, seen from outside
     ((0, 0, -1), (0, 1, 0)),  # +x
@@ -22,9 +23,9 @@ FACES = (  # direction to the right and upwards, seen from outside
 
 class Box(Shape):
     shape: Literal["box"] = "box"
-    size: tuple[Positive, Positive, Positive] = (2.0, 2.0, 2.0)
+    size: Triple[Positive] = (2.0, 2.0, 2.0)
     """Extent along x, y and z."""
-    resolution: Annotated[int, Whole(ge=1, le=1024)] = 1
+    resolution: Annotated[int, Field(ge=1, le=1024)] = 1
     """Quads along each edge."""
 
     def triangles(self) -> int:

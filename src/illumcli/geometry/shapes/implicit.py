@@ -13,12 +13,12 @@ Gibson, S. F. F. (1998). Constrained elastic surface nets. MICCAI '98. Here proj
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from illumcli.arrays import Vectors, dot, length, unit
 from illumcli.errors import InputError, LimitError
@@ -26,8 +26,7 @@ from illumcli.geometry.formula import MAX_LENGTH, Formula, checked, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import MAX_TRIANGLES, TRIANGLE_BYTES, Shape
 from illumcli.memory import refuse_beyond
-from illumcli.schema.description import checks
-from illumcli.schema.fields import After, Text, Vector, Whole
+from illumcli.schema.fields import Vector
 
 XYZ = ("x", "y", "z")
 NODES_AT_ONCE = 2**20
@@ -39,7 +38,9 @@ NODE_OFFSET = 0.1180339887
 MAX_NEWTON_STEPS = 12
 """Convergence is quadratic: four steps are usual, creases of f take more."""
 
-FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=XYZ))]
+FormulaText: TypeAlias = Annotated[
+    str, Field(max_length=MAX_LENGTH), AfterValidator(partial(checked, variables=XYZ))
+]
 
 
 class Implicit(Shape):
@@ -50,14 +51,16 @@ class Implicit(Shape):
     """Lowest corner of the box that is searched."""
     high: Vector = (1.0, 1.0, 1.0)
     """Highest corner of that box."""
-    resolution: Annotated[int, Whole(ge=2, le=512)] = 64
+    resolution: Annotated[int, Field(ge=2, le=512)] = 64
     """Cubic cells along the longest edge of the box; parts thinner than a cell may be missed."""
 
-    @checks("high")
-    def _above_low(high: tuple[float, float, float], before: Mapping[str, Any]) -> None:
-        low = before.get("low", high)
-        if "low" in before and not all(a < b for a, b in zip(low, high, strict=True)):
+    @field_validator("high")
+    @classmethod
+    def _above_low(cls, high: tuple[float, float, float], info: ValidationInfo) -> tuple[float, float, float]:
+        low = info.data.get("low")
+        if low is not None and not all(a < b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"must be above low, {list(low)}, along every axis, is {list(high)}")
+        return high
 
     def triangles(self) -> int:
         """An estimate, for surfaces that cross the box several times; others are counted as they are made."""

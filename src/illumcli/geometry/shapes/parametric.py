@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, field_validator
 
 from illumcli.arrays import Vectors, length, unit
 from illumcli.errors import InputError
@@ -18,8 +18,7 @@ from illumcli.geometry.formula import MAX_LENGTH, checked, parametric_normal, pa
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, turned, vertex_numbers, woven
-from illumcli.schema.description import checks
-from illumcli.schema.fields import After, Number, Text
+from illumcli.schema.fields import Number, Pair
 
 UV = ("u", "v")
 WELD = 1e-9
@@ -29,8 +28,10 @@ MIN_NORMAL = 1e-12
 POLE_OFFSET = 1e-7
 """Distance from a pole at which the limit of the normal is evaluated, in ranges of the parameter."""
 
-FormulaText: TypeAlias = Annotated[str, Text(longest=MAX_LENGTH), After(partial(checked, variables=UV))]
-Range: TypeAlias = tuple[Number, Number]
+FormulaText: TypeAlias = Annotated[
+    str, Field(max_length=MAX_LENGTH), AfterValidator(partial(checked, variables=UV))
+]
+Range: TypeAlias = Pair[Number]
 
 
 class Parametric(Shape):
@@ -50,10 +51,12 @@ class Parametric(Shape):
     flip: bool = False
     """Outside is the other side, -(d/du x d/dv)."""
 
-    @checks("u", "v")
-    def _grows(span: tuple[float, float], before: Mapping[str, Any]) -> None:
+    @field_validator("u", "v")
+    @classmethod
+    def _grows(cls, span: tuple[float, float]) -> tuple[float, float]:
         if not span[0] < span[1]:
             raise ValueError(f"must run from low to high, is {list(span)}; `flip` turns the surface round")
+        return span
 
     def triangles(self) -> int:
         return 2 * self.resolution[0] * self.resolution[1]

@@ -9,12 +9,12 @@ import numpy as np
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, vertex_numbers, woven
-from illumcli.schema.fields import Positive
+from illumcli.schema.fields import Pair, Positive
 
 
 class Plane(Shape):
     shape: Literal["plane"] = "plane"
-    size: tuple[Positive, Positive] = (2.0, 2.0)
+    size: Pair[Positive] = (2.0, 2.0)
     """Extent along x and z."""
     resolution: CellsByCells = (1, 1)
     """Quads along x and z."""

@@ -2,46 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
-from illumcli.schema.description import checks
-from illumcli.schema.fields import Many, Vector, Whole
+from illumcli.schema.fields import ListOf, Vector
 
-Face = Annotated[tuple[Annotated[int, Whole(ge=0)], ...], Many(least=3)]
+Face: TypeAlias = Annotated[ListOf[Annotated[int, Field(ge=0)]], Field(min_length=3)]
 
 
 class Polygons(Shape):
     shape: Literal["polygons"] = "polygons"
-    vertices: Annotated[tuple[Vector, ...], Many(least=3, most=1_000_000)]
+    vertices: Annotated[ListOf[Vector], Field(min_length=3, max_length=1_000_000)]
     """Positions, at least three [scene units]."""
-    faces: Annotated[tuple[Face, ...], Many(least=1, most=1_000_000)]
+    faces: Annotated[ListOf[Face], Field(min_length=1, max_length=1_000_000)]
     """Vertex numbers of each face, from 0, counter-clockwise seen from outside."""
-    normals: tuple[Vector, ...] | None = None
+    normals: ListOf[Vector] | None = None
     """One per vertex, of any length; by default they follow from the faces."""
 
-    @checks("faces")
-    def _names_vertices(faces: tuple[Face, ...], before: Mapping[str, Any]) -> None:
-        count = len(before.get("vertices", ()))
+    @field_validator("faces")
+    @classmethod
+    def _names_vertices(cls, faces: tuple[Face, ...], info: ValidationInfo) -> tuple[Face, ...]:
+        count = len(info.data.get("vertices", ()))
         for number, face in enumerate(faces):
             strange = [vertex for vertex in face if vertex >= count]
             if count and strange:
                 raise ValueError(f"face {number} names vertex {strange[0]}, the last one is {count - 1}")
+        return faces
 
-    @checks("normals")
-    def _one_per_vertex(normals: tuple[Vector, ...] | None, before: Mapping[str, Any]) -> None:
-        count = len(before.get("vertices", ()))
+    @field_validator("normals")
+    @classmethod
+    def _one_per_vertex(
+        cls, normals: tuple[Vector, ...] | None, info: ValidationInfo
+    ) -> tuple[Vector, ...] | None:
+        count = len(info.data.get("vertices", ()))
         if normals is None or not count:
-            return
+            return normals
         if len(normals) != count:
             raise ValueError(f"there must be one per vertex, {count}, there are {len(normals)}")
         for number, normal in enumerate(normals):
             if not any(normal):
                 raise ValueError(f"normal {number} is zero")
+        return normals
 
     def triangles(self) -> int:
         return sum(len(face) - 2 for face in self.faces)

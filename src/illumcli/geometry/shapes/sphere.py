@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
-from illumcli.schema.fields import Positive, Whole
+from illumcli.schema.fields import Positive
 
 
 class Sphere(Shape):
@@ -22,7 +23,7 @@ class Sphere(Shape):
     """[scene units]"""
     segments: Segments = 96
     """Facets around."""
-    rings: Annotated[int, Whole(ge=2, le=2048)] = 48
+    rings: Annotated[int, Field(ge=2, le=2048)] = 48
     """Facets from pole to pole."""
 
     def triangles(self) -> int:

@@ -15,12 +15,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from illumcli.arrays import cross, unit
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, vertex_numbers, woven
-from illumcli.schema.fields import Positive, Whole
+from illumcli.schema.fields import Positive
 
 # control points (radius, height); the outside is on the right
 POT = (
@@ -54,7 +55,7 @@ class Teapot(Shape):
     shape: Literal["teapot"] = "teapot"
     size: Positive = 2.0
     """Extent from handle to spout, along x; the height is 0.49 of it."""
-    resolution: Annotated[int, Whole(ge=2, le=512)] = 12
+    resolution: Annotated[int, Field(ge=2, le=512)] = 12
     """Quads along each side of a patch."""
 
     def triangles(self) -> int:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import Segments, Shape
 from illumcli.geometry.shapes._revolution import lathed, profile
-from illumcli.schema.description import checks
-from illumcli.schema.fields import Positive, Whole
+from illumcli.schema.fields import Positive
 
 
 class Torus(Shape):
@@ -22,13 +21,15 @@ class Torus(Shape):
     """r, radius of the tube, below R."""
     segments: Segments = 96
     """Facets around the axis."""
-    sides: Annotated[int, Whole(ge=3, le=2048)] = 48
+    sides: Annotated[int, Field(ge=3, le=2048)] = 48
     """Facets around the tube."""
 
-    @checks("minor")
-    def _has_a_hole(minor: float, before: Mapping[str, Any]) -> None:
-        if minor >= before.get("major", np.inf):
-            raise ValueError(f"must be smaller than major, {before['major']}; the torus would cut itself")
+    @field_validator("minor")
+    @classmethod
+    def _has_a_hole(cls, minor: float, info: ValidationInfo) -> float:
+        if minor >= info.data.get("major", np.inf):
+            raise ValueError(f"must be smaller than major, {info.data['major']}; the torus would cut itself")
+        return minor
 
     def triangles(self) -> int:
         return 2 * self.segments * self.sides

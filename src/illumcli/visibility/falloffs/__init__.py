@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, TypeAlias
 
-from illumcli.schema.families import Tagged
+from illumcli.schema.families import Family
 from illumcli.visibility.falloffs._base import Falloff
 
-AnyFalloff: TypeAlias = Annotated[Falloff, Tagged("illumcli.visibility.falloffs", "falloff")]
+AnyFalloff: TypeAlias = Annotated[Falloff, Family("illumcli.visibility.falloffs", "falloff")]

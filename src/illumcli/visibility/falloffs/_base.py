@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, ClassVar, TypeAlias
 
+from pydantic import AfterValidator, Discriminator, Field, Tag
+
 from illumcli.arrays import Floats
 from illumcli.schema.description import Description
-from illumcli.schema.fields import LARGEST, After, By, Positive, Tag
+from illumcli.schema.fields import LARGEST, Positive
 
 
 def _radii(text: str) -> str:
@@ -20,10 +22,10 @@ def _radii(text: str) -> str:
 
 
 RADII = r"([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]{1,3})?)r"
-Radii: TypeAlias = Annotated[str, After(_radii, form=f"^{RADII}$")]
+Radii: TypeAlias = Annotated[str, AfterValidator(_radii), Field(json_schema_extra={"pattern": f"^{RADII}$"})]
 Distance: TypeAlias = Annotated[
     Annotated[Positive, Tag("units")] | Annotated[Radii, Tag("radii")],
-    By(lambda value: "radii" if isinstance(value, str) else "units"),
+    Discriminator(lambda value: "radii" if isinstance(value, str) else "units"),
 ]
 
 

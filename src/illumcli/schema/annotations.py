@@ -1,0 +1,109 @@
+"""What the annotations of descriptions say about a part of a scene: its class, its choices, its range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import Discriminator, Tag
+from pydantic.fields import FieldInfo
+
+from illumcli.schema.description import Description
+from illumcli.schema.families import Family
+
+
+class Range(NamedTuple):
+    """What a number may be, or each number of a list."""
+
+    ge: float | None
+    gt: float | None
+    le: float | None
+    lt: float | None
+    width: int
+    """3 for a colour, 1 for a number."""
+
+
+def field_annotation(cls: type[Description], name: str) -> Any:
+    """The annotation of a field with its marks."""
+    info = cls.model_fields[name]
+    return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
+
+
+def split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
+    """An annotation without `None`, and its marks from the inside out."""
+    marks: tuple[Any, ...] = ()
+    while True:
+        parts = get_args(annotation)
+        if get_origin(annotation) is Annotated:
+            annotation, marks = parts[0], (*parts[1:], *marks)
+        elif get_origin(annotation) in (Union, UnionType) and len(parts) == 2 and NoneType in parts:
+            annotation = next(part for part in parts if part is not NoneType)
+        else:
+            return annotation, marks
+
+
+def inside(annotation: Any, value: Any, step: str | int) -> tuple[Any, bool]:
+    """The annotation one step of an error's location further in; and whether the step is a key or an index.
+
+    The other steps name the choice of a union, which the text does not.
+
+    Parameters
+    ----------
+    annotation
+        Of the part where the step begins; None where nothing is known of it, as the answer may be.
+    value
+        What the scene has there.
+    step : str or int
+    """
+    plain, marks = split(annotation)
+    for mark in marks:
+        if isinstance(mark, Discriminator):
+            return dict(choices(annotation)).get(step), False
+        if isinstance(mark, Family):
+            plain = mark.meant(value)
+    parts = get_args(plain)
+    if isinstance(plain, type) and issubclass(plain, Description):
+        return (field_annotation(plain, str(step)) if step in plain.model_fields else None), True
+    if get_origin(plain) is dict:
+        return parts[1], True
+    if get_origin(plain) is tuple and isinstance(step, int):
+        return parts[0 if parts[-1] is ... else min(step, len(parts) - 1)], True
+    return None, True
+
+
+def choices(annotation: Any) -> Iterator[tuple[Any, Any]]:
+    """What each choice is called, and its own annotation: of literals, or of a union told apart by tags."""
+    plain, marks = split(annotation)
+    if get_origin(plain) is Literal:
+        yield from ((value, value) for value in get_args(plain))
+    key = next((mark.discriminator for mark in marks if isinstance(mark, Discriminator)), None)
+    for part in get_args(plain) if key else ():
+        if isinstance(key, str):
+            (tag,) = get_args(part.model_fields[key].annotation)
+        else:
+            tag = next(mark.tag for mark in part.__metadata__ if isinstance(mark, Tag))
+        yield tag, part
+
+
+def number_range(annotation: Any) -> Range:
+    """The range of a number or colour; of a parameter that may vary over the surface, of its value.
+
+    Raises
+    ------
+    LookupError
+        It holds no number.
+    """
+    plain, marks = split(annotation)
+    if any(isinstance(mark, Discriminator) for mark in marks):
+        return number_range(dict(choices(annotation))["value"])
+    if get_origin(plain) is tuple:
+        return number_range(get_args(plain)[0])._replace(width=3)
+    if plain is not float:
+        raise LookupError(f"{annotation} holds no number")
+    rules = [rule for mark in marks for rule in (mark.metadata if isinstance(mark, FieldInfo) else [mark])]
+
+    def limit(name: str) -> float | None:
+        return next((getattr(rule, name) for rule in rules if hasattr(rule, name)), None)
+
+    return Range(limit("ge"), limit("gt"), limit("le"), limit("lt"), 1)

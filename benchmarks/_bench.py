@@ -16,7 +16,7 @@ from statistics import median
 
 from illumcli.render_graph.build import build
 from illumcli.render_graph.schedule import Plan, outputs_of, schedule
-from illumcli.scene.load import SceneFile
+from illumcli.scene.scene_file import SceneFile
 
 ROOT = Path(__file__).parents[1]
 MESHES = ROOT.parent / "shared" / "meshes"

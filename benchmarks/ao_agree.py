@@ -28,7 +28,8 @@ from illumcli.baking.settings import BakeSettings
 from illumcli.graph import topological_order
 from illumcli.rays.interaction import Hits, interact
 from illumcli.render_graph.build import build
-from illumcli.scene.load import SceneFile, load
+from illumcli.scene.load import load
+from illumcli.scene.scene_file import SceneFile
 from illumcli.visibility.baked import read_npz
 
 POINTS = 20 if SMALL else 2000

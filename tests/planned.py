@@ -8,7 +8,7 @@ from illumcli.cache.recorder import Cache
 from illumcli.render_graph.build import build
 from illumcli.render_graph.pipeline import plan_view
 from illumcli.render_graph.schedule import Plan, outputs_of, schedule
-from illumcli.scene.load import SceneFile
+from illumcli.scene.scene_file import SceneFile
 
 
 def planned(loaded: SceneFile, only: Sequence[str] = (), cache: Cache | None = None, number: int = 0) -> Plan:

@@ -11,8 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from illumcli.errors import InputError, LimitError
-from illumcli.scene.load import STUDIO, file_problems, load, resolve
+from illumcli.scene.access import file_problems, resolve
+from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
+from illumcli.scene.studio import STUDIO
 
 GOOD = """\
 version: 1
@@ -599,7 +601,7 @@ def mutated(text: bytes, rng: random.Random) -> bytes:
 
 
 def test_bases_count_towards_the_limit_of_parts(problems, write, monkeypatch):
-    from illumcli.scene import load as module
+    from illumcli.scene import extend as module
 
     monkeypatch.setattr(module, "MAX_NODES", 12)
     write("version: 1\nfilm: {width: 4, height: 3, samples: 1}\n", "scenes/base.yaml")

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from illumcli.commands.schema import schema_of
 from illumcli.layers import NAMES
-from illumcli.scene.load import PATHS
+from illumcli.scene.access import PATHS
 from illumcli.scene.references import reference_faults
 from illumcli.scene.spec import Scene
 from illumcli.schema.docs import field_docs

@@ -8,7 +8,8 @@ import pytest
 from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.repairs import repairs
-from illumcli.scene.load import load, unused_lines
+from illumcli.scene.load import load
+from illumcli.scene.scene_file import unused_lines
 from planned import planned
 
 BASE = """version: 1

@@ -22,7 +22,7 @@ from illumcli.render_graph.execute import Run, at_pixels, bands
 from illumcli.render_graph.framing import placed
 from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.schedule import Plan, outputs_of, schedule
-from illumcli.scene.load import SceneFile
+from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 
 

@@ -27,7 +27,8 @@ from illumcli.render_graph import stages
 from illumcli.render_graph.build import build
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs
-from illumcli.scene.load import SceneFile, load
+from illumcli.scene.load import load
+from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 from illumcli.visibility.baked import mesh_hash
 

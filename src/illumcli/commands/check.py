@@ -9,7 +9,9 @@ from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.work import refuse_too_large, work_of
 from illumcli.errors import InputError, LimitError
 from illumcli.records import Value
-from illumcli.scene.load import file_problems, load, unused_lines
+from illumcli.scene.access import file_problems
+from illumcli.scene.load import load
+from illumcli.scene.scene_file import unused_lines
 
 
 class SceneChecks(Value):

@@ -21,7 +21,9 @@ from illumcli.render_graph.build import Graph, build
 from illumcli.render_graph.keys import content_key
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory, refuse_rays
 from illumcli.render_graph.schedule import outputs_of
-from illumcli.scene.load import SceneFile, lacking_lines, load, refuse_outside, unused_lines
+from illumcli.scene.access import refuse_outside
+from illumcli.scene.load import load
+from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MOST)

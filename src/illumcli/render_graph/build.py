@@ -20,7 +20,7 @@ from illumcli.models._parameters import Texture
 from illumcli.records import Value
 from illumcli.render_graph import stages
 from illumcli.render_graph.replicates import error_recipes
-from illumcli.scene.load import resolve
+from illumcli.scene.access import resolve
 from illumcli.scene.spec import MeshFile, Normals, Object, Obscurance, Scene, default_material
 from illumcli.schema.messages import suggestion
 from illumcli.shading.materials import DEFAULT, Choice, Token

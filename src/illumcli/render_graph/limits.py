@@ -15,7 +15,8 @@ from illumcli.models._parameters import Texture
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.schedule import reached
-from illumcli.scene.load import SceneFile, resolve
+from illumcli.scene.access import resolve
+from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import MeshFile, Scene
 
 BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}

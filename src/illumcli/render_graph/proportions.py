@@ -17,7 +17,7 @@ from illumcli.geometry.bounds import ObjectBounds
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph
-from illumcli.scene.load import SceneFile, told
+from illumcli.scene.scene_file import SceneFile, message_at
 from illumcli.visibility.culling import Boxes, frustum, outside_frustum
 
 VISIBLE = 0.005
@@ -70,7 +70,7 @@ def disproportion_lines(loaded: SceneFile, graph: Graph, object_bounds: ObjectBo
         f"{worst.offset:.1g} off surfaces, {100 * worst.share:,.1f} % of its radius, and shadows lose touch; "
         "make it smaller, or bring it nearer"
     )
-    return [told(loaded, ("objects", worst.large), fact)]
+    return [message_at(loaded, ("objects", worst.large), fact)]
 
 
 def _edges(radius: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -350,7 +350,7 @@ class Images(Value):
     def _read(self, path: str, space: Any) -> NDArray[np.float32]:
         from illumcli.images.reader import read_embedded_texture, read_texture
         from illumcli.mesh_files import embedded_image, image_within
-        from illumcli.scene.load import resolve
+        from illumcli.scene.access import resolve
 
         if path in self.contents:
             return read_texture(self.contents[path].path, space)

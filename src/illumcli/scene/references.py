@@ -24,6 +24,16 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
         A `Scene`, or its text as dicts and lists, which may hold any other fault: what cannot be understood
         is passed over.
     """
+    yield from _camera_faults(scene)
+    for i, thing in enumerate(_parts(_get(scene, "objects"))):
+        for path, fact in _object_faults(scene, thing):
+            yield ("objects", i, *path), fact
+    for kind in ("objects", "lights"):
+        yield from _name_faults(kind, _parts(_get(scene, kind)))
+
+
+def _camera_faults(scene: Any) -> Iterator[Fault]:
+    """Cameras beside a camera, and names of objects that are to fill the picture."""
     if _get(scene, "camera") is not None and _get(scene, "cameras"):
         yield ("camera",), "give either camera or cameras, not both"
     things = _parts(_get(scene, "objects"))
@@ -32,34 +42,38 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
         name = _get(camera, "fit")
         if isinstance(name, str) and name not in known:
             yield (*path, "fit"), _no("object", name, known)
+
+
+def _object_faults(scene: Any, thing: Any) -> Iterator[Fault]:
+    """Names of meshes and materials in one object, and its overrides of a material."""
     meshes, materials = (_names(_get(scene, kind)) for kind in ("meshes", "materials"))
+    mesh, material, fallback = (_get(thing, key) for key in ("mesh", "material", "fallback"))
+    if isinstance(mesh, str) and mesh not in meshes and "." not in mesh:
+        yield ("mesh",), _no("mesh", mesh, meshes)
+    for key, name in (("fallback", fallback), ("material", material)):
+        if isinstance(name, str) and name not in materials:
+            yield (key,), _no("material", name, materials)
+    override, is_known = _get(thing, "override"), not isinstance(material, str) or material in materials
+    if is_known and isinstance(override, dict) and override:
+        base = materials[material] if isinstance(material, str) else material
+        for path, fact in _override_faults(base, override):
+            yield ("override", *path), fact
+
+
+def _name_faults(kind: str, things: Any) -> Iterator[Fault]:
+    """Names that two objects or two lights share, default names among them, and lights called as a layer."""
+    taken = {_default_name(kind, thing, i + 1) for i, thing in enumerate(things) if not _get(thing, "name")}
     for i, thing in enumerate(things):
-        mesh, material = _get(thing, "mesh"), _get(thing, "material")
-        if isinstance(mesh, str) and mesh not in meshes and "." not in mesh:
-            yield ("objects", i, "mesh"), _no("mesh", mesh, meshes)
-        fallback = _get(thing, "fallback")
-        if isinstance(fallback, str) and fallback not in materials:
-            yield ("objects", i, "fallback"), _no("material", fallback, materials)
-        if isinstance(material, str) and material not in materials:
-            yield ("objects", i, "material"), _no("material", material, materials)
-        elif isinstance(override := _get(thing, "override"), dict) and override:
-            own = materials[material] if isinstance(material, str) else material
-            for path, fact in _override_faults(own, override):
-                yield ("objects", i, "override", *path), fact
-    for kind in ("objects", "lights"):
-        things = _parts(_get(scene, kind))
-        taken = {
-            _default_name(kind, thing, i + 1) for i, thing in enumerate(things) if not _get(thing, "name")
-        }
-        for i, thing in enumerate(things):
-            name = _get(thing, "name")
-            layer = owner_of(name) if kind == "lights" and isinstance(name, str) else None
-            if layer is not None:
-                yield (kind, i, "name"), f"the layer {layer} has the name '{name}'; give the light another"
-            elif isinstance(name, str) and name in taken:
-                yield (kind, i, "name"), f"the name '{name}' is taken"
-            elif isinstance(name, str):
-                taken.add(name)
+        name = _get(thing, "name")
+        if not isinstance(name, str):
+            continue
+        layer = owner_of(name) if kind == "lights" else None
+        if layer is not None:
+            yield (kind, i, "name"), f"the layer {layer} has the name '{name}'; give the light another"
+        elif name in taken:
+            yield (kind, i, "name"), f"the name '{name}' is taken"
+        else:
+            taken.add(name)
 
 
 def _cameras(scene: Any) -> Iterator[tuple[Path, Any]]:
@@ -73,12 +87,12 @@ def _default_name(kind: str, thing: Any, number: int) -> str:
     return f"{'object' if kind == 'objects' else _get(thing, 'light')}{number}"
 
 
-def _override_faults(own: Any, override: dict[str, Any]) -> Iterator[Fault]:
+def _override_faults(material: Any, override: dict[str, Any]) -> Iterator[Fault]:
     """Faults of the overrides alone; those of the material itself are found where it stands."""
-    if isinstance(own, Description):
-        base = dict(own)
+    if isinstance(material, Description):
+        base = dict(material)
     else:
-        base = own if isinstance(own, dict) else {"model": "lambert"}
+        base = material if isinstance(material, dict) else {"model": "lambert"}
     try:
         model = member("illumcli.models", base["model"])
     except (LookupError, TypeError):

@@ -1,0 +1,54 @@
+"""A scene that was read: the description, and what was written to get it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from illumcli.records import Value
+from illumcli.scene import source
+from illumcli.scene.problems import problem_at, problem_lines
+from illumcli.scene.source import Node
+from illumcli.scene.spec import Scene
+from illumcli.scene.studio import STUDIO
+from illumcli.scene.unused import lacking, unused
+
+
+class SceneFile(Value):
+    """A valid scene and what was written to get it."""
+
+    scene: Scene
+    path: Path
+    folder: Path
+    """Where the paths in the scene begin."""
+    name: str
+    """The file's name without its suffix."""
+    overrides: dict[str, Any]
+    """Value by path, as given with -D, for patterns of file names."""
+    tree: Node = field(repr=False)
+    """The scene as written, extended and overridden, with the place of every part."""
+    roots: tuple[Path, ...] = field(repr=False)
+    """The folders that the scene may read from."""
+
+
+def unused_lines(
+    loaded: SceneFile, scene: Scene, layers: Collection[str], files: Collection[str]
+) -> list[str]:
+    """What stands in the scene and has no effect, a line each; arguments as those of `unused`."""
+    parts = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
+    written = ((node.at, path, fact) for path, fact, node in parts if node is not None)
+    return problem_lines(
+        [problem_at(at, path, fact) for at, path, fact in written if at.source != str(STUDIO)]
+    )
+
+
+def lacking_lines(loaded: SceneFile, scene: Scene, layers: Collection[str]) -> list[str]:
+    """What pictures of the scene lack, a line each; arguments as those of `lacking`."""
+    return [message_at(loaded, path, fact) for path, fact in lacking(scene, layers)]
+
+
+def message_at(loaded: SceneFile, path: source.Path, fact: str) -> str:
+    """A line about a part of the scene, with its place."""
+    return str(problem_at((loaded.tree.find(path) or loaded.tree).at, path, fact))

@@ -17,8 +17,8 @@ from unittest.mock import patch
 import numpy as np
 
 from illumcli.arrays import dot, take_rows
-from illumcli.lights import incident
-from illumcli.lights.incident import LitPoints
+from illumcli.lights import _incident as light_at
+from illumcli.lights._incident import LitPoints
 from illumcli.models._base import IlluminationModel
 from illumcli.render_graph import build as recipes
 from illumcli.render_graph import culling, explain
@@ -86,7 +86,7 @@ def asked(light, render_space, points, shadow):
 
 def dimmed(light, render_space, points, shadow):
     """Every lit point is evaluated, those in shadow with scale 0."""
-    lit = incident.incident(light, render_space, points)
+    lit = light_at.incident(light, render_space, points)
     return replace(lit, irradiance_scale=lit.irradiance_scale * shadow.take(lit.index))
 
 
@@ -109,9 +109,9 @@ SKIPS = (
     Skip(
         "points a light does not reach",
         (),
-        ((incident, "incident", everywhere), (incident, "unshadowed", asked)),
+        ((light_at, "incident", everywhere), (light_at, "unshadowed", asked)),
     ),
-    Skip("points in shadow", (), ((incident, "unshadowed", dimmed),)),
+    Skip("points in shadow", (), ((light_at, "unshadowed", dimmed),)),
     Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),
     Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),

@@ -10,7 +10,7 @@ import numpy as np
 from illumcli.arrays import F, Floats, Vectors, dot, length
 from illumcli.film.tiles import Samples, Tile
 from illumcli.lights._base import towards
-from illumcli.lights.incident import Placed
+from illumcli.lights._incident import Placed
 from illumcli.rays import sampling
 from illumcli.rays.camera import Rays, axes, camera_rays, film_points
 from illumcli.rays.interaction import SurfaceInteraction

@@ -12,7 +12,7 @@ from illumcli.errors import InputError
 from illumcli.film.view import View, depth, rays, samples, view_vectors
 from illumcli.graph import Node, topological_order
 from illumcli.layers import FIXED, PER_LIGHT, Layer
-from illumcli.lights import incident as light_at
+from illumcli.lights import _incident as light_at
 from illumcli.lights._base import Light
 from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel

@@ -20,7 +20,7 @@ from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.film.tiles import MOST, Scattered, Tile, tiles
 from illumcli.film.view import View
 from illumcli.graph import Node
-from illumcli.lights.incident import LitPoints
+from illumcli.lights._incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record, Value

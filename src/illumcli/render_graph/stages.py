@@ -35,7 +35,7 @@ from illumcli.geometry.repairs import (
 from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.geometry.transforms import cofactors, transform_matrix
-from illumcli.lights.incident import LitPoints
+from illumcli.lights._incident import LitPoints
 from illumcli.rays import interaction as surface
 from illumcli.rays import sampling
 from illumcli.rays.camera import Rays, framing

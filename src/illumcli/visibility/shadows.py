@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, length, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
-from illumcli.lights.incident import LitPoints
+from illumcli.lights._incident import LitPoints
 from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import SurfaceInteraction, facing

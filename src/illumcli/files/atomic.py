@@ -161,8 +161,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 def refused(place: str, error: OSError) -> OutputError:
     """The operating system's refusal to write `place`: fact and way out."""
-    way = _WAYS_OUT.get(error.errno or 0, "choose another place for the output")
-    return OutputError(f"{place}: cannot be written: {error.strerror or error}; {way}")
+    advice = _WAYS_OUT.get(error.errno or 0, "choose another place for the output")
+    return OutputError(f"{place}: cannot be written: {error.strerror or error}; {advice}")
 
 
 def is_full(error: OutputError) -> bool:
@@ -202,8 +202,8 @@ def claim(path: Path, create: bool = True) -> int | None:
         held = False
         try:
             about = os.fstat(handle)
-            own = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink < 2
-            if not own or _lock(handle) != 0:
+            is_ours = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink < 2
+            if not is_ours or _lock(handle) != 0:
                 return None
             about = os.fstat(handle)
             if about.st_nlink == 0:  # removed before it was locked

@@ -62,11 +62,11 @@ class Journal:
             return None
         at, size = self._places[key]
         try:
-            found = os.pread(self._handle, size, at)
+            values = os.pread(self._handle, size, at)
             check = os.pread(self._handle, 16, at - 16)
         except OSError:
             return None
-        return found if len(found) == size and check == self._check(key, found) else None
+        return values if len(values) == size and check == self._check(key, values) else None
 
     def append(self, key: bytes, values: bytes) -> None:
         """Keep the values under a key of 16 bytes."""
@@ -135,15 +135,15 @@ def place(output: Path, content: str) -> Path:
 
 def tidy(output: Path) -> None:
     """Remove the journals of `output`, which is written, and abandoned ones beside it; none that is held."""
-    own = beside(output, "").name
+    prefix = beside(output, "").name
     try:
-        found = [each for each in os.scandir(output.parent) if _NAME.fullmatch(each.name)]
+        journals = [each for each in os.scandir(output.parent) if _NAME.fullmatch(each.name)]
     except OSError:
         return
-    for each in found:
+    for each in journals:
         with suppress(OSError):
             age = time.time() - each.stat(follow_symlinks=False).st_mtime
-            if each.name.startswith(own) or age > ABANDONED:
+            if each.name.startswith(prefix) or age > ABANDONED:
                 handle = claim(Path(each.path), create=False)
                 if handle is not None:
                     os.unlink(each.path)

@@ -65,7 +65,7 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
 
 def fields(pattern: str) -> set[str]:
     """The names of the fields in `pattern`."""
-    return {found["name"] for found in _FIELD.finditer(pattern) if found["name"] is not None}
+    return {match["name"] for match in _FIELD.finditer(pattern) if match["name"] is not None}
 
 
 def check_unique(names: Sequence[str]) -> None:
@@ -84,10 +84,10 @@ def check_unique(names: Sequence[str]) -> None:
     for same in images.values():
         if len(same) > 1:
             listed = ", ".join(map(str, same[:5])) + (", ..." if len(same) > 5 else "")
-            way = "put a field that tells them apart into the pattern"
+            advice = "put a field that tells them apart into the pattern"
             if len({normal[number - 1] for number in same}) == len(same):
-                way = "they differ in case alone, which some file systems ignore; rename one of them"
-            problems.append(f"{names[same[0] - 1]}: the name of {len(same)} images ({listed}); {way}")
+                advice = "they differ in case alone, which some file systems ignore; rename one of them"
+            problems.append(f"{names[same[0] - 1]}: the name of {len(same)} images ({listed}); {advice}")
     if problems:
         raise InputError(problems)
 

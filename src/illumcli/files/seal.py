@@ -32,10 +32,10 @@ def seal(path: Path) -> None:
     OSError
     """
     with path.open("r+b") as file:
-        found = _body(file)
-        if found is None:
+        mark = _body(file)
+        if mark is None:
             raise ValueError(f"{path}: has no place for its hash")
-        place, _, body = found
+        place, _, body = mark
         file.seek(place)
         file.write(body)
 
@@ -49,8 +49,8 @@ def is_sealed(path: Path) -> bool:
     """
     with path.open("rb") as file:
         if path.suffix.lower() != ".png":
-            found = _body(file)
-            return found is not None and found[1] == found[2]
+            mark = _body(file)
+            return mark is not None and mark[1] == mark[2]
         digest = png_digest()
         left = path.stat().st_size - len(png_end(digest))
         while left > 0 and (piece := file.read(min(left, _PIECE))):
@@ -80,23 +80,23 @@ def png_digest() -> hashlib.blake2b:
 
 def png_end(digest: hashlib.blake2b) -> bytes:
     """The last two pieces of a PNG, with the hash of all before them."""
-    said = b"tEXtillum:body\0" + _MARK + digest.hexdigest().encode()
-    return struct.pack(">I", len(said) - 4) + said + struct.pack(">I", zlib.crc32(said)) + _PNG_END
+    chunk = b"tEXtillum:body\0" + _MARK + digest.hexdigest().encode()
+    return struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk)) + _PNG_END
 
 
 def _body(file: BinaryIO) -> tuple[int, bytes, bytes] | None:
     """Where the digits stand, the digits, and the hash of the file with these 0; None where it has none."""
     digest = hashlib.blake2b(digest_size=_DIGITS // 2)
-    found: tuple[int, bytes] | None = None
+    mark: tuple[int, bytes] | None = None
     at, rest = 0, b""
     while piece := file.read(_PIECE):
         data = rest + piece
-        seal = _SEAL.search(data) if found is None else None
+        seal = _SEAL.search(data) if mark is None else None
         if seal is not None:
-            found = at + seal.start(1), seal[1]
+            mark = at + seal.start(1), seal[1]
             data = data[: seal.start(1)] + b"0" * _DIGITS + data[seal.end(1) :]
         # the mark may go on in the next piece
-        done = len(data) if found else max(0, len(data) - len(BLANK) + 1)
+        done = len(data) if mark else max(0, len(data) - len(BLANK) + 1)
         digest.update(data[:done])
         at, rest = at + done, data[done:]
-    return None if found is None else (*found, digest.hexdigest().encode())
+    return None if mark is None else (*mark, digest.hexdigest().encode())

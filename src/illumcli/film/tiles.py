@@ -87,5 +87,5 @@ class Samples(Record):
     def nearest(self) -> Ids:
         """(P,) the lane of the sample nearest to each pixel's centre."""
         distance = np.square(self.points[:, 0] - 0.5) + np.square(self.points[:, 1] - 0.5)
-        own = np.argmin(distance.reshape(-1, self.per_pixel), axis=1)
-        return (own + np.arange(len(self.x)) * self.per_pixel).astype(np.int32)
+        nearest = np.argmin(distance.reshape(-1, self.per_pixel), axis=1)
+        return (nearest + np.arange(len(self.x)) * self.per_pixel).astype(np.int32)

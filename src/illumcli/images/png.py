@@ -72,11 +72,11 @@ class PngFile:
             self._chunk(b"sRGB", b"\0")
             self._chunk(b"gAMA", (45455).to_bytes(4))  # for readers that do not know sRGB
         for name, value in metadata.items():
-            said = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
-            if said.isascii():
-                self._chunk(b"tEXt", name.encode("latin-1") + b"\0" + said.encode())
+            text = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+            if text.isascii():
+                self._chunk(b"tEXt", name.encode("latin-1") + b"\0" + text.encode())
             else:
-                self._chunk(b"iTXt", name.encode("latin-1") + b"\0\0\0\0\0" + said.encode())
+                self._chunk(b"iTXt", name.encode("latin-1") + b"\0\0\0\0\0" + text.encode())
 
     def write(self, band: NDArray[Any]) -> None:
         """The next rows, (h, W, C)."""
@@ -86,10 +86,10 @@ class PngFile:
         lines[:, 1 : 1 + self._pixel] = rows[:, : self._pixel]
         np.subtract(rows[:, self._pixel :], rows[:, : -self._pixel], out=lines[:, 1 + self._pixel :])
         self._waiting += lines.data
-        whole = len(self._waiting) // _PIECE * _PIECE
-        for at in range(0, whole, _PIECE):
+        ready = len(self._waiting) // _PIECE * _PIECE
+        for at in range(0, ready, _PIECE):
             self._image(self._deflate.compress(self._waiting[at : at + _PIECE]))
-        del self._waiting[:whole]
+        del self._waiting[:ready]
 
     def close(self) -> None:
         """The end of the file."""
@@ -100,8 +100,8 @@ class PngFile:
     def is_as_written(self) -> bool:
         """Does the closed file hold the bytes it was given?"""
         with self._path.open("rb") as file:
-            found = hashlib.file_digest(file, png_digest)
-        return found.digest() == self._hash.digest()
+            digest = hashlib.file_digest(file, png_digest)
+        return digest.digest() == self._hash.digest()
 
     def abandon(self) -> None:
         """Close the file as it is."""

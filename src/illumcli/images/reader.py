@@ -174,10 +174,10 @@ class ImageSource:
             raise InputError(f"{path}: an EXR of several parts; join them (oiiotool IN --siappendall -o OUT)")
         if self._format == "png":
             try:
-                whole = _ends_with(path, _PNG_END)
+                is_complete = _ends_with(path, _PNG_END)
             except OSError as error:
                 raise self._refusal(error.strerror or str(error)) from error
-            if not whole:
+            if not is_complete:
                 raise self._refusal("its end is missing")
 
     def __enter__(self) -> Self:

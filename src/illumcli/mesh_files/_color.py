@@ -15,5 +15,5 @@ def unit_range(colors: NDArray[np.float64]) -> NDArray[np.float64]:
     bright = colors[colors > 0]
     if not (bright > 1).any():
         return colors
-    whole = bool((bright == np.floor(bright)).all())
-    return colors / 255 if whole or np.median(bright) > 2 else colors
+    are_integers = bool((bright == np.floor(bright)).all())
+    return colors / 255 if are_integers or np.median(bright) > 2 else colors

@@ -41,16 +41,16 @@ def beside(path: Path, name: str, place: str, folder: Path | None = None) -> Pat
     Links are followed first. `place` begins the message, as ``path:line``; `folder` is that of `path` by
     default. The file need not exist.
     """
-    way = "copy the file beside the mesh and name it alone"
+    advice = "copy the file beside the mesh and name it alone"
     if Path(name).is_absolute() or PureWindowsPath(name).drive:
-        raise InputError(f"{place}: '{name}' is an absolute path; {way}")
+        raise InputError(f"{place}: '{name}' is an absolute path; {advice}")
     target = path.parent / name.replace("\\", "/")
     try:
         inside = target.resolve().is_relative_to((folder or path.parent).resolve())
     except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{place}: '{name}' is no usable path ({error}); {way}") from None
+        raise InputError(f"{place}: '{name}' is no usable path ({error}); {advice}") from None
     if not inside:
-        raise InputError(f"{place}: '{name}' leads out of the folder of the mesh; {way}")
+        raise InputError(f"{place}: '{name}' leads out of the folder of the mesh; {advice}")
     return target
 
 
@@ -79,12 +79,12 @@ def nearby(path: Path, name: str, folder: Path) -> tuple[Path | None, str]:
         return None, MISSING
     matter = MISSING
     last = PureWindowsPath(name).name
-    for start, said in ((path, name), (path, last), (folder / path.name, last)):
+    for start, candidate in ((path, name), (path, last), (folder / path.name, last)):
         try:
-            found = beside(start, said, "", folder)
+            file = beside(start, candidate, "", folder)
         except InputError:
             matter = OUTSIDE
             continue
-        if said and os.path.isfile(found):
-            return found, "" if said == name and start == path else matter
+        if candidate and os.path.isfile(file):
+            return file, "" if candidate == name and start == path else matter
     return None, matter

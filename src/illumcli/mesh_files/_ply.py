@@ -110,17 +110,17 @@ def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
                 if name in (element.name for element in elements):
                     raise InputError(f"{place}: element '{name}' is announced twice; export the mesh again")
                 elements.append(Element(name, int(count), [], number))
-            case ["property", *rest] if elements and (found := _property(rest, number)):
+            case ["property", *rest] if elements and (prop := _property(rest, number)):
                 known = [each.name for each in elements[-1].properties]
-                if found.name in known:
+                if prop.name in known:
                     note(repairs, "properties named twice, renamed", f":{number}")
-                    found = replace(found, name=_unused(found.name, known))
-                elements[-1].properties.append(found)
-                if found.count_type is not None and found.count_type.kind == "f":
+                    prop = replace(prop, name=_unused(prop.name, known))
+                elements[-1].properties.append(prop)
+                if prop.count_type is not None and prop.count_type.kind == "f":
                     note(repairs, "lengths of lists in floats", f":{number}")
             case ["format" | "element" | "property", *_]:
-                said = f"'{decoded(line).strip():.60}'"
-                raise InputError(f"{place}: {said} is no line of a PLY header; export the mesh again")
+                text = f"'{decoded(line).strip():.60}'"
+                raise InputError(f"{place}: {text} is no line of a PLY header; export the mesh again")
             case _:
                 note(repairs, "unknown lines of the header left out", f":{number}")
     if order is None:
@@ -174,31 +174,31 @@ def tables(
     left out; where lines do not hold their rows, rows may go on in the next, as values alone are counted.
     """
     if not head.is_text:
-        found, end = _binary_tables(path, data, head.elements, head.start)
+        columns, end = _binary_tables(path, data, head.elements, head.start)
         if data[end:].strip():
             note(repairs, "bytes behind the last row left out", f": byte {end + 1}", len(data) - end)
-        return found, None
+        return columns, None
     text = Text.of(path, data)
     repairs.update(text.repairs)
     lines = np.flatnonzero(text.starts >= head.start)
     try:
         return _by_lines(path, text, lines, head.elements, repairs), text
     except InputError as error:
-        made = _by_values(path, text.block(lines).floats(), head.elements)
-        if made is None:
+        values = _by_values(path, text.block(lines).floats(), head.elements)
+        if values is None:
             raise error from None
         note(repairs, "rows that are no lines, read value by value", f":{text.number(int(lines[0]))}")
-        return made, None
+        return values, None
 
 
 def _by_values(path: Path, values: NDArray[np.float64], elements: list[Element]) -> dict[str, Table] | None:
     """The tables where rows are no lines and the values are as many as announced; else None."""
     data = values.tobytes()
     try:
-        found, end = _binary_tables(path, data, [_of_doubles(each) for each in elements], 0)
+        columns, end = _binary_tables(path, data, [_of_doubles(each) for each in elements], 0)
     except InputError:
         return None
-    return found if end == len(data) else None
+    return columns if end == len(data) else None
 
 
 def _of_doubles(element: Element) -> Element:
@@ -220,17 +220,17 @@ def _by_lines(
         raise InputError(
             f"{path}: announces {announced} rows and has {len(lines)} lines of them; export the mesh again"
         )
-    made = {}
+    columns = {}
     first = 0
     behind: dict[str, Repair] = {}
     for element in elements:
-        made[element.name] = _lines_of(text.block(lines[first : first + element.count]), element, behind)
+        columns[element.name] = _lines_of(text.block(lines[first : first + element.count]), element, behind)
         first += element.count
     if len(lines) > announced:
         place = f":{text.number(int(lines[announced]))}"
         note(behind, "lines behind the last row left out", place, len(lines) - announced)
     repairs.update(behind)
-    return made
+    return columns
 
 
 def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Table:
@@ -251,8 +251,8 @@ def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Tab
             at = at + 1
             continue
         counts = values[at]
-        whole = (counts >= 0) & (counts == np.floor(counts)) & (counts <= ends - at - 1)
-        check(~whole, f"has fewer values in '{each.name}' than it announces")
+        valid = (counts >= 0) & (counts == np.floor(counts)) & (counts <= ends - at - 1)
+        check(~valid, f"has fewer values in '{each.name}' than it announces")
         counts = counts.astype(np.int64)
         table[each.name] = Lists(values[runs(at + 1, counts)], counts)
         at = at + 1 + counts
@@ -267,10 +267,10 @@ def _binary_tables(
     path: Path, data: bytes, elements: list[Element], start: int
 ) -> tuple[dict[str, Table], int]:
     """Element -> property -> values of a binary body, and where it ends."""
-    made = {}
+    columns = {}
     for element in elements:
-        made[element.name], start = _binary_table(path, data, element, start)
-    return made, start
+        columns[element.name], start = _binary_table(path, data, element, start)
+    return columns, start
 
 
 def _binary_table(path: Path, data: bytes, element: Element, start: int) -> tuple[Table, int]:
@@ -361,12 +361,12 @@ def _row_starts(path: Path, data: bytes, element: Element, start: int) -> tuple[
         for before, length, size in steps:
             at += before
             try:
-                (said,) = length.unpack_from(data, at)
+                (length_of_list,) = length.unpack_from(data, at)
             except struct.error:
                 raise _cut_off(path, element, row) from None
-            if (count := _whole(said)) < 0:
+            if (count := _whole(length_of_list)) < 0:
                 place = f"{path}: {element.name} {row}"
-                raise InputError(f"{place} announces a list of {said}; export the mesh again")
+                raise InputError(f"{place} announces a list of {length_of_list}; export the mesh again")
             at += length.size + size * count
         at += gap
     if at > len(data):

@@ -64,10 +64,10 @@ def polygons(
     **more
         Other fields of `Mesh`.
     """
-    found = dict(repairs or {})
+    noted = dict(repairs or {})
     few = counts < 3
     if few.any():
-        _count(found, "faces with fewer than three corners", "face", few, place)
+        _count(noted, "faces with fewer than three corners", "face", few, place)
         kept = np.repeat(~few, counts)
         corners, counts = corners[kept], counts[~few]
         corner_normals, corner_uvs = _pick(corner_normals, kept), _pick(corner_uvs, kept)
@@ -79,17 +79,17 @@ def polygons(
         raise LimitError(
             f"{path}: has {len(corners)} corners, the limit is {MOST_CORNERS}; use a smaller mesh"
         )
-    vertices = _finite_vertices(path, vertices, corners, found, place)
+    vertices = _finite_vertices(path, vertices, corners, noted, place)
     if normals is not None and corner_normals is not None:
         usable = _within(normals) & normals.any(axis=1)
         corner_normals = _unless(usable, corner_normals)
-        _count(found, "normals not finite or of no length", "normal", ~usable, place)
+        _count(noted, "normals not finite or of no length", "normal", ~usable, place)
     if uvs is not None and corner_uvs is not None:
         usable = _within(uvs)
         corner_uvs = _unless(usable, corner_uvs)
-        _count(found, "uv not finite", "uv", ~usable, place)
+        _count(noted, "uv not finite", "uv", ~usable, place)
     mesh = Mesh(
-        attributes={name: _finite(name, values, found, place) for name, values in (attributes or {}).items()},
+        attributes={name: _finite(name, values, noted, place) for name, values in (attributes or {}).items()},
         vertices=vertices,
         corners=corners.astype(np.int32),
         starts=starts_of(counts).astype(np.int32),
@@ -100,7 +100,7 @@ def polygons(
         polygon_materials=_ids(polygon_materials),
         polygon_groups=_ids(polygon_groups),
         polygon_smoothing=_ids(polygon_smoothing),
-        repairs=found,
+        repairs=noted,
         **more,
     )
     face = np.flatnonzero(~few)
@@ -121,7 +121,7 @@ def runs(starts: NDArray[Any], counts: NDArray[Any], step: int = 1) -> Ints:
 
 
 def _finite_vertices(
-    path: Path, vertices: NDArray[np.float64], corners: Ints, found: dict[str, Repair], place: Place
+    path: Path, vertices: NDArray[np.float64], corners: Ints, noted: dict[str, Repair], place: Place
 ) -> NDArray[np.float64]:
     """`vertices`, 0 where one is NaN, infinite or beyond `LARGEST`; refused where a corner uses it."""
     usable = _within(vertices)
@@ -134,7 +134,7 @@ def _finite_vertices(
             f"{path}: {len(bad)} of {len(vertices)} vertices are not finite or beyond {LARGEST:g}, the first "
             f"is number {bad[0] + 1}; repair the mesh where it was made"
         )
-    _count(found, "unused vertices that are not finite, made 0", "vertex", ~usable, place)
+    _count(noted, "unused vertices that are not finite, made 0", "vertex", ~usable, place)
     return np.where(usable[:, None], vertices, 0.0)
 
 
@@ -162,10 +162,10 @@ def strip(indices: NDArray[Any]) -> tuple[Ints, int]:
     first = np.maximum.accumulate(np.where(ids == -1, place + 1, 0))[: len(triples)]
     turned = (place[: len(triples)] - first) % 2 == 1
     triples[turned, 0], triples[turned, 1] = triples[turned, 1], triples[turned, 0]
-    whole = triples[(triples != -1).all(axis=1)]
-    a, b, c = whole.T
+    triangles = triples[(triples != -1).all(axis=1)]
+    a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)
-    return whole[proper], int(np.count_nonzero(~proper))
+    return triangles[proper], int(np.count_nonzero(~proper))
 
 
 def _within(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -184,20 +184,20 @@ def _unless(usable: NDArray[np.bool_], corner_rows: NDArray[Any]) -> NDArray[Any
     return np.where(np.append(usable, True)[corner_rows], corner_rows, -1)
 
 
-def _finite(name: str, values: NDArray[Any], found: dict[str, Repair], place: Place) -> NDArray[Any]:
+def _finite(name: str, values: NDArray[Any], noted: dict[str, Repair], place: Place) -> NDArray[Any]:
     if values.dtype.kind != "f" or np.isfinite(values).all():
         return values
     finite = np.isfinite(values)
     row = int(np.argwhere(~finite)[0, 0])
     note(
-        found, f"values of '{name}' not finite, made 0", place("vertex", row), int(np.count_nonzero(~finite))
+        noted, f"values of '{name}' not finite, made 0", place("vertex", row), int(np.count_nonzero(~finite))
     )
     return np.where(finite, values, values.dtype.type(0))
 
 
-def _count(found: dict[str, Repair], what: str, part: str, wrong: NDArray[np.bool_], place: Place) -> None:
+def _count(noted: dict[str, Repair], what: str, part: str, wrong: NDArray[np.bool_], place: Place) -> None:
     if wrong.any():
-        note(found, what, place(part, int(np.argmax(wrong))), int(np.count_nonzero(wrong)))
+        note(noted, what, place(part, int(np.argmax(wrong))), int(np.count_nonzero(wrong)))
 
 
 def _ids(values: NDArray[Any] | None) -> NDArray[np.int32] | None:

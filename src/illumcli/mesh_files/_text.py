@@ -61,12 +61,12 @@ class Text(Value):
             note(repairs, "NUL and Ctrl-Z behind the text left out", first, len(raw) - len(text))
         data = text + b"\n" * PADDING
         if b".#" in data or b"nan(" in data:
-            data = _NOT_FINITE.sub(lambda found: b"nan".ljust(len(found[0])), data)
+            data = _NOT_FINITE.sub(lambda match: b"nan".ljust(len(match[0])), data)
         if comments and b"#" in data:
-            data = _COMMENT.sub(lambda found: NEWLINE * len(found[0]), data)
+            data = _COMMENT.sub(lambda match: NEWLINE * len(match[0]), data)
             data = _without_comments_behind_numbers(data, raw, repairs)
         if continued and b"\\" in data:
-            data = _CONTINUED.sub(lambda found: b" " * len(found[0]), data)
+            data = _CONTINUED.sub(lambda match: b" " * len(match[0]), data)
         return cls(path, raw, data, repairs)
 
     @cached_property
@@ -80,8 +80,8 @@ class Text(Value):
         starts = np.concatenate(([0], ends + 1))
         first = self.bytes[starts]
         for i in np.flatnonzero((first <= 32) & (first != 10)):
-            found = _BLANKS.match(self.data, starts[i])
-            starts[i] = found.end() if found else starts[i]
+            match = _BLANKS.match(self.data, starts[i])
+            starts[i] = match.end() if match else starts[i]
         return starts[self.bytes[starts] != 10]
 
     def keywords(self, width: int) -> NDArray[np.uint64]:
@@ -231,8 +231,8 @@ class Block(Value):
             raise InputError(f"{self.place(line)}: {fact}; export the mesh again")
 
     def _bad_word(self, line: int, word: bytes, kind: str) -> InputError:
-        way = "write a decimal point, not a comma" if b"," in word else "export the mesh again"
-        return InputError(f"{self.place(line)}: '{decoded(word):.40}' is no {kind}; {way}")
+        advice = "write a decimal point, not a comma" if b"," in word else "export the mesh again"
+        return InputError(f"{self.place(line)}: '{decoded(word):.40}' is no {kind}; {advice}")
 
 
 def _without_comments_behind_numbers(data: bytes, raw: bytes, repairs: dict[str, Repair]) -> bytes:
@@ -240,10 +240,10 @@ def _without_comments_behind_numbers(data: bytes, raw: bytes, repairs: dict[str,
     if b"#" not in data:
         return data
 
-    def blank(found: re.Match[bytes]) -> bytes:
-        lines = "" if what in repairs else f":{1 + raw.count(NEWLINE, 0, found.start())}"
+    def blank(match: re.Match[bytes]) -> bytes:
+        lines = "" if what in repairs else f":{1 + raw.count(NEWLINE, 0, match.start())}"
         note(repairs, what, lines)
-        return found[1] + NEWLINE * (found.end() - found.end(1))
+        return match[1] + NEWLINE * (match.end() - match.end(1))
 
     what = "comments that follow a number without a blank"
     return _COMMENT_BEHIND_NUMBER.sub(blank, data)

@@ -92,8 +92,8 @@ def read(path: Path, folder: Path) -> Library:
             note(library.repairs, "statements before any material left out", place)
         else:
             current.take(word, rest, place)
-    for material, found in materials.items():
-        library.materials[material], library.substitutes[material] = found.keys()
+    for material, keys in materials.items():
+        library.materials[material], library.substitutes[material] = keys.keys()
     return library
 
 
@@ -170,21 +170,21 @@ class _Material:
         # as it stands, else without a comment, else without quotes
         name = text[at:]
         names = dict.fromkeys((name, without_comment(name).rstrip(), name.strip("\"'")))
-        found = [nearby(self._path, each, self._folder) for each in names]
-        file, matter = next((each for each in found if each[0]), found[0])
+        files = [nearby(self._path, each, self._folder) for each in names]
+        file, matter = next((each for each in files if each[0]), files[0])
         if matter:
             note(self._repairs, f"textures {matter} {TAKEN if file else 'left out'}", place)
         return None if file is None else {"texture": str(file), **texture}
 
     def keys(self) -> tuple[dict[str, Any], dict[str, Substitute]]:
         """The keys of a scene's material, and what stands in for textures among them."""
-        found, places = self._values, self._places
-        diffuse = found.get("map_Kd", found.get("Kd"))
-        if "map_Kd" in found and found.get("Kd", WHITE) != WHITE:
+        values, places = self._values, self._places
+        diffuse = values.get("map_Kd", values.get("Kd"))
+        if "map_Kd" in values and values.get("Kd", WHITE) != WHITE:
             note(self._looks, "factors Kd of a texture left out", places["Kd"])
-        if found.get("d", 1 - found.get("Tr", 0.0)) < 1:
-            note(self._repairs, "transparent materials made opaque", places["d" if "d" in found else "Tr"])
-        illum = found.get("illum", 2.0)
+        if values.get("d", 1 - values.get("Tr", 0.0)) < 1:
+            note(self._repairs, "transparent materials made opaque", places["d" if "d" in values else "Tr"])
+        illum = values.get("illum", 2.0)
         if illum > 2:
             note(self._looks, "reflection of materials left out", places["illum"])
         if illum == 0:
@@ -193,12 +193,12 @@ class _Material:
         else:
             keys = {
                 "diffuse": diffuse,
-                "specular": found.get("Ks", BLACK) if illum >= 2 else BLACK,
-                "exponent": found.get("Ns"),
-                "emission": found.get("Ke"),
-                "ambient": found.get("Ka"),
+                "specular": values.get("Ks", BLACK) if illum >= 2 else BLACK,
+                "exponent": values.get("Ns"),
+                "emission": values.get("Ke"),
+                "ambient": values.get("Ka"),
             }
-        said = {key: value for key, value in keys.items() if value is not None}
-        substitute = Substitute(found.get("Kd", WHITE), places.get("map_Kd", ""))
-        textured = {key: substitute for key, value in said.items() if isinstance(value, dict)}
-        return {"model": "blinn_phong", **said}, textured
+        given = {key: value for key, value in keys.items() if value is not None}
+        substitute = Substitute(values.get("Kd", WHITE), places.get("map_Kd", ""))
+        textured = {key: substitute for key, value in given.items() if isinstance(value, dict)}
+        return {"model": "blinn_phong", **given}, textured

@@ -141,8 +141,8 @@ class _Statements(Value):
                 names[word].append((line, name[0] if name else ""))
             elif word not in _STATE.split():
                 left_out.setdefault(_LEFT_OUT.get(word, _UNKNOWN), []).append(line)
-        for what, found in left_out.items():
-            note(rest.repairs, what, f":{text.number(found[0])}", len(found))
+        for what, numbers in left_out.items():
+            note(rest.repairs, what, f":{text.number(numbers[0])}", len(numbers))
         return rest
 
 
@@ -350,24 +350,24 @@ def _is_off(group: str) -> bool:
 
 def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> mtl.Library:
     """Every material of the libraries, the first of a name, and what was left out of them."""
-    whole = mtl.Library()
+    library = mtl.Library()
     for names, line in {names: line for line, names in reversed(statements)}.items():
         place = f":{text.number(line)}"
         for file, matter in _library_files(path, names):
             if matter:
-                note(whole.repairs, f"material libraries {matter} {TAKEN if file else 'left out'}", place)
+                note(library.repairs, f"material libraries {matter} {TAKEN if file else 'left out'}", place)
             if file is None:
                 continue
-            found = mtl.read(file, path.parent)
-            whole.materials.update({**found.materials, **whole.materials})
-            whole.substitutes.update({**found.substitutes, **whole.substitutes})
-            whole.repairs.update(joined([whole.repairs, found.repairs]))
-            whole.looks.update(joined([whole.looks, found.looks]))
-    return whole
+            part = mtl.read(file, path.parent)
+            library.materials.update({**part.materials, **library.materials})
+            library.substitutes.update({**part.substitutes, **library.substitutes})
+            library.repairs.update(joined([library.repairs, part.repairs]))
+            library.looks.update(joined([library.looks, part.looks]))
+    return library
 
 
 def _library_files(path: Path, names: str) -> list[tuple[Path | None, str]]:
     """The file of the one name with blanks, or those of several names, and what is the matter with each."""
-    whole = nearby(path, names.strip("\"'"), path.parent)
+    one = nearby(path, names.strip("\"'"), path.parent)
     several = [nearby(path, name, path.parent) for name in names.split()]
-    return several if whole[0] is None and any(file for file, _ in several) else [whole]
+    return several if one[0] is None and any(file for file, _ in several) else [one]

@@ -61,8 +61,8 @@ class _File(Value):
 
     def line(self, element: str, name: str) -> str:
         """Where the header announces a property."""
-        found = next(each for each in self.element(element).properties if each.name == name)
-        return f":{found.line}"
+        prop = next(each for each in self.element(element).properties if each.name == name)
+        return f":{prop.line}"
 
     def place(self, part: str, index: int) -> str:
         """Where a vertex, with its normal, or a face stands."""
@@ -95,8 +95,8 @@ def read(path: Path) -> Mesh:
     data = content(path)
     repairs: dict[str, Repair] = {}
     head = _ply.header(path, data, repairs)
-    found, text = _ply.tables(path, data, head, repairs)
-    file = _File(path, head, found, text, repairs)
+    columns, text = _ply.tables(path, data, head, repairs)
+    file = _File(path, head, columns, text, repairs)
     vertex = file.tables.get("vertex", {})
     if any(isinstance(vertex.get(name, None), Lists | None) for name in "xyz"):
         raise InputError(f"{path}: has no vertices with x, y and z; export the mesh again")
@@ -173,27 +173,27 @@ def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints
         raise InputError(f"{file.path}: element '{element}' has no list 'vertex_indices'; export it with one")
     if name not in _CORNERS:
         note(file.repairs, "lists of another name taken for the corners of faces", file.line(element, name))
-    found = table[name]
-    assert isinstance(found, Lists)
+    lists_of_corners = table[name]
+    assert isinstance(lists_of_corners, Lists)
     if any(each.name == name and each.type.kind == "f" for each in file.element(element).properties):
         note(file.repairs, "indices in floats", file.line(element, name))
 
     def row(position: int) -> str:
-        number = int(np.searchsorted(np.cumsum(found.counts), position, side="right"))
+        number = int(np.searchsorted(np.cumsum(lists_of_corners.counts), position, side="right"))
         line = file.row_line(element, number)
         place = f"{file.path}" if line is None else f"{file.path}:{line}"
-        return f"{place}: {element} {number} has the index {found.values[position]:g}"
+        return f"{place}: {element} {number} has the index {lists_of_corners.values[position]:g}"
 
     with np.errstate(invalid="ignore"):
-        indices = found.values.astype(np.int64)
-    if (broken := indices != found.values).any():
+        indices = lists_of_corners.values.astype(np.int64)
+    if (broken := indices != lists_of_corners.values).any():
         raise InputError(f"{row(int(np.argmax(broken)))}, no whole number; export the mesh again")
     check_range(
         indices - least,
         size - least,
         lambda position: InputError(f"{row(position)}, there are {size} vertices; export the mesh again"),
     )
-    return indices, found.counts
+    return indices, lists_of_corners.counts
 
 
 def _materials(file: _File, has_uv: bool, count: int) -> dict[str, Any]:
@@ -203,10 +203,10 @@ def _materials(file: _File, has_uv: bool, count: int) -> dict[str, Any]:
         note(file.repairs, "textures without coordinates left out", f":{file.head.textures[0][1]}")
         return {}
     for name, line in file.head.textures:
-        found, matter = nearby(path, name, path.parent)
+        image, matter = nearby(path, name, path.parent)
         if matter:
-            note(file.repairs, f"textures {matter} {TAKEN if found else 'left out'}", f":{line}")
-        diffuse = {} if found is None else {"diffuse": {"texture": str(found)}}
+            note(file.repairs, f"textures {matter} {TAKEN if image else 'left out'}", f":{line}")
+        diffuse = {} if image is None else {"diffuse": {"texture": str(image)}}
         materials[name] = {"model": "lambert", **diffuse}
     if not any("diffuse" in each for each in materials.values()):
         return {}

@@ -138,8 +138,8 @@ def _statements_as_lines(data: bytes) -> bytes:
 def _note_other_lines(text: Text, lines: dict[bytes, NDArray[Any]], repairs: dict[str, Repair]) -> None:
     """Count the lines that are no part of a solid."""
     known = np.zeros(len(text.starts), np.bool_)
-    for found in lines.values():
-        known[found] = True
+    for numbers in lines.values():
+        known[numbers] = True
     if not known.all():
         first = f":{text.number(int(np.argmin(known)))}"
         note(repairs, "lines that are no part of a facet left out", first, int(np.count_nonzero(~known)))

@@ -41,10 +41,10 @@ class Baked(Record):
 
     def of_corners(self, name: str, corners: NDArray[np.int32], count: int) -> NDArray[np.float32] | None:
         """(C,) the same at the mesh's corners, (C,) vertex numbers: their own values, else the vertices'."""
-        values, own = self.of(name, count), None
+        values, at_corners = self.of(name, count), None
         if self.corner_obscurance is not None:
-            own = self._part(self.corner_obscurance, "corners", name, len(corners))
-        return values[corners] if own is None and values is not None else own
+            at_corners = self._part(self.corner_obscurance, "corners", name, len(corners))
+        return values[corners] if at_corners is None and values is not None else at_corners
 
     def _part(
         self, values: NDArray[np.float32], what: str, name: str, count: int
@@ -52,8 +52,8 @@ class Baked(Record):
         if len(values) == count:
             return values
         first = 0
-        for own, size in dict(self.about.get(what, {})).items():
-            if own == name and size == count:
+        for object_name, size in dict(self.about.get(what, {})).items():
+            if object_name == name and size == count:
                 return values[first : first + count]
             first += size
         return None
@@ -64,8 +64,8 @@ class Baked(Record):
 
     def columns(self) -> dict[str, NDArray[np.float32]]:
         """What is written of every vertex, by name."""
-        found = {"obscurance": self.obscurance, "standard_error": self.standard_error}
-        return found if self.bent_normal is None else {**found, "bent_normal": self.bent_normal}
+        columns = {"obscurance": self.obscurance, "standard_error": self.standard_error}
+        return columns if self.bent_normal is None else {**columns, "bent_normal": self.bent_normal}
 
     def corner_columns(self) -> dict[str, NDArray[np.float32]]:
         """What is written of every corner, by name; nothing where no vertex has several values."""
@@ -114,16 +114,16 @@ def read_npz(path: Path) -> Baked:
             names = [part.name for part in fields(Baked) if part.name != "about" and part.name in data]
             arrays = {name: np.asarray(data[name], np.float32) for name in names}
             about = json.loads(str(data["about"])) if "about" in data else {}
-            made = Baked(**arrays, about=about)
+            baked = Baked(**arrays, about=about)
     except LimitError:
         raise
     except Exception as why:  # zipfile, numpy and json each have their own
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
-    values = [made.obscurance, *(() if made.corner_obscurance is None else (made.corner_obscurance,))]
+    values = [baked.obscurance, *(() if baked.corner_obscurance is None else (baked.corner_obscurance,))]
     sound = all(w.ndim == 1 and np.isfinite(w).all() and (w >= 0).all() and (w <= 1).all() for w in values)
-    if not sound or made.standard_error.shape != made.obscurance.shape:
+    if not sound or baked.standard_error.shape != baked.obscurance.shape:
         raise InputError(f"{path}: obscurance must be one number from 0 to 1 per vertex; bake it again")
-    return made
+    return baked
 
 
 def read_about(path: Path) -> dict[str, Any]:

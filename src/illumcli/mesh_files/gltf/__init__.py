@@ -42,29 +42,29 @@ def read(path: Path) -> Mesh:
     materials, in `material_repairs`.
     """
     document = open_document(path)
-    found = list(parts(document))
-    if not any(len(part.triangles) for part in found):
+    primitives = list(parts(document))
+    if not any(len(part.triangles) for part in primitives):
         why = "; ".join(document.repairs)
         raise InputError(f"{path}: has no faces{f' ({why})' * bool(why)}; export the mesh with its faces")
-    sizes = [len(part.vertices) for part in found]
+    sizes = [len(part.vertices) for part in primitives]
     firsts = starts_of(np.array(sizes, np.int64)).tolist()
-    triangles = [part.triangles + first for part, first in zip(found, firsts, strict=False)]
+    triangles = [part.triangles + first for part, first in zip(primitives, firsts, strict=False)]
     corners = np.concatenate([np.empty((0, 3), np.int64), *triangles]).ravel()
-    counts = [len(part.triangles) for part in found]
+    counts = [len(part.triangles) for part in primitives]
 
     # normals and uv of each corner; a primitive without normals is flat
-    normals, corner_normals = _joined([part.normals for part in found], sizes, corners)
-    uvs, corner_uvs = _joined([part.uvs.get(0) for part in found], sizes, corners)
-    flat = np.array([part.normals is None for part in found], np.bool_)
+    normals, corner_normals = _joined([part.normals for part in primitives], sizes, corners)
+    uvs, corner_uvs = _joined([part.uvs.get(0) for part in primitives], sizes, corners)
+    flat = np.array([part.normals is None for part in primitives], np.bool_)
     smoothing = np.repeat(np.where(flat, 0, -1), counts) if flat.any() else None
 
     # names: materials by number, groups by name
-    library = Library(document, found)
-    material_names, materials = _numbered([library.name(part) for part in found])
-    group_names, groups = _numbered([part.group for part in found])
+    library = Library(document, primitives)
+    material_names, materials = _numbered([library.name(part) for part in primitives])
+    group_names, groups = _numbered([part.group for part in primitives])
     return polygons(
         path,
-        np.concatenate([np.empty((0, 3)), *(part.vertices for part in found)]),
+        np.concatenate([np.empty((0, 3)), *(part.vertices for part in primitives)]),
         corners,
         np.full(len(corners) // 3, 3),
         normals=normals,
@@ -76,12 +76,12 @@ def read(path: Path) -> Mesh:
         group_names=group_names,
         polygon_groups=np.repeat(groups, counts),
         polygon_smoothing=smoothing,
-        attributes={**_shared(document, found), **library.coordinates()},
+        attributes={**_shared(document, primitives), **library.coordinates()},
         materials=library.materials,
         substitutes=library.substitutes,
         material_repairs=library.repairs,
         repairs=document.repairs,
-        place=partial(_place, found, firsts, starts_of(np.array(counts)).tolist()),
+        place=partial(_place, primitives, firsts, starts_of(np.array(counts)).tolist()),
     )
 
 
@@ -102,11 +102,12 @@ def _unescaped(uri: bytes) -> bytes:
         return uri
 
 
-def _place(found: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:
+def _place(primitives: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:
     """Where a part of the mesh stands in the file: its primitive, and its number in it from 1."""
     first = faces if part == "face" else vertices
-    k = bisect_right(first, number, hi=len(found)) - 1
-    return f": meshes[{found[k].mesh}].primitives[{found[k].primitive}], {part} {number - first[k] + 1}"
+    k = bisect_right(first, number, hi=len(primitives)) - 1
+    where = f"meshes[{primitives[k].mesh}].primitives[{primitives[k].primitive}]"
+    return f": {where}, {part} {number - first[k] + 1}"
 
 
 def primitives_of(document: Document) -> list[tuple[int, int, int]]:
@@ -137,15 +138,15 @@ def _joined(
 def _numbered(names: list[str | None]) -> tuple[tuple[str, ...], Ints]:
     """The distinct names in order, and the number of each of `names` among them, -1 for none."""
     numbers: dict[str | None, int] = {name: i for i, name in enumerate(dict.fromkeys(n for n in names if n))}
-    found = tuple(name for name in numbers if name)
-    return found, np.array([numbers.get(name, -1) for name in names], np.int64)
+    distinct = tuple(name for name in numbers if name)
+    return distinct, np.array([numbers.get(name, -1) for name in names], np.int64)
 
 
-def _shared(document: Document, found: list[Part]) -> dict[str, NDArray[Any]]:
+def _shared(document: Document, primitives: list[Part]) -> dict[str, NDArray[Any]]:
     """The attributes of all parts together: those that every part has in the same width, and colours."""
     shared = {}
-    for name in sorted({name for part in found for name in part.attributes}):
-        known = [part.attributes.get(name) for part in found]
+    for name in sorted({name for part in primitives for name in part.attributes}):
+        known = [part.attributes.get(name) for part in primitives]
         shapes = {table.shape[1:] for table in known if table is not None}
         if len(shapes) > 1 or (name not in FILLED and any(table is None for table in known)):
             what = f"attribute {printable(name)} that some primitives lack or have otherwise, left out"
@@ -157,7 +158,7 @@ def _shared(document: Document, found: list[Part]) -> dict[str, NDArray[Any]]:
                 np.full((len(part.vertices), *shape), FILLED.get(name, 0), np.float32)
                 if table is None
                 else table
-                for part, table in zip(found, known, strict=True)
+                for part, table in zip(primitives, known, strict=True)
             ]
         )
     return shared

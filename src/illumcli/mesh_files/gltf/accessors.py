@@ -90,17 +90,17 @@ def _sparse(
     kind = indices.get("componentType")
     if kind not in (5121, 5123, 5125):
         raise document.wrong(f"{where}.sparse.indices are of type {kind!r:.20}, which is no whole number")
-    found = []
+    arrays = []
     for part, shape, dtype in (
         (indices, (count, 1), np.dtype(_TYPES[kind])),
         (rows, (count, values.shape[1]), values.dtype),
     ):
         start = document.integer(part, "byteOffset", f"{where}.sparse", 0)
-        found.append(_rows(document, part.get("bufferView"), start, shape, dtype, f"{where}.sparse"))
-    numbers = found[0][:, 0].astype(np.int64)
+        arrays.append(_rows(document, part.get("bufferView"), start, shape, dtype, f"{where}.sparse"))
+    numbers = arrays[0][:, 0].astype(np.int64)
     if len(numbers) and numbers.max() >= len(values):
         raise document.wrong(f"{where}.sparse replaces row {numbers.max()} of {len(values)}")
-    return numbers, found[1]
+    return numbers, arrays[1]
 
 
 def _rows(

@@ -42,9 +42,9 @@ class Document:
         """Note something that was mended or left out, at the part of the JSON called `where`."""
         note(self.repairs, what, f": {where}" if where else "", count)
 
-    def wrong(self, fact: str, way: str = "export the mesh again") -> InputError:
+    def wrong(self, fact: str, advice: str = "export the mesh again") -> InputError:
         """What cannot be read, with the way out."""
-        return InputError(f"{self.path}: {fact}; {way}")
+        return InputError(f"{self.path}: {fact}; {advice}")
 
     def reason(self, error: InputError) -> str:
         """The fact of an error that `wrong` made, without the file and the way out."""
@@ -90,7 +90,7 @@ class Document:
         entry = self.item("bufferViews", index)
         number = entry.get("buffer")
         if compressed := ", ".join(
-            printable(name) for name, said in extensions(entry).items() if "buffer" in said
+            printable(name) for name, extension in extensions(entry).items() if "buffer" in extension
         ):
             buffer = self.item("buffers", number)
             if "uri" not in buffer and (number != 0 or self.chunk is None):
@@ -132,22 +132,22 @@ class Document:
             return self._inline(uri, where)
         if "://" in uri:
             raise self.wrong(f"{where} is on the network", "copy the file beside the mesh and name it alone")
-        found, matter = self.nearby(uri)
-        if found is None:
+        file, matter = self.nearby(uri)
+        if file is None:
             return content(beside(self.path, unquote(uri), str(self.path)))
         if matter:
             self.count(f"buffers {matter} {TAKEN}", where)
-        return content(found)
+        return content(file)
 
     def nearby(self, uri: str) -> tuple[Path | None, str]:
         """The file that a URI names, percent-encoded as the specification says or as it stands, and what is
         the matter with it, as `_files.nearby` has them."""
-        found, matter = nearby(self.path, unquote(uri), self.path.parent)
-        if found is None or matter:
+        file, matter = nearby(self.path, unquote(uri), self.path.parent)
+        if file is None or matter:
             plain, plain_matter = nearby(self.path, uri, self.path.parent)
-            if plain is not None and (found is None or not plain_matter):
+            if plain is not None and (file is None or not plain_matter):
                 return plain, plain_matter
-        return found, matter
+        return file, matter
 
     def _inline(self, uri: str, where: str) -> bytes:
         """The bytes of a data URI, of any media type; blanks and missing padding are of no matter."""
@@ -225,28 +225,28 @@ def _chunks(path: Path, data: bytes) -> _Chunks:
     version, length = int.from_bytes(data[4:8], "little"), int.from_bytes(data[8:12], "little")
     if version != 2:
         raise InputError(f"{path}: is binary glTF of version {version}; export it as glTF 2")
-    found: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     at, cut = 12, False
     while at + 8 <= len(data):
         size, kind = int.from_bytes(data[at : at + 4], "little"), data[at + 4 : at + 8]
-        wanted = kind in (b"JSON", b"BIN\0") and kind not in found
+        wanted = kind in (b"JSON", b"BIN\0") and kind not in chunks
         if at >= length and not wanted:
             break
         cut = at + 8 + size > len(data)
-        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
-    if b"JSON" not in found:
+    if b"JSON" not in chunks:
         raise InputError(f"{path}: has no JSON chunk; export the mesh again")
     cut = cut or length > len(data)
     surplus = 0 if cut else length - at if at > length else len(data) - length
-    return _Chunks(found[b"JSON"], found.get(b"BIN\0"), cut, surplus)
+    return _Chunks(chunks[b"JSON"], chunks.get(b"BIN\0"), cut, surplus)
 
 
 def extensions(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """What the extensions of a part of the JSON say, by name."""
-    found = entry.get("extensions")
-    said = found if isinstance(found, dict) else {}
-    return {name: each if isinstance(each, dict) else {} for name, each in said.items()}
+    named = entry.get("extensions")
+    mapping = named if isinstance(named, dict) else {}
+    return {name: each if isinstance(each, dict) else {} for name, each in mapping.items()}
 
 
 def extension(entry: dict[str, Any], name: str) -> dict[str, Any]:

@@ -99,14 +99,14 @@ class Library:
 
     def coordinates(self) -> dict[str, NDArray[np.float32]]:
         """Attribute -> (V, 2) coordinates, v upwards, of the textures that do not use set 0 as it is."""
-        found = {}
+        tables_by_name = {}
         for (uv_set, transform), name in self._coordinates.items():
             tables = [
                 part.uvs.get(uv_set, np.zeros((len(part.vertices), 2))).astype(np.float32)
                 for part in self._parts
             ]
-            found[name] = _transformed(np.concatenate(tables), transform)
-        return found
+            tables_by_name[name] = _transformed(np.concatenate(tables), transform)
+        return tables_by_name
 
     def _count(self, what: str, where: str) -> None:
         note(self.repairs, what, f": {where}")
@@ -191,7 +191,7 @@ class Library:
         if not isinstance(info, dict):
             raise document.wrong("no texture")
         texture = document.item("textures", info.get("index"))
-        found = {"texture": self._image(texture)}
+        keys = {"texture": self._image(texture)}
 
         # which coordinates it is looked up at, and what lies beyond them
         transform = extension(info, "KHR_texture_transform")
@@ -201,20 +201,20 @@ class Library:
         place = _transform(document, transform)
         if uv_set != 0 or place != _UNMOVED:
             plain = f"uv{uv_set}" if place == _UNMOVED else f"uv{uv_set}_{len(self._coordinates) + 1}"
-            found["uv"] = self._coordinates.setdefault((uv_set, place), plain)
+            keys["uv"] = self._coordinates.setdefault((uv_set, place), plain)
         if "sampler" in texture:
-            found |= self._sampling(
+            keys |= self._sampling(
                 document.item("samplers", texture["sampler"]), f"samplers[{texture['sampler']}]"
             )
-        return found
+        return keys
 
     def _sampling(self, sampler: dict[str, Any], where: str) -> dict[str, str]:
-        said = [sampler.get(key, _REPEAT) for key in ("wrapS", "wrapT")]
-        wraps = [_WRAPS.get(code, "repeat") if is_index(code) else "repeat" for code in said]
+        codes = [sampler.get(key, _REPEAT) for key in ("wrapS", "wrapT")]
+        wraps = [_WRAPS.get(code, "repeat") if is_index(code) else "repeat" for code in codes]
         if wraps[0] != wraps[1]:
             self._count("textures that wrap in two ways, wrapped in the first", where)
-        found = {} if wraps[0] == "repeat" else {"wrap": wraps[0]}
-        return found | ({"filter": "nearest"} if sampler.get("magFilter") == _NEAREST else {})
+        keys = {} if wraps[0] == "repeat" else {"wrap": wraps[0]}
+        return keys | ({"filter": "nearest"} if sampler.get("magFilter") == _NEAREST else {})
 
     def _image(self, texture: dict[str, Any]) -> str:
         """The image of a texture: the path of a file beside, or ``FILE#images[N]`` for one in the file."""

@@ -101,10 +101,10 @@ def _roots(document: Document) -> list[int]:
 
 def children(document: Document, index: int) -> list[int]:
     """The numbers of a node's children."""
-    found = document.item("nodes", index).get("children", [])
-    if not isinstance(found, list) or not all(is_index(child) for child in found):
+    indices = document.item("nodes", index).get("children", [])
+    if not isinstance(indices, list) or not all(is_index(child) for child in indices):
         raise document.wrong(f"nodes[{index}].children is no list of nodes")
-    return found
+    return indices
 
 
 def world_matrices(document: Document, nodes: list[int]) -> Matrix:
@@ -172,24 +172,24 @@ def _instances(document: Document, node: dict[str, Any], where: str) -> Matrix:
     tables = extension(node, "EXT_mesh_gpu_instancing").get("attributes")
     if not isinstance(tables, dict):
         return np.eye(4)[None]
-    found: dict[str, Matrix] = {}
+    tables_by_name: dict[str, Matrix] = {}
     for name, width in (("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)):
         if name in tables:
-            found[name] = table(document, tables[name], (width,)).astype(np.float64)
-    if not found:
+            tables_by_name[name] = table(document, tables[name], (width,)).astype(np.float64)
+    if not tables_by_name:
         return np.eye(4)[None]
-    count = min(map(len, found.values()))
-    if count < max(map(len, found.values())):
+    count = min(map(len, tables_by_name.values()))
+    if count < max(map(len, tables_by_name.values())):
         document.count("instances that lack a part of their transform, left out", where)
     if count > MOST_INSTANCES:
         raise LimitError(
             f"{document.path}: {where} has {count} instances, the limit is {MOST_INSTANCES}; "
             "use a smaller scene"
         )
-    if not all(np.isfinite(values[:count]).all() for values in found.values()):
+    if not all(np.isfinite(values[:count]).all() for values in tables_by_name.values()):
         raise document.wrong(f"{where} has instances whose place is not finite")
     return composed(
-        found.get("TRANSLATION", np.zeros((count, 3)))[:count],
-        found.get("ROTATION", np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)))[:count],
-        found.get("SCALE", np.ones((count, 3)))[:count],
+        tables_by_name.get("TRANSLATION", np.zeros((count, 3)))[:count],
+        tables_by_name.get("ROTATION", np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)))[:count],
+        tables_by_name.get("SCALE", np.ones((count, 3)))[:count],
     )

@@ -87,7 +87,9 @@ def _is_drawn(document: Document, primitive: dict[str, Any], where: str) -> bool
         document.count("primitives without POSITION, left out", where)
         return False
     needed += [primitive["indices"]] if "indices" in primitive else []
-    names = ", ".join(printable(name) for name, said in extensions(primitive).items() if "bufferView" in said)
+    names = ", ".join(
+        printable(name) for name, extension in extensions(primitive).items() if "bufferView" in extension
+    )
     if names and not all(has_data(document, each) for each in needed):
         raise document.wrong(
             f"{where} has its geometry in the extension {names:.80} alone, which is not read",
@@ -171,29 +173,29 @@ def _uvs(tables: _Tables) -> dict[int, Floats]:
     """Texture coordinates by number of their set, v upwards; integers are whole only where quantised."""
     used = tables.document.json.get("extensionsUsed")
     fractions = not (isinstance(used, list) and "KHR_mesh_quantization" in used)
-    found = {}
+    sets = {}
     for name in tables.accessors:
         if name.startswith("TEXCOORD_") and name[9:].isdecimal():
             uv = tables.optional(name, (2,), fractions)
             if uv is not None:
-                found[int(name[9:])] = uv.astype(np.float64) * (1, -1) + (0, 1)
-    return found
+                sets[int(name[9:])] = uv.astype(np.float64) * (1, -1) + (0, 1)
+    return sets
 
 
 def _attributes(tables: _Tables) -> dict[str, NDArray[Any]]:
     """`COLOR_0` as `color`, linear (3.7.2.1), and `alpha`; what begins with an underscore by its name."""
-    found: dict[str, NDArray[Any]] = {}
+    columns: dict[str, NDArray[Any]] = {}
     for name in tables.accessors:
         if name.startswith("_"):
             values = tables.optional(name, (1, 2, 3, 4))
             if values is not None:
-                found[name] = values[:, 0] if values.shape[1] == 1 else values
+                columns[name] = values[:, 0] if values.shape[1] == 1 else values
     color = tables.optional("COLOR_0", (3, 4), fractions=True)
     if color is not None:
-        found["color"] = color[:, :3].astype(np.float32)
+        columns["color"] = color[:, :3].astype(np.float32)
         if color.shape[1] == 4:
-            found["alpha"] = color[:, 3].astype(np.float32)
-    return found
+            columns["alpha"] = color[:, 3].astype(np.float32)
+    return columns
 
 
 def _triangles(document: Document, primitive: dict[str, Any], size: int, where: str) -> Ints:
@@ -219,21 +221,21 @@ def _triangles(document: Document, primitive: dict[str, Any], size: int, where: 
             document.count("triangles that only join strips", where, joints)
     else:
         triangles = _fans(indices)
-    whole = (triangles >= 0).all(axis=1)
-    lost = np.count_nonzero(indices < 0) if mode != _TRIANGLES else np.count_nonzero(~whole)
+    complete = (triangles >= 0).all(axis=1)
+    lost = np.count_nonzero(indices < 0) if mode != _TRIANGLES else np.count_nonzero(~complete)
     if lost:
         document.count("triangles of vertices that are not there, left out", where, int(lost))
-    return triangles[whole]
+    return triangles[complete]
 
 
 def _fans(indices: Ints) -> Ints:
     """(T, 3) triangles of fans; -1 ends one."""
-    found = []
+    fans = []
     for fan in np.split(indices, np.flatnonzero(indices < 0)):
-        own = fan[fan >= 0]
-        if len(own) > 2:
-            found.append(np.stack([np.full(len(own) - 2, own[0]), own[1:-1], own[2:]], axis=1))
-    return np.concatenate([np.empty((0, 3), np.int64), *found])
+        corners = fan[fan >= 0]
+        if len(corners) > 2:
+            fans.append(np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1))
+    return np.concatenate([np.empty((0, 3), np.int64), *fans])
 
 
 def _material(document: Document, primitive: dict[str, Any], where: str) -> int | None:
@@ -253,8 +255,8 @@ def _applied(linear: Floats, vectors: Floats) -> Floats:
     """(I, V, 3) (V, 3) vectors by matrices of instances (I, 1, 3, 3), or of vertices (1, V, 3, 3)."""
     if linear.shape[1] == 1:
         return vectors @ linear[:, 0].transpose(0, 2, 1)
-    found: Floats = np.einsum("ivab,vb->iva", linear, vectors)
-    return found
+    transformed: Floats = np.einsum("ivab,vb->iva", linear, vectors)
+    return transformed
 
 
 def _repeated(values: NDArray[Any], copies: int) -> NDArray[Any]:

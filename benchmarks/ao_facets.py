@@ -20,12 +20,14 @@ import numpy as np
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, dot, length, take_rows, unit
 from illumcli.baking.inputs import mesh_alone
-from illumcli.rays.interaction import Hits, SurfaceInteraction, facets
+from illumcli.rays.corner_weights import corner_weights
+from illumcli.rays.interaction import Hits, ShadingContext, SurfaceInteraction, interact
 from illumcli.render_graph.build import build
-from illumcli.render_graph.stages import corner_weights, obscurance_normals, ray_origins
+from illumcli.shading.rates import obscurance_normals
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.hemisphere import Hemispheres
 from illumcli.visibility.obscurance import Method, estimates
+from illumcli.visibility.shadows import ray_origins
 
 EDGES = 20 if SMALL else 1000
 RAYS = 64 if SMALL else 2048
@@ -56,7 +58,7 @@ def beside(geometry: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
     ]
     front = unit(np.cross(corner[1] - corner[0], corner[2] - corner[0]))
     hits = Hits(np.arange(len(side), dtype=np.int32), triangle, u, v)
-    return hits, facets(geometry, triangle, u, v, column_major(front, np.float64))
+    return hits, interact(geometry, triangle, u, v, column_major(front, np.float64))
 
 
 def jumps(path: Path) -> tuple[int, float, float, float]:
@@ -71,7 +73,8 @@ def jumps(path: Path) -> tuple[int, float, float, float]:
     for side in shared_edges(geometry.triangles).T:
         hits, facet = beside(geometry, side)
         weights = corner_weights(geometry, hits, made["planar_polygons"])
-        n = obscurance_normals(["phong"], geometry, weights, facet, made["corner_normals"])
+        context = ShadingContext(geometry, weights, facet, made["corner_normals"])
+        n = obscurance_normals(["phong"], context)
         sides.append((hits, facet, n))
     (_, left, n), (_, right, m) = sides
     polygon = [geometry.polygons[hits.triangle] for hits, _, _ in sides]

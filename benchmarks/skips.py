@@ -20,8 +20,7 @@ from illumcli.arrays import dot, take_rows
 from illumcli.lights import _incident as light_at
 from illumcli.lights._incident import LitPoints
 from illumcli.models._base import IlluminationModel
-from illumcli.render_graph import build as recipes
-from illumcli.render_graph import culling, explain
+from illumcli.render_graph import culling, needs
 from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.render_graph.pipeline import place_and_cull
@@ -102,8 +101,8 @@ def _directions(_):
     return frozenset("nlvt")
 
 
-DARK = ((recipes, "sends", yes),)
-AMBIENT = ((recipes, "is_ambient", yes), (explain, "is_ambient", yes))
+DARK = ((needs, "sends", yes),)
+AMBIENT = ((needs, "is_ambient", yes),)
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
     Skip(
@@ -115,9 +114,9 @@ SKIPS = (
     Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),
     Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),
-    Skip("emission of 0", (), ((recipes, "is_emissive", yes),)),
+    Skip("emission of 0", (), ((needs, "is_emissive", yes),)),
     Skip(
-        "directions nobody reads", ("objects.ball.material=grey",), ((recipes, "reached_words", _directions),)
+        "directions nobody reads", ("objects.ball.material=grey",), ((needs, "reached_words", _directions),)
     ),
     Skip("layers nobody asks for", (), (), ("depth",), ("depth", "beauty")),
     Skip(
@@ -135,9 +134,9 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
     counts = {"rays": 0, "responses": 0, "lobes": 0, "steps": 0, "triangles": 0}
     response, evaluate = direct.response, direct.evaluate
 
-    def counted(models, lobes, material, lit, *rest):
+    def counted(materials, lit, *rest):
         counts["responses"] += len(lit.index)
-        return response(models, lobes, material, lit, *rest)
+        return response(materials, lit, *rest)
 
     def counted_lobes(lobes, given):
         counts["lobes"] += len(lobes) * len(given["n"])

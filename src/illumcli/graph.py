@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, fields
 from functools import cache, partial
 from typing import Any
 
@@ -59,6 +60,12 @@ def required(function: Callable[..., Any]) -> tuple[str, ...]:
 
 @cache
 def _parameters(function: Callable[..., Any]) -> tuple[str, ...]:
+    if isinstance(function, type) and issubclass(function, Value):  # a record: its fields
+        return tuple(
+            part.name
+            for part in fields(function)
+            if part.default is MISSING and part.default_factory is MISSING
+        )
     parameters = inspect.signature(function).parameters.values()
     return tuple(p.name for p in parameters if p.default is p.empty)
 

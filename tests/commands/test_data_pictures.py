@@ -112,7 +112,7 @@ def test_nothing_seen_is_black_however_far_things_are(tmp_path):
 
 def test_ids_beyond_single_precision_stay_exact_the_whole_way(tmp_path, monkeypatch):
     """From the samples through tiles, pixels and the file: neighbours beyond 2^24 stay apart."""
-    from illumcli.render_graph import stages
+    from illumcli.render_graph import build
 
     def triangle_id(hits):
         return (hits.triangle + 2**24 + 1).astype(np.uint32)
@@ -126,7 +126,7 @@ def test_ids_beyond_single_precision_stay_exact_the_whole_way(tmp_path, monkeypa
         )
     )
     plain = read_image(tmp_path / "plain.exr").channels["triangleId.Y"]
-    monkeypatch.setattr(stages, "triangle_id", triangle_id)
+    monkeypatch.setattr(build, "triangle_id", triangle_id)
     for colour, only in names.items():
         path = tmp_path / f"{colour}.exr"
         render_scene(

@@ -13,8 +13,14 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import CornerVectors, place_meshes, polygon_centres
 from illumcli.geometry.transforms import rotation
-from illumcli.rays.corner_weights import CornerWeights, MeanCorners, concatenated, corner_weights
-from illumcli.rays.interaction import SurfaceInteraction, quadratic
+from illumcli.rays.corner_weights import (
+    CornerWeights,
+    MeanCorners,
+    TriangleCorners,
+    concatenated,
+    corner_weights,
+)
+from illumcli.rays.interaction import ShadingContext, SurfaceInteraction, quadratic
 
 F = np.float32
 TURNED = rotation(0, 33) @ rotation(1, 12) @ rotation(2, 71)
@@ -36,6 +42,10 @@ NAMED = {
     "pole": POLE,
     "straight": STRAIGHT,
 }
+
+
+def weights_at(geometry, planar, triangle, u, v):
+    return corner_weights(geometry, TriangleCorners(None, triangle, u, v), planar)
 
 
 def ring(radii, squeeze=1.0):
@@ -77,7 +87,7 @@ def at(points, seed=3, matrix=TURNED):
     found = planar_polygons(geometry)
     assert found is not None
     hits = anywhere(geometry, seed=seed)
-    return geometry, hits, corner_weights(geometry, found, *hits)
+    return geometry, hits, weights_at(geometry, found, *hits)
 
 
 convex = st.builds(
@@ -156,7 +166,7 @@ def test_values_are_linear_along_edges(points, seed):
             w = np.zeros((3, len(share)), F)
             w[k], w[(k + 1) % 3] = 1 - share, share
             which = np.full(len(share), triangle, np.int32)
-            along = corner_weights(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
+            along = weights_at(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
             wanted = (1 - share) * values[a] + share * values[b]
             np.testing.assert_allclose(along[:, 0], wanted, atol=2e-6)
 
@@ -181,8 +191,8 @@ def test_another_cut_gives_the_same_values(points, turn):
         other[inside], u2[inside], v2[inside] = number, own[0, inside], own[1, inside]
     kept = other >= 0
     assert kept.mean() > 0.9
-    one = corner_weights(worlds[0], planar_polygons(worlds[0]), triangle, u, v)
-    two = corner_weights(worlds[1], planar_polygons(worlds[1]), other[kept], u2[kept], v2[kept])
+    one = weights_at(worlds[0], planar_polygons(worlds[0]), triangle, u, v)
+    two = weights_at(worlds[1], planar_polygons(worlds[1]), other[kept], u2[kept], v2[kept])
     found = two.interpolate_vertices(worlds[1], np.roll(values, turn, axis=0))
     np.testing.assert_allclose(found, one.interpolate_vertices(worlds[0], values)[kept], atol=3e-5)
 
@@ -192,7 +202,7 @@ def test_parallelograms_and_trapezoids_have_exact_bilinear_coordinates(skew):
     corners = np.array([[0, 0], [1, 0], [1.2 + skew, 1], [0.2 - skew, 1 + skew / 2]])
     geometry = place_meshes([polygon(corners)], [np.eye(4)])
     triangle, u, v = anywhere(geometry)
-    found = dense(corner_weights(geometry, planar_polygons(geometry), triangle, u, v), geometry).astype(float)
+    found = dense(weights_at(geometry, planar_polygons(geometry), triangle, u, v), geometry).astype(float)
     s, t = found[:, 1] + found[:, 2], found[:, 2] + found[:, 3]
     wanted = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
     np.testing.assert_allclose(found, wanted, atol=3e-7)
@@ -223,7 +233,7 @@ def test_a_folded_quad_is_interpolated_by_triangles_and_agrees_at_its_edge():
         w = np.zeros((3, len(share)), F)
         w[where[0]], w[where[1]] = 1 - share, share
         which = np.full(len(share), triangle, np.int32)
-        along = corner_weights(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
+        along = weights_at(geometry, found, which, w[1], w[2]).interpolate_vertices(geometry, values)
         np.testing.assert_allclose(along[:, 0], (1 - share) * values[1] + share * values[2], atol=1e-6)
         seen[int(geometry.polygons[triangle])] += 1
     assert all(seen.values())
@@ -262,10 +272,10 @@ def test_triangles_keep_their_bits_beside_polygons():
     mesh = Mesh(vertices, np.array([0, 1, 2, 3, 1, 4, 2], np.int32), np.array([0, 4, 7], np.int32))
     geometry = place_meshes([mesh], [TURNED])
     hits = anywhere(geometry)
-    whole = corner_weights(geometry, planar_polygons(geometry), *hits).interpolate_vertices(
+    whole = weights_at(geometry, planar_polygons(geometry), *hits).interpolate_vertices(
         geometry, geometry.vertices
     )
-    by_triangles = corner_weights(geometry, None, *hits).interpolate_vertices(geometry, geometry.vertices)
+    by_triangles = weights_at(geometry, None, *hits).interpolate_vertices(geometry, geometry.vertices)
     alone = geometry.polygons[hits[0]] == 1
     assert alone.any()
     np.testing.assert_array_equal(whole[alone], by_triangles[alone])
@@ -275,7 +285,7 @@ def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
     meshes = [polygon(L_SHAPE), two_quads(), polygon(ARROW), polygon(ring(np.ones(9)))]
     geometry = place_meshes(meshes, [np.eye(4)] * 4)
     hits = anywhere(geometry, 1000)
-    whole = corner_weights(geometry, planar_polygons(geometry), *hits)
+    whole = weights_at(geometry, planar_polygons(geometry), *hits)
     values = np.random.default_rng(1).random((len(geometry.vertices), 3)).astype(F)
     all_of_them = whole.interpolate_vertices(geometry, values)
     half = [np.flatnonzero(hits[0] % 2 == rest) for rest in (0, 1)]
@@ -292,7 +302,7 @@ def test_the_mean_of_polygons_of_any_size():
     geometry = place_meshes([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
     centres = polygon_centres(geometry)
     group = MeanCorners(None, centres, np.array([0, 2, 1, 0], np.int32))
-    weights = CornerWeights(corner_weights(geometry, None, *anywhere(geometry, 4)).hits, (group,))
+    weights = CornerWeights(weights_at(geometry, None, *anywhere(geometry, 4)).hits, (group,))
     found = weights.interpolate_vertices(geometry, geometry.vertices)
     np.testing.assert_allclose(found, centres.position[[0, 2, 1, 0]], atol=1e-6)
 
@@ -312,11 +322,12 @@ def test_quadratic_normals_of_a_strip_are_those_of_its_edges_all_the_way_across(
         a, b, c = (geometry.vertices[geometry.triangles[0, k], :2].astype(float) for k in range(3))
         u, v = np.linalg.solve(np.stack([b - a, c - a], axis=1), (at - a).T)  # beyond the triangle too
         first = np.zeros(len(width), np.int32)
-        weights = corner_weights(geometry, planar_polygons(geometry), first, u.astype(F), v.astype(F))
+        weights = weights_at(geometry, planar_polygons(geometry), first, u.astype(F), v.astype(F))
         normals = CornerVectors(column_major(lean[None], F), np.zeros(4, np.int32))
         interact = SurfaceInteraction(
             at, column_major(np.tile([0, 0, 1], (21, 1)), F), np.ones(21, F), np.zeros(21, np.bool_)
         )
         bent = lean - (width * (1 - width) * 3 * 1.2)[:, None] * [1, 0, 0]
         wanted = bent / np.linalg.norm(bent, axis=1)[:, None]
-        np.testing.assert_allclose(quadratic(geometry, normals, weights, interact), wanted, atol=2e-6)
+        context = ShadingContext(geometry, weights, interact, normals)
+        np.testing.assert_allclose(quadratic(context), wanted, atol=2e-6)

@@ -12,7 +12,7 @@ from illumcli.geometry.shapes.cylinder import Cylinder
 from illumcli.geometry.shapes.plane import Plane
 from illumcli.geometry.shapes.sphere import Sphere
 from illumcli.geometry.transforms import rotation
-from illumcli.rays.corner_weights import corner_weights
+from illumcli.rays.corner_weights import TriangleCorners, corner_weights
 from illumcli.rays.interaction import rings, tangent, uv_tangents
 
 F = np.float32
@@ -33,7 +33,7 @@ def position(geometry, triangle, u, v):
 
 
 def along_u(geometry, triangle, u, v):
-    weights = corner_weights(geometry, None, triangle, u, v)
+    weights = corner_weights(geometry, TriangleCorners(None, triangle, u, v))
     return weights.interpolate(geometry, uv_tangents(geometry, scene_uvs(geometry)))
 
 

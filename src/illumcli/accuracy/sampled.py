@@ -17,10 +17,11 @@ from illumcli.graph import Node
 from illumcli.layers import Layer
 from illumcli.rays.sampling import stream
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import build, views
+from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import Run, at_pixels, bands
 from illumcli.render_graph.framing import placed
 from illumcli.render_graph.limits import refuse_rays
+from illumcli.render_graph.needs import views
 from illumcli.render_graph.schedule import Plan, outputs_of, schedule
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
@@ -38,6 +39,10 @@ class Sampling(Value):
     def rays(self) -> int:
         """Obscurance rays per pixel."""
         return self.pixel * self.obscurance
+
+
+OF_SAMPLING = ("obscurance_method",)
+"""Buffers that no tile changes and the sampling does."""
 
 
 class SampledLayer(Record):
@@ -64,7 +69,7 @@ class SampledLayer(Record):
     def _compute(self, nodes: Iterable[Node]) -> None:
         """Compute what is not shared yet."""
         for node in nodes:
-            if node.output not in self.shared:
+            if node.output not in self.shared or node.output in OF_SAMPLING:
                 self.shared[node.output] = node.run(self.shared)
 
     def planned(self, sampling: Sampling) -> Plan:

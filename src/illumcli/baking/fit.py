@@ -46,7 +46,7 @@ def fitted_to_surface(context: BakeContext) -> PointValues:
     per_point = min(RAYS_PER_POINT, settings.samples)
     count = len(vertices.points.key) * settings.samples // per_point
     area = area_points(context.surfaces, max(count, PARTS), settings.seed)
-    method = replace(context.method, samples=per_point, facets=None)
+    method = replace(context.method, samples=per_point, triangle_normals=None)
     sampler = BakeSampler(area, context.occluders, method, settings.seed, context.threads, context.progress)
     is_open = sampler.open_points()
     closed = np.flatnonzero(~is_open)

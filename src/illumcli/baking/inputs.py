@@ -20,10 +20,9 @@ from illumcli.baking.settings import AS_USUAL, BakeOptions, BakeSettings
 from illumcli.errors import InputError
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import CornerVectors
+from illumcli.geometry.scene_geometry import CornerVectors, corner_normals
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Record
-from illumcli.render_graph import stages
 from illumcli.render_graph.build import build
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs
@@ -119,7 +118,7 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
         buffers[node.output] = node.run(buffers)
     geometry, normals = buffers["geometry"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":
-        normals = stages.corner_normals(("flat",) * len(geometry.placed), buffers["meshes"], geometry)
+        normals = corner_normals(("flat",) * len(geometry.placed), buffers["meshes"], geometry)
     return Surfaces(geometry, normals), buffers["repairs"].repairs
 
 

@@ -143,7 +143,7 @@ class BakeSampler(Record):
             hemispheres = self.points.hemispheres(unit.points, draws[2])
             occluders = self.occluders[unit.object]
             tracer = occluders.tracer.counting(stop)
-            method = replace(self.method, samples=unit.samples, facets=occluders.normals)
+            method = replace(self.method, samples=unit.samples, triangle_normals=occluders.normals)
             return estimates(tracer, hemispheres, draws[:2], method, bent=bent), tracer.rays
 
         # units that an earlier run finished are copied from the journal

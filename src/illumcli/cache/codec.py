@@ -21,7 +21,7 @@ from illumcli.rays.interaction import Hits
 from illumcli.records import Record, Value
 from illumcli.render_space import RenderSpace
 from illumcli.shading.materials import Numbering
-from illumcli.shading.rates import Points, as_they_are
+from illumcli.shading.rates import Identity, ShadingPoints
 
 CLASSES = {
     cls.__name__: cls
@@ -71,18 +71,18 @@ def _pack_hits(hits: Hits, buffers: Mapping[str, Any]) -> NDArray[np.int32]:
     return np.stack([hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
 
 
-def _pack_points(points: Points, buffers: Mapping[str, Any]) -> NDArray[np.float32] | None:
-    if points.spread is not as_they_are:
+def _pack_points(points: ShadingPoints, buffers: Mapping[str, Any]) -> NDArray[np.float32] | None:
+    if not points.are_samples:
         return None
     return np.concatenate([points.position.T, points.n.T])
 
 
-def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> Points:
-    return Points(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, as_they_are)
+def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> ShadingPoints:
+    return ShadingPoints(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, Identity())
 
 
 def _pack_material(material: NDArray[np.int32], buffers: Mapping[str, Any]) -> NDArray[np.uint16] | None:
-    if buffers["points"].spread is not as_they_are or material.max(initial=0) >= 1 << 16:
+    if not buffers["points"].are_samples or material.max(initial=0) >= 1 << 16:
         return None
     return material[None].astype(np.uint16)
 

@@ -87,3 +87,15 @@ def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
     corners, first = transformed_vertices(mesh, matrix)[mesh.corners], mesh.starts[:-1]
     size = np.maximum.reduceat(corners, first, axis=0) - np.minimum.reduceat(corners, first, axis=0)
     return float(np.sqrt(np.square(size).sum(axis=1).max()))
+
+
+def implied_widths(
+    flat: Sequence[bool], meshes: Sequence[Mesh], object_bounds: ObjectBounds
+) -> NDArray[np.float64]:
+    """(O,) largest polygon diagonal of each object whose normals imply a smooth surface, else 0.
+
+    It bounds how far off its polygons an object's shadow rays start [scene units].
+    """
+    each = zip(flat, meshes, object_bounds.matrices, strict=True)
+    widths = [0.0 if is_flat else widest_polygon(mesh, matrix) for is_flat, mesh, matrix in each]
+    return np.array(widths, np.float64)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, column_major, take_rows
-from illumcli.geometry.bounds import object_bounds, transformed_vertices
+from illumcli.arrays import F, Vectors, column_major, cross, take_rows, unit
+from illumcli.geometry.bounds import ObjectBounds, object_bounds, transformed_vertices
 from illumcli.geometry.corner_normals import CornerNormals
+from illumcli.geometry.corner_normals import corner_normals as mesh_corner_normals
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.polygon_normals import polygon_normals as mesh_polygon_normals
 from illumcli.geometry.polygon_normals import reversed_polygons
-from illumcli.geometry.transforms import cofactors
+from illumcli.geometry.transforms import cofactors, transform_matrix
 from illumcli.geometry.triangulate import triangulate
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
@@ -99,13 +101,26 @@ def without_polygons(mesh: Mesh) -> Mesh:
     )
 
 
-def place_meshes(
-    meshes: Sequence[Mesh],
-    matrices: Sequence[NDArray[np.float64]],
-    render_space: RenderSpace | None = None,
-    by_file: Sequence[bool] | None = None,
+def without_culled(culled: Collection[int], meshes: Sequence[Mesh]) -> tuple[Mesh, ...]:
+    """The meshes, those of culled objects (by number) without their polygons."""
+    return tuple(without_polygons(mesh) if number in culled else mesh for number, mesh in enumerate(meshes))
+
+
+def bounds_of(transforms: Sequence[Any], meshes: Sequence[Mesh]) -> ObjectBounds:
+    """The bounds of mesh i under transform i (`scene.spec.Transform`)."""
+    each = zip(transforms, meshes, strict=True)
+    return object_bounds(meshes, [transform_matrix(transform, mesh) for transform, mesh in each])
+
+
+def place_meshes(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> SceneGeometry:
+    """The triangles of mesh i under matrix i, in the render space of them all; see `scene_geometry`."""
+    return scene_geometry([True] * len(meshes), meshes, object_bounds(meshes, matrices))
+
+
+def scene_geometry(
+    by_file: Sequence[bool], meshes: Sequence[Mesh], object_bounds: ObjectBounds
 ) -> SceneGeometry:
-    """The triangles of mesh i under matrix i, in render space.
+    """The triangles of all meshes, in render space.
 
     Triangles run counter-clockwise seen from outside: those of mirrored objects are turned round, and those
     of polygons that run clockwise about their file's normals. Transforms are applied in float64, before
@@ -113,12 +128,10 @@ def place_meshes(
 
     Parameters
     ----------
-    render_space : RenderSpace, optional
-        By default that of these meshes alone.
-    by_file : sequence of bool, optional
-        Of which objects the file's normals are used; by default of all.
+    by_file : sequence of bool
+        Of which objects the file's normals are used.
     """
-    render_space = render_space or object_bounds(meshes, matrices).render_space
+    render_space, matrices = object_bounds.render_space, object_bounds.matrices
     placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
     first_vertex = first_corner = first_polygon = first_triangle = 0
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
@@ -126,7 +139,7 @@ def place_meshes(
         cut = triangulate(mesh)
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
         oriented = cut.corners[:, ::-1] if mirrored else cut.corners
-        against = reversed_polygons(mesh) if by_file is None or by_file[number] else None
+        against = reversed_polygons(mesh) if by_file[number] else None
         if against is not None:
             oriented = np.where(against[cut.polygon][:, None], oriented[:, ::-1], oriented)
 
@@ -191,6 +204,55 @@ def scene_uvs(geometry: SceneGeometry) -> CornerVectors:
     return CornerVectors(
         column_major(_concatenated(values, np.zeros((0, 2))), F), _concatenated(index, np.zeros(0, np.int32))
     )
+
+
+def corner_normals(how: Sequence[Any], meshes: Sequence[Mesh], geometry: SceneGeometry) -> CornerVectors:
+    """Shading normals of every corner of the scene.
+
+    Parameters
+    ----------
+    how : sequence
+        Of each object: `flat` for its polygons' own, what its file's description says
+        (`scene.spec.Normals`), or None for the mesh's own.
+    """
+    # Objects that share a mesh share its normals.
+    known: dict[tuple[int, str, bool], CornerNormals] = {}
+    of_objects = []
+    for mesh, says, placed in zip(meshes, how, geometry.placed, strict=True):
+        key = (id(mesh), repr(says), placed.reversed is None)
+        if key not in known:
+            if says == "flat":
+                known[key] = mesh_corner_normals(mesh, crease=0.0, use_file=False, turned=placed.reversed)
+            elif says is not None:
+                known[key] = mesh_corner_normals(
+                    mesh, says.weights, says.crease, says.source == "file", says.polygon
+                )
+            else:
+                known[key] = mesh_corner_normals(mesh)
+        of_objects.append(known[key])
+    return scene_normals(geometry, of_objects)
+
+
+def polygon_normals(
+    methods: Sequence[Any], meshes: Sequence[Mesh], geometry: SceneGeometry
+) -> NDArray[np.float32]:
+    """(P, 3) unit normal of every polygon, in scene directions, by each object's method."""
+    parts = []
+    for mesh, method, placed in zip(meshes, methods, geometry.placed, strict=True):
+        transformed = mesh_polygon_normals(mesh, method) @ cofactors(placed.matrix[:3, :3]).T
+        size = np.linalg.norm(transformed, axis=1, keepdims=True)
+        sign: Any = -1 if placed.mirrored else 1
+        if placed.reversed is not None:
+            sign = np.where(placed.reversed, -sign, sign)[:, None]
+        zero = np.zeros_like(transformed)
+        parts.append(np.divide(sign * transformed, size, out=zero, where=size > 0))
+    return column_major(_concatenated(parts, np.zeros((0, 3))), F)
+
+
+def triangle_normals(geometry: SceneGeometry) -> Vectors:
+    """(T, 3) float32 unit normals of all triangles."""
+    a, b, c = triangle_corners(geometry.vertices, geometry.triangles)
+    return column_major(unit(cross(b - a, c - a)), F)
 
 
 def polygon_centres(geometry: SceneGeometry) -> PolygonCentres:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major
+from illumcli.geometry.bounds import ObjectBounds, take_used, transformed_vertices
+from illumcli.geometry.mesh import Mesh
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
@@ -69,6 +72,20 @@ def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
     return camera.model_copy(
         update={"position": _tuple(position), "target": _tuple(target), "fit": None, **changes}
     )
+
+
+Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], float | None]
+"""Position, target and, of orthographic cameras, extent."""
+
+
+def framed(
+    camera: Any, aspect: float, number: int, meshes: Sequence[Mesh], object_bounds: ObjectBounds
+) -> Placement:
+    """Where a camera stands whose picture the object of this number fills."""
+    mesh = meshes[number]
+    points = take_used(mesh, transformed_vertices(mesh, object_bounds.matrices[number]))
+    placed = framing(camera, aspect, points)
+    return placed.position, placed.target, getattr(placed, "extent", None)
 
 
 CLOSEST = 1e-3

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -269,25 +269,39 @@ def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
     return CornerWeights(TriangleCorners(None, triangle, u, v), tuple(groups))
 
 
-def corner_weights(
-    geometry: SceneGeometry, planar: PlanarPolygons | None, triangle: Ids, u: Floats, v: Floats
-) -> CornerWeights:
-    """The weights at M hits.
+class OnTriangles(Protocol):
+    """Points on triangles by barycentric weights: hits, shading points."""
 
-    Parameters
-    ----------
-    planar : PlanarPolygons, optional
-        None: interpolate by triangles.
-    triangle : (M,) int32
-    u, v : (M,) float32
-        Barycentric weights of the triangle's corners 1 and 2.
-    """
-    hits = TriangleCorners(None, triangle, u, v)
+    @property
+    def triangle(self) -> Ids:
+        """(M,) int32."""
+
+    @property
+    def u(self) -> Floats:
+        """(M,) float32 weight of corner 1."""
+
+    @property
+    def v(self) -> Floats:
+        """(M,) float32 weight of corner 2."""
+
+
+def corner_weights(
+    geometry: SceneGeometry, hits: OnTriangles, planar_polygons: PlanarPolygons | None = None
+) -> CornerWeights:
+    """The weights at M hits: over planar polygons where these are given, else over triangles alone."""
+    triangle, u, v = hits.triangle, hits.u, hits.v
+    by_triangle = TriangleCorners(None, triangle, u, v)
+    planar = planar_polygons
     if planar is None:
-        return CornerWeights(hits, (hits,))
+        return CornerWeights(by_triangle, (by_triangle,))
+
+    # Hits on polygons that are not planar keep barycentric weights.
     row = planar.row.take(triangle)
     alone = np.flatnonzero(row < 0).astype(np.int32)
     groups: list[Corners] = [TriangleCorners(alone, triangle.take(alone), u.take(alone), v.take(alone))]
+
+    # The others are grouped by the number of corners: quads (0) by bilinear, larger polygons by mean value
+    # coordinates.
     padded = planar.padded.take(row)
     padded[alone] = -1
     for size in np.flatnonzero(np.bincount(planar.padded)):
@@ -303,7 +317,7 @@ def corner_weights(
         outside = np.any(weights < BELOW, axis=0)
         groups.append(PolygonCorners(lane, planar, polygon, last, weights, outside))
     some = tuple(group for group in groups if group.lane is not None and group.lane.size)
-    return CornerWeights(hits, some or tuple(groups[:1]))
+    return CornerWeights(by_triangle, some or tuple(groups[:1]))
 
 
 def _in_plane(

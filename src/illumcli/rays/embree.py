@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, repeat_rows
 from illumcli.errors import IllumError
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.embree_upload import upload
 from illumcli.records import Record
 
@@ -176,6 +177,6 @@ def _checked(origins: Vectors, directions: Vectors) -> int:
     return count // starts if starts else 1
 
 
-def tracer(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> Tracer:
-    """The ray core over these triangles, built and ready for threads."""
-    return Tracer(vertices, triangles)
+def tracer(geometry: SceneGeometry) -> Tracer:
+    """The ray core over the triangles of a scene."""
+    return Tracer(geometry.vertices, geometry.triangles)

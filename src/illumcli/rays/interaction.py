@@ -1,9 +1,9 @@
-"""Hits to what shading asks of them: position, facet, view, normal, depth, uv, tangent."""
+"""Hits to what shading asks of them: position, planes, normals, uv, tangents, ids."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,12 @@ from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, l
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.transforms import cofactors
+from illumcli.rays.camera import Rays
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
-from illumcli.rays.embree import Closest
+from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import effective_edge
 from illumcli.records import Record
+from illumcli.render_space import RenderSpace
 
 
 class Hits(Record):
@@ -27,8 +29,9 @@ class Hits(Record):
     v: Floats  # (M,) float32 weight of corner 2
 
 
-def seen(closest: Closest) -> Hits:
-    """The hits among `closest`, packed."""
+def hits(tracer: Tracer, rays: Rays) -> Hits:
+    """The samples whose rays hit a triangle, and where."""
+    closest = tracer.closest(rays.origins, rays.directions)
     sample = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
     return Hits(sample, *(getattr(closest, name).take(sample) for name in ("triangle", "u", "v")))
 
@@ -40,6 +43,12 @@ class SurfaceInteraction(Record):
     ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
     edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
     back_facing: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
+
+
+def interaction(geometry: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
+    """Positions and planes of the hits, seen along their rays."""
+    towards_eye = -take_rows(rays.directions, hits.sample)
+    return interact(geometry, hits.triangle, hits.u, hits.v, towards_eye)
 
 
 def interact(
@@ -65,6 +74,25 @@ def interact(
     return SurfaceInteraction(position, column_major(normal, F), effective_edge(edge, area), back_facing)
 
 
+class ShadingContext(Record):
+    """The surface at M hits, as interpolation needs it."""
+
+    geometry: SceneGeometry
+    weights: CornerWeights
+    interaction: SurfaceInteraction
+    normals: CornerVectors | None = None
+    """Shading normals at corners; None where every object is flat."""
+
+    def take(self, index: NDArray[Any]) -> ShadingContext:
+        """The context of some of the hits, which ascend."""
+        if len(index) == len(self.weights):
+            return self
+        interaction = SurfaceInteraction(
+            *(take_rows(values, index) for values in vars(self.interaction).values())
+        )
+        return ShadingContext(self.geometry, self.weights.take(index), interaction, self.normals)
+
+
 def facing(n: Vectors, back_facing: NDArray[np.bool_]) -> Vectors:
     """`n`, turned over where the eye sees the back."""
     return n * (1 - 2 * back_facing.astype(n.dtype))[:, None]
@@ -76,31 +104,33 @@ def corner_rows(geometry: SceneGeometry, triangle: Ids, table: CornerVectors) ->
     return a, b, c
 
 
-def polygon_facing(triangle: Ids, interaction: SurfaceInteraction, planar: PlanarPolygons | None) -> Vectors:
+def geometric_normal(
+    hits: Hits, interaction: SurfaceInteraction, planar_polygons: PlanarPolygons | None = None
+) -> Vectors:
     """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
 
-    Of a planar polygon Newell's, of others the triangle's. Rays keep to the triangle's, which they leave.
+    Newell's normal of a planar polygon, else the triangle's. Rays keep to the triangle's, which they leave.
     """
-    row = np.zeros(0, np.int32) if planar is None else planar.row.take(triangle)
-    own = np.flatnonzero(row >= 0)
-    if planar is None or not own.size:
+    row = np.zeros(0, np.int32) if planar_polygons is None else planar_polygons.row.take(hits.triangle)
+    planar = np.flatnonzero(row >= 0)
+    if planar_polygons is None or not planar.size:
         return interaction.ng
-    normal, ng = take_rows(planar.normal, row.take(own)), take_rows(interaction.ng, own)
+    normal, ng = take_rows(planar_polygons.normal, row.take(planar)), take_rows(interaction.ng, planar)
     out = interaction.ng.copy(order="F")
-    out[own] = facing(normal, dot(normal, ng) < 0)
+    out[planar] = facing(normal, dot(normal, ng) < 0)
     return out
 
 
-def interpolated(
-    geometry: SceneGeometry, normals: CornerVectors, weights: CornerWeights, interaction: SurfaceInteraction
-) -> Vectors:
+def interpolated(context: ShadingContext) -> Vectors:
     """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
 
     The facet's own where the interpolated one vanishes. On the side the eye sees.
     """
-    n = unit(weights.interpolate(geometry, normals))
-    n = facing(n, interaction.back_facing)
-    return with_facet(n, interaction.ng)
+    interaction = context.interaction
+    if context.normals is None:
+        return interaction.ng
+    n = unit(context.weights.interpolate(context.geometry, context.normals))
+    return with_facet(facing(n, interaction.back_facing), interaction.ng)
 
 
 def with_facet(n: Vectors, ng: Vectors) -> Vectors:
@@ -111,9 +141,7 @@ def with_facet(n: Vectors, ng: Vectors) -> Vectors:
     return n
 
 
-def quadratic(
-    geometry: SceneGeometry, normals: CornerVectors, weights: CornerWeights, interaction: SurfaceInteraction
-) -> Vectors:
+def quadratic(context: ShadingContext) -> Vectors:
     """(M, 3) unit normal, quadratic along every edge.
 
     Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
@@ -127,6 +155,10 @@ def quadratic(
     ----------
     van Overveld, C. W. A. M. and Wyvill, B. (1997). Phong normal interpolation revisited. ACM TOG 16(4).
     """
+    geometry, weights, interaction = context.geometry, context.weights, context.interaction
+    normals = context.normals
+    if normals is None:
+        return interaction.ng
     n = column_major(weights.interpolate(geometry, normals))
     for group in weights.groups:
 
@@ -176,7 +208,12 @@ def bend(
         last = following
 
 
-def uv(geometry: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
+def uv(geometry: SceneGeometry, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
+    """(M, 2) texture coordinates, linear on every triangle; 0 where a mesh has none."""
+    return _with_all(geometry, uvs, TriangleCorners(None, hits.triangle, hits.u, hits.v))
+
+
+def uv_at(geometry: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
     """(M, 2) texture coordinates; 0 where a mesh has none.
 
     Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
@@ -237,6 +274,21 @@ def _along_u(
     e1, e2 = points[1] - points[0], points[2] - points[0]
     way: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
     return unit(way) * hand[:, None], hand.astype(np.int64) + 1
+
+
+def world_position(render_space: RenderSpace, interaction: SurfaceInteraction) -> Vectors:
+    """(M, 3) float32 position [scene units]."""
+    return column_major(render_space.to_world(interaction.position), F)
+
+
+def object_id(geometry: SceneGeometry, hits: Hits) -> NDArray[np.uint32]:
+    """(M,) number of the object, from 1."""
+    return (geometry.objects.take(hits.triangle) + 1).astype(np.uint32)
+
+
+def triangle_id(hits: Hits) -> NDArray[np.uint32]:
+    """(M,) number of the triangle, from 1."""
+    return (hits.triangle + 1).astype(np.uint32)
 
 
 def rings(

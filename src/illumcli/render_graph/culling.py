@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.geometry.bounds import ObjectBounds
+from illumcli.geometry.scene_geometry import without_culled
 from illumcli.graph import Node
 from illumcli.layers import Layer
 from illumcli.records import Record
-from illumcli.render_graph import stages
-from illumcli.render_graph.build import SMOOTH, Graph, active_lights, rates
+from illumcli.render_graph.build import Graph
 from illumcli.render_graph.execute import Run
 from illumcli.render_graph.known import with_known
+from illumcli.render_graph.needs import active_lights, is_smooth
 from illumcli.render_graph.schedule import reached
 from illumcli.scene.spec import Obscurance
 from illumcli.visibility.culling import Boxes, SecondaryRays, culled_objects, frustum
@@ -63,7 +64,7 @@ def find_bounds(
     # normals matter only if a box alone would be culled and shadow rays start from the smooth surface
     scene = graph.scene
     shadowed = any(name.startswith("shadow:") for name in reached(graph, outputs))
-    smooth = scene.terminator == "smooth" and set(rates(scene)) & set(SMOOTH)
+    smooth = scene.terminator == "smooth" and is_smooth(scene)
     if shadowed and smooth and unaffecting(graph, outputs, bounds):
         graph = with_known(graph, "implied_widths", run, only_cached)
         if "implied_widths" not in graph.known:
@@ -108,7 +109,7 @@ def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
         return graph
     nodes = dict(graph.nodes)
     nodes["every_mesh"] = replace(nodes["meshes"], output="every_mesh", kind="meshes")
-    nodes["meshes"] = Node.of(partial(stages.left, numbers), "meshes", meshes="every_mesh")
+    nodes["meshes"] = Node.of(partial(without_culled, numbers), "meshes", meshes="every_mesh")
     for name, node in nodes.items():
         if name in ("object_bounds", "implied_widths") or name.startswith("camera:"):
             nodes[name] = replace(node, inputs={**node.inputs, "meshes": "every_mesh"})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,7 @@ import numpy as np
 from illumcli.cache.codec import codec_of
 from illumcli.film.view import View
 from illumcli.layers import Layer
-from illumcli.lights._base import Light
-from illumcli.records import Value
-from illumcli.render_graph.build import Graph, active_lights, is_ambient, is_baked, is_emissive
+from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import why_all
 from illumcli.render_graph.replicates import AGAIN, doubled_count
 from illumcli.render_graph.schedule import Plan, reached
@@ -21,53 +19,6 @@ from illumcli.scene.spec import Scene
 
 CULLED = "no view sees it, and it shadows and obscures nothing that one sees"
 CACHED = "all that needs it is at hand"
-SHADOW = ("shadow", "shadow_candidates")
-OBSCURANCE = ("obscurance", "obscurance_draws")
-AMBIENT = ("ambient", "ambient_color", *OBSCURANCE)
-
-
-class Unused(Value):
-    """A buffer that is not computed: its name, its parts before and after a colon, and what is."""
-
-    name: str
-    kind: str
-    light: str
-    scene: Scene
-    active: Mapping[str, Light]
-    """The lights that send anything."""
-    computed: set[str]
-
-
-Rule = tuple[Callable[[Unused], Any], str]
-RULES: tuple[Rule, ...] = (
-    (
-        lambda unused: unused.light and unused.light not in unused.active,
-        "the light's intensity is 0",
-    ),
-    (
-        lambda unused: unused.kind in SHADOW and unused.light and not unused.active[unused.light].shadows,
-        "the light casts no shadows",
-    ),
-    (
-        lambda unused: unused.name == "obscurance_draws" and any(is_baked(unused.scene)),
-        "the obscurance is baked",
-    ),
-    (
-        lambda unused: unused.kind in OBSCURANCE and unused.scene.obscurance is None,
-        "the scene has no obscurance: w = 1",
-    ),
-    (
-        lambda unused: unused.kind == "obscurance_normals" and "obscurance_draws" in unused.computed,
-        "the hemispheres of obscurance stand about the polygons' own normals",
-    ),
-    (
-        lambda unused: unused.kind in AMBIENT and not is_ambient(unused.scene),
-        "no ambient light leaves any surface",
-    ),
-    (lambda unused: unused.kind == "emission" and not is_emissive(unused.scene), "no material emits"),
-    (lambda unused: True, "no layer asked for reaches it"),
-)
-"""The first one that holds says why a buffer is not computed."""
 
 
 def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) -> dict[str, str]:
@@ -78,20 +29,18 @@ def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) ->
     plan : Plan, optional
         Of one view, in which cached buffers are loaded.
     """
-    scene, order = graph.scene, reached(graph, outputs)
-    computed, active = set(order), active_lights(scene)
+    order = reached(graph, outputs)
+    computed = set(order)
     reasons = {}
     for name in graph.nodes:
-        kind, _, rest = name.partition(":")
-        if name in computed or name.startswith(AGAIN) or kind == "camera":
+        if name in computed or name.startswith((AGAIN, "camera:")):  # cameras are placed before
             continue
         if graph.culled and name in ("implied_widths", "every_mesh"):  # computed before anything was culled
             continue
-        unused = Unused(name, kind, rest if kind != "mesh" else "", scene, active, computed)
-        reasons[name] = next(reason for holds, reason in RULES if holds(unused))
+        reasons[name] = graph.why_not(name)
     if "error" in computed and f"{AGAIN}samples" not in computed:
         reasons[f"{AGAIN}beauty"] = "nothing in the picture is random: its error is 0"
-    names = scene.object_names()
+    names = graph.scene.object_names()
     reasons |= {f"object:{names[number]}": CULLED for number in graph.culled}
     if plan is not None:
         skipped = (name for name in order if name not in plan.buffers and name not in graph.known)

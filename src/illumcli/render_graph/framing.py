@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from illumcli.film.view import View
+from illumcli.rays.camera import Placement
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.execute import Run
 from illumcli.render_graph.known import with_known
-from illumcli.render_graph.stages import Placement
 
 
 def place_cameras(graph: Graph, run: Run, only_cached: bool = False) -> Graph:

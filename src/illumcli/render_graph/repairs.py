@@ -7,7 +7,7 @@ from typing import Any
 
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, Repairs
-from illumcli.render_graph.build import PURPOSES
+from illumcli.render_graph.build_materials import PURPOSES
 
 _TELLING = (
     "repairs",

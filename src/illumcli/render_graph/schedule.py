@@ -10,9 +10,10 @@ from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import Layer
 from illumcli.records import Value
-from illumcli.render_graph.build import GIVEN, SHAPE, Graph, layers, views
+from illumcli.render_graph.build import GIVEN, SHAPE, Graph
 from illumcli.render_graph.cached import Lookup
 from illumcli.render_graph.keys import Keys, code
+from illumcli.render_graph.needs import layers, views
 from illumcli.render_graph.replicates import BLOCK
 from illumcli.scene.spec import Scene
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, take_or_all, take_rows
+from illumcli.arrays import F, Floats, Ids, Vectors, dot, take_or_all, take_rows
 from illumcli.lights._incident import LitPoints
-from illumcli.models._base import IlluminationModel
+from illumcli.rays.interaction import Hits
+from illumcli.shading.rates import ShadingPoints
 from illumcli.shading.terms import evaluate, words
-from illumcli.shading.textures import Parameters
+from illumcli.shading.textures import PointMaterials
 
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
@@ -30,37 +31,56 @@ def pick(values: NDArray[Any], lanes: Ids | slice) -> NDArray[Any]:
     return values if isinstance(lanes, slice) else take_rows(values, lanes)
 
 
-def response(
-    models: Sequence[IlluminationModel],
-    lobes: Sequence[Mapping[str, Any]],
-    material: Ids,
-    incident: LitPoints,
+def direct(
     color: tuple[float, float, float],
-    given: Mapping[str, Vectors],
-    parameters: Parameters | None = None,
+    materials: PointMaterials,
+    points: ShadingPoints,
+    incident: LitPoints,
+    v: Vectors | None = None,
+    t: Vectors | None = None,
 ) -> dict[str, Vectors]:
-    """Light leaving towards the eye at every point, per lobe, shadows not yet applied.
+    """One light's response per lobe at the M samples, its shadow not applied.
 
     Parameters
     ----------
-    models, lobes : sequences
-        By material number; a material without lobes is not evaluated.
-    material : (E,) int32
-        Of each point.
-    incident : Lit
-        The points the light reaches.
     color : (3,)
         Intensity or irradiance of the light.
+    v, t : (E, 3) float32, optional
+        Unit vectors to the eye and tangents, where some model asks for them.
+
+    Returns
+    -------
+    dict
+        `diffuse` and `specular`, (M, 3) float32, only lobes that some material has.
+    """
+    known = {"n": points.n, "v": v, "t": t}
+    given = {word: values for word, values in known.items() if values is not None}
+    at_points = response(materials, incident, color, given)
+    return {name: points.to_samples(value) for name, value in at_points.items()}
+
+
+def response(
+    materials: PointMaterials,
+    incident: LitPoints,
+    color: tuple[float, float, float],
+    given: Mapping[str, Vectors],
+) -> dict[str, Vectors]:
+    """Light leaving towards the eye at every point, per lobe, shadows not yet applied.
+
+    A material without lobes is not evaluated.
+
+    Parameters
+    ----------
     given : mapping
         (E, 3) words of the models at all points: `n`, and `v`, `t` where some model wants them.
-    parameters : Parameters, optional
-        What varies over the surface, at all points.
 
     Returns
     -------
     dict
         `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
     """
+    models, lobes = materials.materials.models, materials.materials.lobes
+    material, parameters = materials.number, materials.parameters
     names = sorted({name for each in lobes for name in each})
     count = len(incident.index)
     made = {name: np.zeros((3, count + 1), F) for name in names}  # by material; the last is of unlit points
@@ -89,3 +109,48 @@ def response(
         first = last
     # gathered: to scatter them takes four times as long
     return {name: take_rows(columns.T, place) for name, columns in made.items()}
+
+
+def sum_lobes(hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
+    """(M, 3) one light: all its lobes, with its shadow."""
+    return _shadowed(add(hits, **direct), shadow)
+
+
+def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
+    """(M, 3) one lobe of one light, with its shadow."""
+    return _shadowed(direct[name] if name in direct else black(hits), shadow)
+
+
+def irradiance(
+    color: tuple[float, float, float],
+    points: ShadingPoints,
+    incident: LitPoints,
+    shadow: Floats | None = None,
+) -> Vectors:
+    """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
+    out = np.zeros((incident.count, 3), F, order="F")
+    cosine = dot(take_rows(points.n, incident.index), incident.l)
+    out[incident.index] = (incident.irradiance_scale * cosine)[:, None] * np.asarray(color, F)
+    return _shadowed(points.to_samples(out), shadow)
+
+
+def add(hits: Hits, **parts: Vectors) -> Vectors:
+    """(M, 3) the sum of the parts, in their order."""
+    if not parts:
+        return black(hits)
+    first, *others = parts.values()
+    if not others:
+        return first
+    out = first + others[0]
+    for part in others[1:]:
+        out += part
+    return out
+
+
+def black(hits: Hits) -> Vectors:
+    """(M, 3) no light."""
+    return np.zeros((len(hits.sample), 3), F, order="F")
+
+
+def _shadowed(value: Vectors, shadow: Floats | None) -> Vectors:
+    return value if shadow is None else value * shadow[:, None]

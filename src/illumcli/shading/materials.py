@@ -16,6 +16,7 @@ from illumcli.geometry.repairs import Repairs, joined, located, path_of
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import VertexValues
+from illumcli.rays.corner_weights import OnTriangles
 from illumcli.records import Record, Value
 
 Token: TypeAlias = tuple[str, ...]
@@ -38,6 +39,16 @@ class Numbering(Record):
         if self.of_triangle is not None:
             return self.of_triangle.take(triangle)
         return self.of_object.take(geometry.objects.take(triangle))
+
+
+def material(geometry: SceneGeometry, numbering: Numbering, points: OnTriangles) -> Ids:
+    """(E,) material number at every point."""
+    return numbering.number(geometry, points.triangle)
+
+
+def material_id(geometry: SceneGeometry, numbering: Numbering, hits: OnTriangles) -> NDArray[np.uint32]:
+    """(M,) number of the material of every hit, from 1."""
+    return (numbering.number(geometry, hits.triangle) + 1).astype(np.uint32)
 
 
 class Choice(Value):
@@ -67,7 +78,7 @@ class Choice(Value):
         return "colors", *token
 
 
-def numbering(geometry: SceneGeometry, choices: Sequence[Choice], named: Collection[str]) -> Numbering:
+def numbering(choices: Sequence[Choice], named: Collection[str], geometry: SceneGeometry) -> Numbering:
     """Numbers the materials of all objects.
 
     Parameters

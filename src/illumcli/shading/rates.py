@@ -4,18 +4,20 @@ constant   once per polygon seen, with the polygon's own normal
 gouraud    once per vertex seen, intensities interpolated (Gouraud 1971)
 phong      once per sample, normals interpolated linearly (Phong 1975)
 quadratic  once per sample, normals interpolated quadratically (van Overveld and Wyvill 1997)
+
+`RATES`, at the end, has a row for each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, column_major, take_rows
-from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, take_rows, unit
+from illumcli.geometry.scene_geometry import PolygonCentres
 from illumcli.rays.corner_weights import (
     Corners,
     CornerWeights,
@@ -23,207 +25,269 @@ from illumcli.rays.corner_weights import (
     TriangleCorners,
     concatenated,
 )
-from illumcli.rays.interaction import SurfaceInteraction, facing, interpolated, quadratic
-from illumcli.records import Record
+from illumcli.rays.interaction import ShadingContext, facing, interpolated, quadratic
+from illumcli.records import Record, Value
 
-RATES = ("constant", "gouraud", "phong", "quadratic")
-AT_SAMPLES = frozenset({"phong", "quadratic"})
-"""Rates that evaluate the model at every sample."""
+Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
+"""Names of the shading rates, the keys of `RATES`."""
 
 
-class Points(Record):
-    """Where models are evaluated, E points on triangles, and how values return to the M samples seen."""
+class Identity(Record):
+    """Point i is sample i."""
+
+    def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values
+
+
+class Gather(Record):
+    """Each sample takes the value of one point."""
+
+    point: NDArray[np.intp]  # (M,)
+
+    def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
+        return take_rows(values, self.point)
+
+
+class Barycentric(Record):
+    """Each sample takes the mean of the points at its polygon's corners, by their weights."""
+
+    weights: CornerWeights
+    first: Mapping[Corners, NDArray[np.int64]]  # group -> (m,) the point of each hit's corner 0
+    step: Mapping[Corners, int]  # group -> how many points further that of the next corner is
+
+    def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
+        return self.weights.joined(
+            lambda group, k: take_rows(values, self.first[group] + k * self.step[group])
+        )
+
+
+class Mixed(Record):
+    """Groups of samples whose points follow each other, each with its own way back."""
+
+    groups: tuple[NDArray[np.intp], ...]  # samples
+    sizes: tuple[int, ...]  # points
+    parts: tuple[ToSamples, ...]
+
+    def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
+        count = sum(len(group) for group in self.groups)
+        out = np.empty((count, *values.shape[1:]), values.dtype, order="F")
+        first = 0
+        for group, size, part in zip(self.groups, self.sizes, self.parts, strict=True):
+            out[group] = part(values[first : first + size])
+            first += size
+        return out
+
+
+ToSamples: TypeAlias = Identity | Gather | Barycentric | Mixed
+"""(E, k) values at points to (M, k) values at samples."""
+
+
+class ShadingPoints(Record):
+    """Where models are evaluated: E points on triangles, and how values return to the M samples seen."""
 
     triangle: Ids  # (E,)
     u: Floats  # (E,)
     v: Floats  # (E,)
     position: Vectors  # (E, 3) float32, in radii
     n: Vectors  # (E, 3) float32 unit shading normal on the side the eye sees
-    spread: Callable[[NDArray[Any]], NDArray[Any]]
-    """(E, k) values at the points to (M, k) values at the samples."""
+    to_samples: ToSamples
     weights: CornerWeights | None = None
     """Of the corners around each point; None where the points are the samples."""
 
     def __len__(self) -> int:
         return len(self.triangle)
 
-
-def sample_normals(
-    geometry: SceneGeometry,
-    weights: CornerWeights,
-    interaction: SurfaceInteraction,
-    rates: Sequence[str],
-    normals: CornerVectors,
-) -> Vectors:
-    """(M, 3) the interpolated shading normal of every sample, where object i is shaded at ``rates[i]``: of
-    `gouraud` the linear one, of `constant` the facet's own."""
-    rate = np.array([RATES.index(name) for name in rates], np.int8)
-    return _sample_normals(
-        geometry, weights, interaction, rate.take(geometry.objects.take(weights.hits.triangle)), normals
-    )
+    @property
+    def are_samples(self) -> bool:
+        """Is point i sample i?"""
+        return isinstance(self.to_samples, Identity)
 
 
 def points(
-    geometry: SceneGeometry,
-    weights: CornerWeights,
-    interaction: SurfaceInteraction,
-    rates: Sequence[str],
-    normals: CornerVectors | None = None,
+    rates: Sequence[Rate],
+    shading_context: ShadingContext,
     centres: PolygonCentres | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
-) -> Points:
+) -> ShadingPoints:
     """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``.
 
     Where every object is shaded at the samples, point i is sample i, whatever the mixture of rates.
+
+    Parameters
+    ----------
+    centres, polygon_normals : PolygonCentres, (P, 3) float32, optional
+        Given where some object is shaded once per polygon.
     """
-    if len(set(rates)) == 1 and rates[0] in _POINTS:
-        return _POINTS[rates[0]](geometry, weights, interaction, normals, centres, polygon_normals)
-    rate = np.array([RATES.index(name) for name in rates], np.int8)
-    of_sample = rate.take(geometry.objects.take(weights.hits.triangle))
-    if AT_SAMPLES.issuperset(rates):
-        return _samples(
-            weights, interaction, _sample_normals(geometry, weights, interaction, of_sample, normals)
-        )
+    # One rate for all objects, or several that all evaluate at the samples: no groups.
+    context = shading_context
+    if len(set(rates)) == 1 and (own_points := RATES[rates[0]].points) is not None:
+        return own_points(context, centres, polygon_normals)
+    of_sample = _rate_of_samples(rates, context)
+    if all(RATES[name].at_samples for name in rates):
+        return _samples(context, _sample_normals(context, of_sample))
 
     # Split the samples: one group per rate with points of its own, and one for all that are shaded in place.
     groups, parts = [], []
-    in_place = np.isin(of_sample, [RATES.index(name) for name in AT_SAMPLES])
-    for name in (*_POINTS, None):
-        group = np.flatnonzero(in_place if name is None else of_sample == RATES.index(name))
-        if not group.size:
-            continue
-        some = weights.take(group)
-        own = SurfaceInteraction(*(take_rows(values, group) for values in vars(interaction).values()))
+    for number, rate in enumerate(RATES.values()):
+        group = np.flatnonzero(of_sample == number)
+        if rate.points is not None and group.size:
+            groups.append(group)
+            parts.append(rate.points(context.take(group), centres, polygon_normals))
+    in_place = np.array([rate.at_samples for rate in RATES.values()]).take(of_sample)
+    if (group := np.flatnonzero(in_place)).size:
+        n = _sample_normals(context.take(group), of_sample.take(group))
         groups.append(group)
-        if name is None:
-            n = _sample_normals(geometry, some, own, of_sample.take(group), normals)
-            parts.append(_samples(some, own, n))
-        else:
-            parts.append(_POINTS[name](geometry, some, own, normals, centres, polygon_normals))
+        parts.append(_samples(context.take(group), n))
     if not parts:
-        return _samples(weights, interaction, interaction.ng)
+        return _samples(context, context.interaction.ng)
 
     # Join the groups' points; a value returns to its samples through its own group.
-    def spread(values: NDArray[Any]) -> NDArray[Any]:
-        out = np.empty((len(weights), *values.shape[1:]), values.dtype, order="F")
-        first = 0
-        for group, part in zip(groups, parts, strict=True):
-            out[group] = part.spread(values[first : first + len(part)])
-            first += len(part)
-        return out
-
+    to_samples = Mixed(tuple(groups), tuple(map(len, parts)), tuple(part.to_samples for part in parts))
     joined = {
         name: column_major(np.concatenate([getattr(part, name) for part in parts]))
         for name in ("triangle", "u", "v", "position", "n")
     }
-    own_weights = [
-        weights.take(group) if part.weights is None else part.weights
+    weights = [
+        context.weights.take(group) if part.weights is None else part.weights
         for group, part in zip(groups, parts, strict=True)
     ]
-    return Points(**joined, spread=spread, weights=concatenated(own_weights))
+    return ShadingPoints(**joined, to_samples=to_samples, weights=concatenated(weights))
 
 
-def _samples(weights: CornerWeights, interaction: SurfaceInteraction, n: Vectors) -> Points:
-    hits = weights.hits
-    return Points(hits.triangle, hits.u, hits.v, column_major(interaction.position, F), n, as_they_are)
+def point_weights(points: ShadingPoints, corner_weights: CornerWeights) -> CornerWeights:
+    """The weights of the corners around each shading point."""
+    return corner_weights if points.weights is None else points.weights
 
 
-def as_they_are(values: NDArray[Any]) -> NDArray[Any]:
-    """The values at the points, where these are the samples."""
-    return values
+def normal(points: ShadingPoints) -> Vectors:
+    """(M, 3) unit shading normal of every sample, on the side the eye sees."""
+    return unit(points.to_samples(points.n))
 
 
-def _sample_normals(
-    geometry: SceneGeometry,
-    weights: CornerWeights,
-    interaction: SurfaceInteraction,
-    of_sample: NDArray[np.int8],
-    normals: CornerVectors | None,
-) -> Vectors:
-    """(M, 3) shading normal of every sample, by the rate of its object; see `sample_normals`."""
-    if normals is None:
-        return interaction.ng
-    bent = of_sample == RATES.index("quadratic")
-    flat = of_sample == RATES.index("constant")
-    parts = [(np.flatnonzero(bent), quadratic), (np.flatnonzero(~bent & ~flat), interpolated)]
-    out = interaction.ng.copy(order="F")
-    for group, normal in parts:
+def obscurance_normals(rates: Sequence[Rate], shading_context: ShadingContext) -> Vectors:
+    """(M, 3) the interpolated shading normal of every sample, what the hemisphere of obscurance stands about.
+
+    Where object i is shaded at ``rates[i]``: of `gouraud` the linear one, of `constant` the triangle's own.
+    """
+    return _sample_normals(shading_context, _rate_of_samples(rates, shading_context))
+
+
+def _rate_of_samples(rates: Sequence[Rate], context: ShadingContext) -> NDArray[np.int8]:
+    """(M,) row number of the rate that each sample's object is shaded at."""
+    number = np.array([list(RATES).index(name) for name in rates], np.int8)
+    return number.take(context.geometry.objects.take(context.weights.hits.triangle))
+
+
+def _sample_normals(context: ShadingContext, of_sample: NDArray[np.int8]) -> Vectors:
+    """(M, 3) shading normal of every sample, by the rate of its object."""
+    by_function: dict[Normals, list[int]] = {}
+    for number, rate in enumerate(RATES.values()):
+        by_function.setdefault(rate.normals, []).append(number)
+    out = context.interaction.ng.copy(order="F")
+    for normals, numbers in by_function.items():
+        group = np.flatnonzero(np.isin(of_sample, numbers))
         if group.size == len(of_sample):
-            return normal(geometry, normals, weights, interaction)
+            return normals(context)
         if group.size:
-            own = SurfaceInteraction(*(take_rows(values, group) for values in vars(interaction).values()))
-            out[group] = normal(geometry, normals, weights.take(group), own)
+            out[group] = normals(context.take(group))
     return out
 
 
+def _samples(context: ShadingContext, n: Vectors) -> ShadingPoints:
+    """The samples themselves."""
+    hits = context.weights.hits
+    position = column_major(context.interaction.position, F)
+    return ShadingPoints(hits.triangle, hits.u, hits.v, position, n, Identity())
+
+
 def _constant(
-    geometry: SceneGeometry,
-    weights: CornerWeights,
-    interaction: SurfaceInteraction,
-    normals: Any,
-    centres: PolygonCentres,
-    polygon_normals: Any,
-) -> Points:
+    context: ShadingContext, centres: PolygonCentres | None, polygon_normals: NDArray[np.float32] | None
+) -> ShadingPoints:
     """One point per polygon and side seen: its centre, its normal, and the mean of what its corners have."""
-    polygon = geometry.polygons.take(weights.hits.triangle)
-    key, first, back = np.unique(
-        polygon * 2 + interaction.back_facing, return_index=True, return_inverse=True
-    )
-    own = key // 2
+    assert centres is not None
+    assert polygon_normals is not None
+    geometry, back_facing = context.geometry, context.interaction.back_facing
+    seen = geometry.polygons.take(context.weights.hits.triangle)
+    key, first, point = np.unique(seen * 2 + back_facing, return_index=True, return_inverse=True)
+    polygon = key // 2
+    n = facing(take_rows(polygon_normals, polygon), back_facing.take(first))
+
+    # A point stands on its polygon's first triangle, and has the mean of all the polygon's corners.
     third = np.full(len(key), 1 / 3, F)
-    n = facing(take_rows(polygon_normals, own), interaction.back_facing.take(first))
-    triangle = np.searchsorted(geometry.polygons, own).astype(np.int32)
+    triangle = np.searchsorted(geometry.polygons, polygon).astype(np.int32)
     first_triangle = TriangleCorners(None, triangle, third, third)
-    mean = CornerWeights(first_triangle, (MeanCorners(None, centres, own),))
-    return Points(
-        triangle,
-        third,
-        third,
-        take_rows(centres.position, own),
-        n,
-        lambda values: take_rows(values, back),
-        mean,
-    )
+    mean = CornerWeights(first_triangle, (MeanCorners(None, centres, polygon),))
+    return ShadingPoints(triangle, third, third, take_rows(centres.position, polygon), n, Gather(point), mean)
 
 
 def _gouraud(
-    geometry: SceneGeometry,
-    weights: CornerWeights,
-    interaction: SurfaceInteraction,
-    normals: Any,
-    centres: Any,
-    polygon_normals: Any,
-) -> Points:
+    context: ShadingContext, centres: PolygonCentres | None, polygon_normals: NDArray[np.float32] | None
+) -> ShadingPoints:
     """One point per polygon corner and side seen: corners of a vertex may differ in normal and uv."""
-    found: list[tuple[NDArray[Any], ...]] = []
-    numbers: dict[Corners, NDArray[np.int64]] = {}  # (m,) point of each hit's corner 0
-    steps: dict[Corners, int] = {}  # how far the next corner's point is away
+    geometry, weights, normals = context.geometry, context.weights, context.normals
+    assert normals is not None
+    corners: list[tuple[NDArray[Any], ...]] = []  # triangle, u, v, position, n
+    first_point: dict[Corners, NDArray[np.int64]] = {}
+    step: dict[Corners, int] = {}
     count = 0
     for group in weights.groups:
-        back_facing = (
-            interaction.back_facing if group.lane is None else interaction.back_facing.take(group.lane)
-        )
-        _, first, back = np.unique(
-            group.shape * np.int64(2) + back_facing, return_index=True, return_inverse=True
-        )
-        numbers[group], steps[group] = back.ravel() + count, len(first)
+        # The polygons of the group that are seen, each side once.
+        back_facing = context.interaction.back_facing
+        back_facing = back_facing if group.lane is None else back_facing.take(group.lane)
+        side = group.shape * np.int64(2) + back_facing
+        _, first, number = np.unique(side, return_index=True, return_inverse=True)
+        first_point[group], step[group] = number.ravel() + count, len(first)
+
+        # A point at each of their corners: corner 0 of all of them, then corner 1, and so on.
         for k in range(group.count):
             corner, vertex = (
                 take_rows(number(geometry, k), first) for number in (group.corner, group.vertex)
             )
             n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(back_facing, first))
             at = (take_rows(part, first) for part in group.place(k))
-            found.append((*at, take_rows(geometry.vertices, vertex), n))
+            corners.append((*at, take_rows(geometry.vertices, vertex), n))
             count += len(first)
-
-    def spread(values: NDArray[Any]) -> NDArray[Any]:
-        return weights.joined(lambda group, k: take_rows(values, numbers[group] + k * steps[group]))
-
     triangle, u, v, position, n = (
-        column_major(np.concatenate([each[part] for each in found])) for part in range(5)
+        column_major(np.concatenate([each[part] for each in corners])) for part in range(5)
     )
     there = TriangleCorners(None, triangle, u, v)
-    return Points(triangle, u, v, position, n, spread, CornerWeights(there, (there,)))
+    to_samples = Barycentric(weights, first_point, step)
+    return ShadingPoints(triangle, u, v, position, n, to_samples, CornerWeights(there, (there,)))
 
 
-_POINTS: dict[str, Callable[..., Points]] = {"constant": _constant, "gouraud": _gouraud}
+def _flat(context: ShadingContext) -> Vectors:
+    """(M, 3) the triangles' own normals."""
+    return context.interaction.ng
+
+
+Normals: TypeAlias = Callable[[ShadingContext], Vectors]
+OwnPoints: TypeAlias = Callable[
+    [ShadingContext, PolygonCentres | None, NDArray[np.float32] | None], ShadingPoints
+]
+
+
+class ShadingRate(Value):
+    """How often a model is evaluated, and with which normals."""
+
+    normals: Normals
+    """(M, 3) at the samples; the hemispheres of obscurance stand about them, too."""
+    points: OwnPoints | None = None
+    """Points of its own; None where the model is evaluated at every sample."""
+    is_smooth: bool = True
+    """Does it read the shading normals at corners?"""
+    normals_alone: bool = False
+    """Is nothing but the normals interpolated over polygons, and linearly?"""
+
+    @property
+    def at_samples(self) -> bool:
+        """Is the model evaluated at every sample?"""
+        return self.points is None
+
+
+RATES: Mapping[Rate, ShadingRate] = {
+    "constant": ShadingRate(_flat, _constant, is_smooth=False),
+    "gouraud": ShadingRate(interpolated, _gouraud),
+    "phong": ShadingRate(interpolated, normals_alone=True),
+    "quadratic": ShadingRate(quadratic),
+}
+"""Every shading rate once. A new one is a row here and its name in `Rate`."""

@@ -20,8 +20,8 @@ from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
-from illumcli.rays import interaction as surface
 from illumcli.rays.corner_weights import CornerWeights
+from illumcli.rays.interaction import uv_at
 from illumcli.records import Record, Value
 from illumcli.schema.annotations import field_annotation, number_range
 from illumcli.schema.fields import LARGEST
@@ -150,12 +150,12 @@ def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexV
     return {purpose: own[purpose]} if purpose in own else {}
 
 
-def varying(
+def textures(
+    object_names: Sequence[str],
+    read: Callable[[str, str | None], Floats],
+    purpose: str,
     geometry: SceneGeometry,
     materials: Materials,
-    object_names: Sequence[str],
-    purpose: str,
-    read: Callable[[str, str | None], Floats],
 ) -> Varying:
     """Everything the materials on some surface vary by, read, checked against the meshes, and within range.
 
@@ -319,9 +319,9 @@ class Parameters(Record):
 
 def parameters(
     geometry: SceneGeometry,
-    varying: Varying,
+    textures: Varying,
     material: Ids,
-    weights: CornerWeights,
+    point_weights: CornerWeights,
     uvs: CornerVectors | None,
 ) -> Parameters:
     """Every varying parameter at points on triangles.
@@ -330,17 +330,17 @@ def parameters(
     ----------
     material : (E,) int32
         Material number of each point.
-    weights : CornerWeights
+    point_weights : CornerWeights
         Of the corners around each of the E points.
     """
     names: list[tuple[tuple[str, int], ...]] = []
     values: dict[tuple[str, int], Floats] = {}
-    for number, mine in enumerate(varying.of_material):
+    for number, mine in enumerate(textures.of_material):
         names.append(tuple((path, each.within.width) for path, each in mine.items()))
         lanes = np.flatnonzero(material == number).astype(np.int32) if mine else np.zeros(0, np.int32)
         if not lanes.size:
             continue
-        at = weights.take(lanes)
+        at = point_weights.take(lanes)
         uv = None
         for path, each in mine.items():
             if isinstance(each, Attribute):
@@ -350,7 +350,7 @@ def parameters(
                     place = at.interpolate_vertices(geometry, each.uv)
                 else:
                     assert uvs is not None
-                    place = uv = surface.uv(geometry, uvs, at) if uv is None else uv
+                    place = uv = uv_at(geometry, uvs, at) if uv is None else uv
                 found = FILTERS[each.filter](each.image, place, each.wrap)
                 if each.vertex is not None:
                     found = found * at.interpolate_vertices(geometry, each.vertex)
@@ -365,17 +365,21 @@ def parameters(
     )
 
 
-def surface_colors(
-    models: Sequence[IlluminationModel],
-    color: Callable[[IlluminationModel], Any],
-    material: Ids,
-    parameters: Parameters | None = None,
-) -> Vectors:
-    """(E, 3) float32 a colour of each point's material, from its values at the point where it varies."""
-    out = colors_at([color(model) for model in models], material)
-    for number, model in enumerate(models if parameters is not None else ()):
-        if parameters is not None and parameters.of_material[number]:
-            lanes = np.flatnonzero(material == number).astype(np.int32)
-            if lanes.size:
-                out[lanes] = color(parameters.model(model, number, lanes))
-    return out
+class PointMaterials(Record):
+    """The material of each of E points."""
+
+    materials: Materials
+    number: Ids  # (E,)
+    parameters: Parameters | None = None
+    """Those that vary over the surface."""
+
+    def colors(self, color: Callable[[IlluminationModel], Any]) -> Vectors:
+        """(E, 3) float32 a colour of each point's material, from its values there where it varies."""
+        models, parameters = self.materials.models, self.parameters
+        out = colors_at([color(model) for model in models], self.number)
+        for number, model in enumerate(models if parameters is not None else ()):
+            if parameters is not None and parameters.of_material[number]:
+                index = np.flatnonzero(self.number == number).astype(np.int32)
+                if index.size:
+                    out[index] = color(parameters.model(model, number, index))
+        return out

@@ -74,7 +74,7 @@ def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     draws = np.stack(
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]
     )
-    core = tracer(geometry.vertices, geometry.triangles)
+    core = tracer(geometry)
     method = Method(RAYS, falloff, geometry.render_space.radius)
     w = estimates(core, Hemispheres(ng, origins), draws, method, errors=False).w.astype(np.float64)
     standard_error = float(w.std(ddof=1)) / np.sqrt(PATTERNS)

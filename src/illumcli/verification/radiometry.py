@@ -11,7 +11,7 @@ from illumcli.lights._attenuation import InverseSquare, InverseSquareFlux, Law, 
 from illumcli.lights.point import Point
 from illumcli.models.lambert import Lambert
 from illumcli.render_space import RenderSpace
-from illumcli.shading.ambient import ambient_light, coupled
+from illumcli.shading.ambient import ambient, coupled
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import brdf, response
 
@@ -59,15 +59,15 @@ def lambert_radiance(inputs: Inputs) -> Floats:
 def lighting_12_75(inputs: Inputs) -> Floats:
     """Ambient light times obscurance plus direct light: kept apart, or coupled as one text prints it."""
     n, kd, w = inputs.unit("n"), inputs.scalars("kd"), inputs.scalars("w")
-    ambient = (inputs.scalars("ka") * inputs.scalars("Ia"))[:, None]
+    ka_light = (inputs.scalars("ka") * inputs.scalars("Ia"))[:, None]
     law = InverseSquare(law="inverse_square")
     direct = np.zeros_like(kd)
     for light in inputs.parts("lights"):
         irradiance = light.scalars("intensity") * law.factor(light.scalars("distance"))
         direct += light.scalars("delta") * irradiance * np.maximum(dot(n, light.unit("l")), 0)
     forms: dict[str, Callable[[], Vectors]] = {
-        "corrected": lambda: ambient_light(ambient, WHITE, w) + kd * direct,
-        "printed": lambda: coupled(ambient, WHITE, (kd * direct)[:, None], direct[:, None], w),
+        "corrected": lambda: ambient(WHITE, ka_light, w) + kd * direct,
+        "printed": lambda: coupled(WHITE, ka_light, (kd * direct)[:, None], direct[:, None], w),
     }
     return inputs.choose("form", forms)()[:, 0]
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, dot, repeat_rows, take_rows
+from illumcli.rays.interaction import SurfaceInteraction
 from illumcli.records import Record
 from illumcli.visibility.samplers import GRAZING, SAMPLERS
 
@@ -59,6 +60,18 @@ class Hemispheres(Record):
         each = self.origins_per_point
         of_point = np.arange(samples) * ORIGIN_STRIDE % each
         return (np.arange(len(self.n))[:, None] * each + of_point).ravel()
+
+
+def hemispheres(
+    interaction: SurfaceInteraction,
+    ray_origins: Vectors,
+    known_open: NDArray[np.bool_] | None,
+    obscurance_normals: Vectors | None = None,
+) -> Hemispheres:
+    """The hemispheres of hits, about the triangles' own normals where no others are given."""
+    if obscurance_normals is None:
+        return Hemispheres(interaction.ng, ray_origins, known_open=known_open)
+    return Hemispheres(obscurance_normals, ray_origins, interaction.ng, known_open)
 
 
 def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: str) -> NDArray[np.float32]:

@@ -6,7 +6,7 @@ Pixels, vertices and texels share this code. Standard errors are in `obscurance_
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, repeat_rows, take_rows
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record
+from illumcli.render_space import RenderSpace
 from illumcli.visibility.falloffs._base import Falloff
 from illumcli.visibility.hemisphere import Hemispheres, directions, mirror_below, sample_frames
 from illumcli.visibility.obscurance_error import Estimates
@@ -36,12 +37,69 @@ class Method(Record):
     radius: float  # of the scene [scene units]
     sampler: str = "spiral"
     faces: Faces = "count"
-    facets: Vectors | None = None  # (T, 3) float32 normals of all triangles, unless every face counts
+    triangle_normals: Vectors | None = None  # (T, 3) float32, unless every face counts
 
     @property
     def any_hit(self) -> bool:
         """Is an occlusion query enough, without the distance?"""
         return self.falloff.step and self.faces == "count"
+
+
+class ObscuranceSettings(Protocol):
+    """What a scene says of its obscurance (`scene.spec.Obscurance`)."""
+
+    @property
+    def samples(self) -> int: ...
+    @property
+    def falloff(self) -> Falloff: ...
+    @property
+    def sampler(self) -> str: ...
+    @property
+    def faces(self) -> Faces: ...
+
+
+def obscurance_method(
+    settings: ObscuranceSettings, render_space: RenderSpace, triangle_normals: Vectors | None = None
+) -> Method:
+    """How w is estimated in pictures; (T, 3) `triangle_normals` are given unless every face counts."""
+    return Method(
+        settings.samples,
+        settings.falloff,
+        render_space.radius,
+        settings.sampler,
+        settings.faces,
+        triangle_normals,
+    )
+
+
+def obscurance(
+    tracer: Tracer,
+    hemispheres: Hemispheres,
+    obscurance_draws: NDArray[np.float64],
+    obscurance_method: Method,
+    baked_obscurance: Floats | None = None,
+) -> NDArray[np.float32]:
+    """(M,) w of every hit; on meshes with baked values these, and rays for the others.
+
+    Parameters
+    ----------
+    obscurance_draws : (2, M) float64
+        As `draws` of `estimates`.
+    baked_obscurance : (M,) float32, optional
+        NaN on meshes that have no baked values.
+    """
+    if baked_obscurance is None:
+        return estimates(tracer, hemispheres, obscurance_draws, obscurance_method, errors=False).w
+    w = baked_obscurance.astype(F)
+    traced = np.flatnonzero(np.isnan(w))
+    draws = obscurance_draws[:, traced]
+    w[traced] = estimates(tracer, hemispheres.take(traced), draws, obscurance_method, errors=False).w
+    return w
+
+
+def baked_or_open(baked_obscurance: Floats) -> Floats:
+    """(M,) baked w; 1 on meshes that have no baked values."""
+    return np.where(np.isnan(baked_obscurance), F(1), baked_obscurance)
 
 
 def estimates(
@@ -143,14 +201,14 @@ def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) 
 
     `one_sided`: a ray that first meets the back of a face ends there, unoccluded. `ignore`: it goes on.
     """
-    assert method.facets is not None
+    assert method.triangle_normals is not None
     distance = np.full(len(o), np.inf, F)
     ray, start, travelled = np.arange(len(o)), o, np.zeros(len(o), F)
     for _ in range(MAX_BACK_FACES):
         # Rays that meet a front face are done.
         closest = tracer.closest(start, d[ray])
         hit = closest.triangle >= 0
-        normal = take_rows(method.facets, np.maximum(closest.triangle, 0))
+        normal = take_rows(method.triangle_normals, np.maximum(closest.triangle, 0))
         is_back = hit & (dot(normal, d[ray]) > 0)
         is_front = hit & ~is_back
         distance[ray[is_front]] = travelled[is_front] + closest.distance[is_front]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Ids, Vectors, column_major, dot, take_rows
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
-from illumcli.rays.interaction import facing, interact
+from illumcli.rays.interaction import Hits, SurfaceInteraction, facing, interact
 from illumcli.rays.offsets import SHARE
 from illumcli.records import Record
 
@@ -267,6 +267,26 @@ class OpenTriangles:
         side, triangle = np.divmod(_members(groups), self._groups * GROUP)
         triangle = np.minimum(triangle, len(self._geometry.triangles) - 1).astype(np.int32)
         return triangle_planes(self._geometry, triangle, side > 0)
+
+
+MAX_TREE_VERTICES = 1 << 17
+"""Scenes of more vertices are not searched for triangles with nothing above them."""
+RAYS_PER_TEST = 1 << 11
+"""To test a group of triangles takes about as long as so many rays."""
+
+
+def open_triangles(geometry: SceneGeometry) -> OpenTriangles | None:
+    """The search for triangles with nothing above them; None for scenes so large that it does not pay."""
+    return OpenTriangles(geometry) if len(geometry.vertices) <= MAX_TREE_VERTICES else None
+
+
+def known_open(
+    samples: int, hits: Hits, interaction: SurfaceInteraction, open_triangles: OpenTriangles | None
+) -> NDArray[np.bool_] | None:
+    """(M,) True for hits that are known to have nothing above them, where each would cast `samples` rays."""
+    if open_triangles is None:
+        return None
+    return open_triangles.is_open(hits.triangle, interaction.back_facing, RAYS_PER_TEST // samples)
 
 
 def triangle_planes(

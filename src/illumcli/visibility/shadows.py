@@ -9,6 +9,7 @@ nearby in the light's direction.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._incident import LitPoints
 from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.rays.embree import Tracer
-from illumcli.rays.interaction import SurfaceInteraction, facing
+from illumcli.rays.interaction import ShadingContext, SurfaceInteraction, facing
 from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.records import Record
 
@@ -34,12 +35,18 @@ NEARBY = 2.0
 class SmoothSurface(Record):
     """The samples of a tile on the smooth surfaces that their normals imply."""
 
-    geometry: SceneGeometry
+    context: ShadingContext
     normals: CornerVectors
     parts: SmoothParts
-    weights: CornerWeights
-    interaction: SurfaceInteraction
     flat: NDArray[np.bool_]  # (O,) objects whose shadow rays start on their polygons
+
+
+def smooth_surface(
+    flat: Sequence[bool], shading_context: ShadingContext, smooth_parts: SmoothParts
+) -> SmoothSurface:
+    """The samples on the surface that their normals imply; those of `flat` objects stay on their polygons."""
+    assert shading_context.normals is not None
+    return SmoothSurface(shading_context, shading_context.normals, smooth_parts, np.array(flat, np.bool_))
 
 
 def ray_origins(interaction: SurfaceInteraction) -> Vectors:
@@ -48,19 +55,23 @@ def ray_origins(interaction: SurfaceInteraction) -> Vectors:
 
 
 def shadow(
-    tracer: Tracer, origins: Vectors, incident: LitPoints, smooth: SmoothSurface | None = None
+    tracer: Tracer,
+    ray_origins: Vectors,
+    shadow_candidates: LitPoints,
+    smooth_surface: SmoothSurface | None = None,
 ) -> NDArray[np.float32]:
-    """(M,) delta: 1 where the light arrives, 0 in shadow and on samples that the light does not reach.
+    """(M,) delta of one light: 1 where it arrives, 0 in shadow and on samples that it does not reach.
 
-    With `smooth` a false terminator is taken away; the samples are then those of its tile.
+    With `smooth_surface` a false terminator is taken away; the samples are then those of its tile.
     """
-    delta = np.zeros(incident.count, F)
-    hidden = tracer.occluded(column_major(take_rows(origins, incident.index)), incident.l, incident.distance)
+    lit, smooth = shadow_candidates, smooth_surface
+    delta = np.zeros(lit.count, F)
+    hidden = tracer.occluded(column_major(take_rows(ray_origins, lit.index)), lit.l, lit.distance)
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
-        sample = incident.index.take(blocked)
-        l, distance = column_major(take_rows(incident.l, blocked)), incident.distance.take(blocked)
-        hidden[blocked] = ~_implied_reached(tracer, smooth, origins, sample, l, distance)
-    delta[incident.index] = ~hidden
+        sample = lit.index.take(blocked)
+        l, distance = column_major(take_rows(lit.l, blocked)), lit.distance.take(blocked)
+        hidden[blocked] = ~_implied_reached(tracer, smooth, ray_origins, sample, l, distance)
+    delta[lit.index] = ~hidden
     return delta
 
 
@@ -69,15 +80,15 @@ def _implied_reached(
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
     # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
-    interaction = smooth.interaction
-    weights = smooth.weights.take(sample)
+    interaction, geometry = smooth.context.interaction, smooth.context.geometry
+    weights = smooth.context.weights.take(sample)
     position = take_rows(interaction.position, sample)
-    width = _box_diagonals(smooth.geometry, weights)
+    width = _box_diagonals(geometry, weights)
     offset = _terminator_offset(
         smooth, weights, column_major(position, F), interaction.back_facing.take(sample)
     )
     offset = bounded(offset, TERMINATOR_SHARE * width)
-    flat = smooth.flat.take(smooth.geometry.objects.take(weights.hits.triangle))
+    flat = smooth.flat.take(geometry.objects.take(weights.hits.triangle))
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
     # Ask the light from there, and of what it reaches, whether the way there is free.
@@ -105,7 +116,7 @@ def _terminator_offset(
     smooth: SmoothSurface, weights: CornerWeights, position: Vectors, back_facing: NDArray[np.bool_]
 ) -> Vectors:
     """(B, 3) the way from samples on polygons to the surface that the normals at their corners imply."""
-    geometry, normals = smooth.geometry, smooth.normals
+    geometry, normals = smooth.context.geometry, smooth.normals
 
     def way(group: Corners, k: int) -> Vectors:
         normal = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))

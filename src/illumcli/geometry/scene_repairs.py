@@ -1,0 +1,68 @@
+"""What was put right or left out in the meshes of a scene, each mesh counted once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.repairs import (
+    NO_GRAIN,
+    NO_MATERIAL,
+    NORMALS_OF_FILE,
+    NOT_ASKED,
+    MeshRepairs,
+    Repair,
+    joined,
+    located,
+    note,
+)
+
+
+def repairs(names: Sequence[str], computes: Sequence[bool], meshes: Sequence[Mesh]) -> MeshRepairs:
+    """The repairs of all meshes.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What each object's mesh is called: its file as the scene names it, or the object.
+    computes : sequence of bool
+        Does the scene say how the object's normals are made where its file has none?
+    """
+    of_meshes = {id(mesh): located(mesh.repairs, name) for name, mesh in zip(names, meshes, strict=True)}
+    together = dict(joined(of_meshes.values()))
+    for name, says_how, mesh in zip(names, computes, meshes, strict=True):
+        index = mesh.corner_normals
+        if says_how and index is not None and len(index) and (index >= 0).all():
+            note(together, NORMALS_OF_FILE, name)
+    return MeshRepairs(together)
+
+
+def undirected(names: Sequence[str], wants: Sequence[bool], meshes: Sequence[Mesh]) -> MeshRepairs:
+    """Objects whose material has a grain that neither the scene nor uv direct; `wants` says which need uv."""
+    without_uv: dict[str, Repair] = {}
+    for name, wants_uv, mesh in zip(names, wants, meshes, strict=True):
+        if wants_uv and mesh.uvs is None and mesh.polygon_count:
+            note(without_uv, NO_GRAIN, name)
+    return MeshRepairs(without_uv)
+
+
+def unnamed(
+    names: Sequence[str], selects: Sequence[tuple[tuple[str, ...], bool] | None], meshes: Sequence[Mesh]
+) -> MeshRepairs:
+    """Materials that mesh files select by name and nobody has, or nobody asked for.
+
+    Parameters
+    ----------
+    selects : sequence
+        Of each object: among which of the scene's materials its mesh selects, and whether it has those of
+        its file; None where the object has one material.
+    """
+    unknown: dict[str, Repair] = {}
+    for name, selected, mesh in zip(names, selects, meshes, strict=True):
+        known, imports = selected or ((), False)
+        missing = set(mesh.material_names) - set(known)
+        # what a library lacks is among its mesh's repairs already
+        if selected is None or not missing or (imports and mesh.materials):
+            continue
+        note(unknown, NOT_ASKED if missing & mesh.materials.keys() else NO_MATERIAL, name, len(missing))
+    return MeshRepairs(unknown)

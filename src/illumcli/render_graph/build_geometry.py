@@ -1,0 +1,130 @@
+"""Nodes of meshes, each source once, of the scene's geometry and normals, and of what was put right."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from illumcli.cache.fingerprint import FileFingerprint
+from illumcli.geometry.bounds import implied_widths
+from illumcli.geometry.scene_geometry import (
+    bounds_of,
+    corner_normals,
+    polygon_normals,
+    scene_geometry,
+)
+from illumcli.geometry.scene_repairs import repairs, undirected, unnamed
+from illumcli.geometry.shapes._base import Shape
+from illumcli.graph import Node
+from illumcli.mesh_files import companions
+from illumcli.rays.embree import tracer
+from illumcli.render_graph import needs, stages
+from illumcli.scene.access import resolve
+from illumcli.scene.scene_file import SceneFile
+from illumcli.scene.spec import MeshFile, Normals, Object, Scene
+
+
+def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+    """Meshes, and what is made of them all."""
+    transforms = tuple(thing.transform for thing in scene.objects)
+    rates = needs.rates(scene)
+    flat = tuple(rate == "constant" or scene.terminator == "none" for rate in rates)
+    return [
+        *_mesh_nodes(scene, loaded),
+        Node.of(partial(bounds_of, transforms), "object_bounds"),
+        Node.of(partial(implied_widths, flat), "implied_widths"),
+        Node.of(stages.render_space),
+        *_normal_nodes(scene),
+        Node.of(tracer),
+        *_repair_nodes(scene),
+    ]
+
+
+def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+    """One node per source of meshes, and the mesh of every object."""
+    sources = {needs.mesh_name(scene, thing.mesh): source for thing, source in _sources(scene)}
+    names = list(sources)
+    which = tuple(names.index(needs.mesh_name(scene, thing.mesh)) for thing in scene.objects)
+    parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
+    meshes = [
+        Node.of(partial(stages.mesh, _content(loaded, source)), f"mesh:{name}")
+        for name, source in sources.items()
+    ]
+    return [*meshes, Node("meshes", partial(stages.meshes, which), parts)]
+
+
+def _normal_nodes(scene: Scene) -> list[Node]:
+    """All triangles, and their shading normals."""
+    says = [source.normals if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
+    by_file = tuple(each is None or each.source == "file" for each in says)
+    rates = needs.rates(scene)
+    how = tuple("flat" if rate == "constant" else each for rate, each in zip(rates, says, strict=True))
+    methods = tuple("newell" if each is None else each.polygon for each in says)
+    return [
+        Node.of(partial(scene_geometry, by_file), "geometry"),
+        Node.of(partial(corner_normals, how), "corner_normals"),
+        Node.of(partial(polygon_normals, methods), "polygon_normals"),
+    ]
+
+
+def _repair_nodes(scene: Scene) -> list[Node]:
+    """What was put right in meshes, and what materials ask of them that they do not have."""
+    rates, sources = needs.rates(scene), [source for _, source in _sources(scene)]
+    names = tuple(
+        source.file if isinstance(source, MeshFile) else f"object {name}"
+        for source, name in zip(sources, scene.object_names(), strict=True)
+    )
+    computes = tuple(
+        rate != "constant" and _computes_normals(source) for rate, source in zip(rates, sources, strict=True)
+    )
+    wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
+    selects = tuple(_selects(scene, thing) for thing in scene.objects)
+    nodes = [Node.of(partial(repairs, names, computes), "repairs")]
+    if any(wants):
+        nodes.append(Node.of(partial(undirected, names, wants), "undirected"))
+    if any(selects):
+        nodes.append(Node.of(partial(unnamed, names, selects), "unnamed"))
+    return nodes
+
+
+def _sources(scene: Scene) -> list[tuple[Object, MeshFile | Shape]]:
+    """Every object with the description of its mesh."""
+    return [(thing, needs.source_of(scene, thing.mesh)) for thing in scene.objects]
+
+
+def _content(loaded: SceneFile, source: MeshFile | Shape) -> FileFingerprint | Shape:
+    """What a mesh is made from: the content of its file, or the shape."""
+    if not isinstance(source, MeshFile):
+        return source
+    return FileFingerprint(partial(resolve, loaded, source.file), companions)
+
+
+def _computes_normals(source: MeshFile | Shape) -> bool:
+    """Does the description of a mesh file say how normals are made, but not that all are?"""
+    if not isinstance(source, MeshFile) or source.normals.source != "file":
+        return False
+    normals, usual = source.normals, Normals()
+    return (normals.crease, normals.weights) != (usual.crease, usual.weights)
+
+
+def _wants_direction(scene: Scene, thing: Object) -> bool:
+    """Has an object's own material a grain that only uv can direct?"""
+    model = scene.material_of(thing)
+    return thing.grain is None and model is not None and model.has_grain()
+
+
+def _selects(scene: Scene, thing: Object) -> tuple[tuple[str, ...], bool] | None:
+    """Among which of the scene's materials an object's mesh selects, and whether it has those of its file;
+    None where the object has one material."""
+    if scene.material_of(thing) is not None:
+        return None
+    named = () if thing.fallback is not None else tuple(sorted(scene.materials))
+    return named, needs.imports(scene, thing)
+
+
+def baked_files(scene: Scene, loaded: SceneFile) -> tuple[tuple[str, FileFingerprint | None], ...]:
+    """Name of each object and the file of its baked obscurance."""
+    files = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
+    return tuple(
+        (name, None if file is None else FileFingerprint(partial(resolve, loaded, file)))
+        for name, file in zip(scene.object_names(), files, strict=True)
+    )

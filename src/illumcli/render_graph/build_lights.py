@@ -1,0 +1,106 @@
+"""Nodes of lights: where each arrives, its shadow, the response to it, and the sums over all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+from illumcli.geometry.smooth_parts import SmoothParts
+from illumcli.graph import Node
+from illumcli.lights import _incident as incident
+from illumcli.lights._base import Light
+from illumcli.render_graph import needs, stages
+from illumcli.scene.spec import Scene
+from illumcli.shading.ambient import ambient, coupled
+from illumcli.shading.direct import add, black, direct, irradiance, one_lobe, sum_lobes
+from illumcli.shading.rates import RATES
+from illumcli.visibility.shadows import shadow, smooth_surface
+
+
+def light_nodes(scene: Scene) -> list[Node]:
+    """What all lights take, each by its name; a light that sends nothing has neither rays nor response."""
+    # The surface that normals imply, from which shadow rays start; none where every object is flat.
+    smooth = needs.is_smooth(scene)
+    flat = tuple(rate == "constant" for rate in needs.rates(scene))
+    nodes = [
+        Node.of(SmoothParts, "smooth_parts", normals="corner_normals"),
+        Node.of(partial(smooth_surface, flat), "smooth_surface"),
+    ] if smooth else []  # fmt: skip
+    implied = {"smooth_surface": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
+
+    eye: dict[str, str] = {word: word for word in ("v", "t") if word in needs.reached_words(scene)}
+    at_samples = all(RATES[rate].at_samples for rate in needs.rates(scene))
+    for name, light in scene.named_lights().items():
+        if not needs.sends(light):
+            nodes += [Node.of(black, f"light:{name}"), Node.of(stages.no_shadow, f"shadow:{name}")]
+            continue
+        nodes += _shadow_nodes(name, light, at_samples, implied)
+        nodes += _response_nodes(name, light, at_samples, eye)
+    return nodes
+
+
+def _shadow_nodes(name: str, light: Light, at_samples: bool, implied: Mapping[str, str]) -> list[Node]:
+    """The points a light reaches if nothing stands between, and its shadow.
+
+    `implied` names the smooth surface that shadow rays may start from, if there is one.
+    """
+    place = light.without_color()
+    nodes = [Node.of(partial(incident.incident, place), f"incident:{name}")]
+    if not light.shadows:
+        nodes.append(Node.of(stages.no_shadow, f"shadow:{name}"))
+    if at_samples:  # the points that are evaluated are the samples that want shadow rays
+        candidates = f"incident:{name}"
+    else:
+        candidates = f"shadow_candidates:{name}"
+        nodes.append(Node.of(partial(incident.shadow_candidates, place), candidates))
+    if light.shadows:
+        nodes.append(Node.of(shadow, f"shadow:{name}", shadow_candidates=candidates, **implied))
+        if at_samples:  # what lies in shadow is not evaluated at all
+            unshadowed = partial(incident.unshadowed, place)
+            nodes.append(Node.of(unshadowed, f"unshadowed:{name}", shadow=f"shadow:{name}"))
+    return nodes
+
+
+def _response_nodes(name: str, light: Light, at_samples: bool, eye: Mapping[str, str]) -> list[Node]:
+    """What leaves towards the eye because of one light, per lobe and together, with its shadow."""
+    color = light.color()
+    before = light.shadows and at_samples  # shadows are known before models are evaluated
+    lit = f"unshadowed:{name}" if before else f"incident:{name}"
+    after = {"shadow": f"shadow:{name}"} if light.shadows and not at_samples else {}
+    lobes = f"direct:{name}"
+    return [
+        Node.of(partial(direct, color), lobes, materials="lobes_materials", incident=lit, **eye),
+        Node.of(sum_lobes, f"light:{name}", direct=lobes, **after),
+        Node.of(partial(one_lobe, "diffuse"), f"diffuse:{name}", direct=lobes, **after),
+        Node.of(partial(one_lobe, "specular"), f"specular:{name}", direct=lobes, **after),
+        Node.of(partial(irradiance, color), f"irradiance:{name}", incident=lit, **after),
+    ]
+
+
+def sum_nodes(scene: Scene) -> list[Node]:
+    """The pictures that are sums over lights, and the beauty."""
+    lights = list(needs.active_lights(scene))
+    weighed = {"obscurance": "obscurance"} if needs.weighs_ambient(scene) else {}
+    nodes = [
+        Node.of(partial(ambient, scene.ambient.color), "ambient", **weighed),
+        _sum("direct", [f"light:{name}" for name in lights]),
+        _sum("irradiance", [f"irradiance:{name}" for name in lights]),
+        _sum("diffuse", [f"diffuse:{name}" for name in lights]),
+        _sum("specular", [f"specular:{name}" for name in lights]),
+    ]
+
+    # The beauty: what is emitted, ambient light and all lights, in this order; then the depth cue.
+    parts = ["emission"] if needs.is_emissive(scene) else []
+    if scene.ambient.form == "coupled":
+        nodes.append(Node.of(partial(coupled, scene.ambient.color), "coupled", **weighed))
+        parts.append("coupled")
+    else:
+        parts += ["ambient"] if needs.is_ambient(scene) else []
+        parts += [f"light:{name}" for name in lights]
+    if scene.depth_cue is None:
+        return [*nodes, _sum("beauty", parts)]
+    return [*nodes, _sum("uncued", parts), Node.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
+
+
+def _sum(output: str, parts: list[str]) -> Node:
+    return Node(output, add, {"hits": "hits", **{part: part for part in parts}})

@@ -1,0 +1,84 @@
+"""Nodes of materials: their numbers, their models, and the parameters that vary over surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from typing import Any
+
+from illumcli.cache.fingerprint import FileFingerprint
+from illumcli.graph import Node
+from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import Texture
+from illumcli.render_graph import needs, stages
+from illumcli.scene.access import resolve
+from illumcli.scene.scene_file import SceneFile
+from illumcli.scene.spec import Object, Scene, default_material
+from illumcli.shading.ambient import ambient_color, emission
+from illumcli.shading.materials import DEFAULT, Choice, Token, numbering
+from illumcli.shading.textures import PointMaterials, parameters, textures
+
+PURPOSES = ("lobes", "ambient", "emission")
+"""What parameters that vary over a surface may serve."""
+
+
+def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+    """Numbers of materials, their models, and what these vary by."""
+    # What each object chooses among, and the models of all choices.
+    choices: list[Choice] = []
+    models: dict[Token, Any] = {DEFAULT: default_material()}
+    for thing, name in zip(scene.objects, scene.object_names(), strict=True):
+        choice, chosen = _choice(scene, thing, name)
+        choices.append(choice)
+        models |= chosen
+    imported = tuple(choice.library for choice in choices)
+    if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
+        models |= {("material", name): model for name, model in scene.materials.items()}
+
+    # Measured materials and textures are known by the content of their files.
+    files = {model.file for model in models.values() if hasattr(model, "file")}
+    measured = {file: FileFingerprint(partial(resolve, loaded, file)) for file in sorted(files)}
+    named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
+    images = stages.Images({path: FileFingerprint(partial(resolve, loaded, path)) for path in named}, loaded)
+
+    libraries = {"meshes": "meshes"} if any(imported) else {}
+    nodes = [
+        Node.of(partial(numbering, tuple(choices), tuple(sorted(scene.materials))), "numbering"),
+        Node.of(partial(stages.materials_of, models, measured, imported), "materials", **libraries),
+        Node.of(ambient_color, materials="ambient_materials"),
+        Node.of(emission, materials="emission_materials"),
+    ]
+    for purpose in PURPOSES:
+        vary = {}
+        if needs.may_vary(scene, purpose):
+            read, at_points = f"{purpose}_textures", f"{purpose}_parameters"
+            vary = {"parameters": at_points}
+            nodes += [
+                Node.of(partial(textures, scene.object_names(), images, purpose), read),
+                Node.of(parameters, at_points, textures=read),
+            ]
+        nodes.append(Node.of(PointMaterials, f"{purpose}_materials", number="material", **vary))
+    return nodes
+
+
+def _choice(scene: Scene, thing: Object, name: str) -> tuple[Choice, dict[Token, IlluminationModel]]:
+    """What decides about the materials of an object, and the models it brings."""
+    models: dict[Token, IlluminationModel] = {}
+    of_scene = isinstance(thing.material, str) and not thing.override
+    token: Token | None = ("material", str(thing.material)) if of_scene else ("object", name)
+    model = scene.material_of(thing)
+    if model is None:
+        token = None
+    elif token is not None:
+        models[token] = model
+    fallback: Token | None = None
+    if (other := scene.fallback_of(thing)) is not None:
+        fallback = ("material", thing.fallback) if isinstance(thing.fallback, str) else ("fallback", name)
+        models[fallback] = other
+    library = needs.mesh_name(scene, thing.mesh) if needs.imports(scene, thing) else None
+    return Choice(token, library, fallback), models
+
+
+def _varied(models: Iterable[IlluminationModel]) -> list[Any]:
+    """Everything that some parameter varies by."""
+    return [each for model in models for each in model.varying().values()]

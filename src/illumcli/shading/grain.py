@@ -1,0 +1,66 @@
+"""The grain of surfaces: tangents that brushed and grooved materials are turned by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from illumcli.arrays import Vectors, take_rows, unit
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
+from illumcli.rays.corner_weights import CornerWeights
+from illumcli.rays.interaction import rings, tangent
+from illumcli.shading.rates import ShadingPoints
+
+
+class Rings(Protocol):
+    """Grain that runs about an axis (`scene.spec.Rings`)."""
+
+    @property
+    def axis(self) -> tuple[float, float, float]: ...
+    @property
+    def centre(self) -> tuple[float, float, float]: ...
+
+
+Grain: TypeAlias = tuple[float, float, float] | Rings
+"""A direction, or rings about an axis, in the object's own coordinates."""
+
+
+def tangents(
+    grains: Sequence[Grain | None],
+    geometry: SceneGeometry,
+    points: ShadingPoints,
+    point_weights: CornerWeights | None = None,
+    uv_tangents: CornerVectors | None = None,
+) -> Vectors:
+    """(E, 3) float32 unit tangents: the grain of each object, or the direction in which u grows.
+
+    Parameters
+    ----------
+    grains : sequence
+        Of each object; None where u directs it.
+    point_weights, uv_tangents : optional
+        Wanted where some object's grain is None.
+    """
+    # The direction of growing u, or zero.
+    if uv_tangents is None or point_weights is None:
+        direction = np.zeros_like(points.n)
+    else:
+        direction = point_weights.interpolate(geometry, uv_tangents)
+
+    # In its place the grain of the objects that have one.
+    number = geometry.objects.take(points.triangle)
+    for i, (grain, placed) in enumerate(zip(grains, geometry.placed, strict=True)):
+        if grain is None or not (index := np.flatnonzero(number == i)).size:
+            continue
+        linear = placed.matrix[:3, :3] / np.abs(placed.matrix[:3, :3]).max()
+        if isinstance(grain, tuple):
+            along = linear @ (np.asarray(grain) / np.abs(grain).max())
+            direction[index] = along / (np.linalg.norm(along) or 1.0)
+        else:
+            centre = geometry.render_space.from_world(
+                placed.matrix[:3, :3] @ grain.centre + placed.matrix[:3, 3]
+            )
+            direction[index] = rings(linear, grain.axis, centre, take_rows(points.position, index))
+    return tangent(points.n, unit(direction))

@@ -681,6 +681,11 @@ def test_a_name_that_another_has_by_default_is_taken(problems, group, order):
     ("text", "fact"),
     [
         ("camera: {position: [0]}", "camera.position: must be a list of 3 numbers, has 1"),
+        ("camera: {fit: nobody}", "camera.fit: no object 'nobody'; the scene has no objects"),
+        (
+            "lights: [{light: spot, position: [0, 1, 2], target: [0, 1, 2]}]",
+            "lights.0: position and target must differ",
+        ),
         ("camera: {position: []}", "camera.position: must be a list of 3, has 0"),
         ("shading: 3", "shading: must be 'constant', 'gouraud', 'phong' or 'quadratic', is 3"),
         ("shading: fong", "shading: no choice 'fong'; did you mean 'phong'?"),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from illumcli.arrays import Vectors, dot, unit
 from illumcli.lights._attenuation import Law
@@ -33,10 +33,11 @@ class Spot(Light):
 
     emission_field: ClassVar[str] = "intensity"
 
-    def check(self) -> None:
-        """The axis must have a direction."""
+    @model_validator(mode="after")
+    def _has_an_axis(self) -> Self:
         if self.position == self.target:
             raise ValueError("position and target must differ")
+        return self
 
     def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
         """Light at `position`; scale f(d) times the cone's smooth step in the cosine to the axis."""

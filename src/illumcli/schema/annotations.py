@@ -59,7 +59,8 @@ def inside(annotation: Any, value: Any, step: str | int) -> tuple[Any, bool]:
     plain, marks = split(annotation)
     for mark in marks:
         if isinstance(mark, Discriminator):
-            return dict(choices(annotation)).get(step), False
+            tagged = dict(choices(annotation))
+            return tagged.get(step), step not in tagged
         if isinstance(mark, Family):
             plain = mark.meant(value)
     parts = get_args(plain)

@@ -112,7 +112,12 @@ def process(
     command: Sequence[str], cwd: Path | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """A process that must end well."""
-    own = {"PYTHONPATH": str(ROOT / "src"), "ILLUM_CACHE": str((cwd or ROOT) / "cache"), **environment}
+    own = {
+        "PYTHONPATH": str(ROOT / "src"),
+        "PYTHONDONTWRITEBYTECODE": "",  # else every run would compile every module
+        "ILLUM_CACHE": str((cwd or ROOT) / "cache"),
+        **environment,
+    }
     return subprocess.run(
         command, cwd=cwd, env={**os.environ, **own}, text=True, capture_output=True, check=True
     )

@@ -1,7 +1,8 @@
 """How long does `illum` take to start, beside what it cannot start without?
 
-References: `python -c "import click"` for `--help`; importing the six libraries a render needs for a tiny
-render, 64x64 with its meshes kept. Whole processes, compiled modules at hand, interleaved.
+References: `python -c "import click"` for `--help`. For a tiny render, 64x64 with its meshes kept: to import
+the six libraries that it needs. A bare import of pydantic leaves BaseModel out, and the first model that is
+defined imports the rest, so there are three of these. Whole processes, compiled modules at hand, interleaved.
 
     PYTHONPATH=src python benchmarks/startup.py [--small]
 """
@@ -14,7 +15,9 @@ from pathlib import Path
 
 from _bench import REPEATS, SMALL, header, illum, interleaved, lit_scene, process, ratio, table
 
-LIBRARIES = "import click, numpy, pydantic, yaml, embreex, OpenImageIO"
+BARE = "import click, numpy, pydantic, yaml, embreex, OpenImageIO"
+LIBRARIES = f"{BARE}\nfrom pydantic import BaseModel"
+ONE_MODEL = f"{LIBRARIES}, Field\nclass Model(BaseModel):\n    width: int = Field(gt=0)"
 
 
 def main() -> None:
@@ -26,7 +29,9 @@ def main() -> None:
             "python -c pass": lambda: process([sys.executable, "-c", "pass"], folder),
             "import click": lambda: process([sys.executable, "-c", "import click"], folder),
             "illum --help": lambda: illum("--help", cwd=folder),
+            "import six libraries, bare": lambda: process([sys.executable, "-c", BARE], folder),
             "import six libraries": lambda: process([sys.executable, "-c", LIBRARIES], folder),
+            "six libraries and a model": lambda: process([sys.executable, "-c", ONE_MODEL], folder),
             "illum plan": lambda: illum("plan", tiny, cwd=folder),
             "illum render 64x64": lambda: illum("render", tiny, "--force", "-q", cwd=folder),
         }
@@ -35,7 +40,8 @@ def main() -> None:
         times = interleaved(runs, 1 if SMALL else 3 * REPEATS)
         table(times)
         ratio("--help / import click", times, "illum --help", "import click")
-        ratio("tiny render / six libraries", times, "illum render 64x64", "import six libraries")
+        for reference in ("import six libraries, bare", "import six libraries", "six libraries and a model"):
+            ratio(f"tiny render / {reference}", times, "illum render 64x64", reference)
 
 
 if __name__ == "__main__":

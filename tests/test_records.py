@@ -42,7 +42,7 @@ def test_fields_are_given_by_place_or_by_name():
 @pytest.mark.parametrize(
     ("values", "named", "said"),
     [
-        ((), {}, "wants x"),
+        ((), {}, "missing field x"),
         ((1,), {"z": 2}, "takes x, y, notes"),
         ((1, 2, {}, 4), {}, "takes"),
         ((1,), {"x": 2}, "takes"),

@@ -90,6 +90,8 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # tiles run on threads of ours; those of numpy's linear algebra would only compete with them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # to look for plugins, pydantic would read the metadata of every installed package: 5 % of a start
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     status = 1
     try:
         output = open_standard_streams()

@@ -57,8 +57,8 @@ def page(tag: str) -> str:
 
 def _parameters(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Iterator[str]:
     properties = schema["properties"]
-    own = [name for name in properties if name not in SHARED]
-    for name in [*own, *(each for each in SHARED if each in properties)]:
+    parameters = [name for name in properties if name not in SHARED]
+    for name in [*parameters, *(each for each in SHARED if each in properties)]:
         field = properties[name]
         if "const" in field:
             continue

@@ -33,18 +33,18 @@ def schema() -> dict[str, Any]:
 
     A scene that extends another need not say what the other says, and may take parts of it away.
     """
-    whole = schema_of(Scene)
-    whole["properties"] = {"extends": EXTENDS, **whole["properties"]}
-    parts = whole.pop("$defs")
+    scene_schema = schema_of(Scene)
+    scene_schema["properties"] = {"extends": EXTENDS, **scene_schema["properties"]}
+    parts = scene_schema.pop("$defs")
     partial = _Partial(parts)
     return {
         "$schema": GenerateJsonSchema.schema_dialect,
         "title": "illum scene",
-        "description": whole["description"],
+        "description": scene_schema["description"],
         "type": "object",
         "if": {"required": ["extends"]},
-        "then": partial.of(whole),
-        "else": whole,
+        "then": partial.of(scene_schema),
+        "else": scene_schema,
         "$defs": parts | partial.made,
     }
 
@@ -52,24 +52,24 @@ def schema() -> dict[str, Any]:
 class _Partial:
     """Schemas of mappings that complete others: no key is required, and null removes one.
 
-    What stands in lists replaces, so it is whole.
+    Parts of lists replace others, so they keep their schema.
     """
 
     def __init__(self, parts: Mapping[str, Any]) -> None:
         self._parts = parts
         self.made: dict[str, Any] = {}
-        """By name: the parts that were asked for."""
+        """Schemas by name, of the parts that were needed."""
 
     def of(self, schema: Mapping[str, Any]) -> dict[str, Any]:
-        """The schema of what may complete that which `schema` describes."""
+        """The schema of mappings that complete one which `schema` describes."""
         made = {key: value for key, value in schema.items() if key not in ("required", "discriminator")}
         if "$ref" in made:
             made["$ref"] = self._reference(made["$ref"])
         for key in ("properties", "patternProperties"):
             if key in made:
                 made[key] = {name: self._or_null(self.of(part)) for name, part in made[key].items()}
-        if found := [each for key in ("oneOf", "anyOf") for each in made.pop(key, ())]:
-            made["anyOf"] = [self.of(each) for each in found]  # what says not what it is may be any of them
+        if alternatives := [each for key in ("oneOf", "anyOf") for each in made.pop(key, ())]:
+            made["anyOf"] = [self.of(each) for each in alternatives]  # without its tag it may be any
         return made
 
     def _or_null(self, schema: dict[str, Any]) -> dict[str, Any]:
@@ -92,8 +92,8 @@ def schema_of(cls: type[Description]) -> dict[str, Any]:
 def _describe_choices(part: dict[str, Any], text: str) -> None:
     """Put what a field's text says of each choice beside the choices, as editors show it."""
     for inner in [part, part.get("items", {}), *part.get("anyOf", ())]:
-        if "enum" in inner and (said := choices(text, inner["enum"])):
-            inner["enumDescriptions"] = said
+        if "enum" in inner and (sentences := choices(text, inner["enum"])):
+            inner["enumDescriptions"] = sentences
 
 
 class _Schema(GenerateJsonSchema):
@@ -106,35 +106,38 @@ class _Schema(GenerateJsonSchema):
         """A description with the texts of its class and fields."""
         cls = schema["cls"]
         docs = field_docs(cls)
-        made = super().model_schema(schema)
-        required = set(made.pop("required", ()))
-        for name, part in made["properties"].items():
+        generated = super().model_schema(schema)
+        properties, required = generated["properties"], set(generated.get("required", ()))
+        for name, part in properties.items():
             if text := docs.get(name) or ("const" in part and summary(cls)):
                 part["description"] = text
                 _describe_choices(part, text)
-            if part.get("default") == {}:  # what is described by all its defaults
+            if part.get("default") == {}:  # a description with all its defaults
                 del part["default"]
             if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:
                 part.pop("default", None)
                 required.add(name)
-        about = {"type": "object", "title": cls.__name__, "description": summary(cls)}
-        made = {**about, "properties": made["properties"], "additionalProperties": False}
-        return (
-            {**made, "required": [name for name in made["properties"] if name in required]}
-            if required
-            else made
-        )
+        description: JsonSchemaValue = {
+            "type": "object",
+            "title": cls.__name__,
+            "description": summary(cls),
+            "properties": properties,
+            "additionalProperties": False,
+        }
+        if required:
+            description["required"] = [name for name in properties if name in required]
+        return description
 
     def tuple_schema(self, schema: Any) -> JsonSchemaValue:
         """A list of equal parts says so once."""
-        made = super().tuple_schema(schema)
-        parts = made.get("prefixItems", [])
+        listed = super().tuple_schema(schema)
+        parts = listed.get("prefixItems", [])
         if parts and all(part == parts[0] for part in parts):
-            del made["prefixItems"]
-            made["items"] = parts[0]
-        return made
+            del listed["prefixItems"]
+            listed["items"] = parts[0]
+        return listed
 
     def dict_schema(self, schema: Any) -> JsonSchemaValue:
         """Keys that are no names are refused."""
-        made = super().dict_schema(schema)
-        return {**made, "additionalProperties": False} if "patternProperties" in made else made
+        keyed = super().dict_schema(schema)
+        return {**keyed, "additionalProperties": False} if "patternProperties" in keyed else keyed

@@ -55,12 +55,12 @@ def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Floats]:
     loses anything; nearer ones in the precision of the positions.
     """
     far = np.abs(light).max() > 1e4
-    way = column_major(light.astype(np.float64 if far else position.dtype) - position)
-    if not far and np.abs(way).max(initial=0) < 1e-15:
-        far, way = True, column_major(way, np.float64)
-    size = length(way)
-    distance = np.maximum(size, NEAREST)
-    l = way * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
+    offset = column_major(light.astype(np.float64 if far else position.dtype) - position)
+    if not far and np.abs(offset).max(initial=0) < 1e-15:
+        far, offset = True, column_major(offset, np.float64)
+    norm = length(offset)
+    distance = np.maximum(norm, NEAREST)
+    l = offset * np.divide(1, norm, out=np.zeros_like(norm), where=norm > 0)[:, None]
     if far:
         return column_major(l, position.dtype), distance.astype(position.dtype)
     return l, distance

@@ -24,8 +24,8 @@ class Directional(Light):
     def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
         """Light at `position`: the same everywhere, scale 1, distance inf."""
         lanes = len(position)
-        way = -np.asarray(self.direction) / np.abs(self.direction).max()
-        l = (way / np.linalg.norm(way)).astype(position.dtype)
+        direction = -np.asarray(self.direction) / np.abs(self.direction).max()
+        l = (direction / np.linalg.norm(direction)).astype(position.dtype)
         return LightSample(
             np.broadcast_to(l, (lanes, 3)),
             np.broadcast_to(position.dtype.type(np.inf), lanes),

@@ -56,9 +56,9 @@ class Spot(Light):
         return LightSample(l, distance, strength.astype(position.dtype))
 
 
-def gap_to_axis(way: NDArray[np.float64], axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def gap_to_axis(direction: NDArray[np.float64], axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N,) 1 - cos of the angle between (N, 3) vectors and an axis, within 0..2: half the squared distance of
     the unit vectors, which keeps its digits where the cosine is near 1."""
     axis = axis / np.abs(axis).max()
-    apart = unit(way) - axis / np.linalg.norm(axis)
+    apart = unit(direction) - axis / np.linalg.norm(axis)
     return np.minimum(dot(apart, apart) / 2, 2)

@@ -80,7 +80,7 @@ class IlluminationModel(Description):
         values : mapping
             Path, as `varying` names it -> (N,) numbers or (N, 3) colours, one per lane.
         """
-        return _placed(self, values)
+        return _replace_parameters(self, values)
 
     def _is_zero(self, name: str) -> bool:
         value = getattr(self, name)
@@ -95,11 +95,11 @@ def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture
             yield from _varying(value, f"{prefix}{name}.")
 
 
-def _placed(part: D, values: Mapping[str, Any]) -> D:
-    here = {path: value for path, value in values.items() if "." not in path}
+def _replace_parameters(part: D, values: Mapping[str, Any]) -> D:
+    changes = {path: value for path, value in values.items() if "." not in path}
     for name in {path.partition(".")[0] for path in values if "." in path}:
         inner = {
             path.removeprefix(f"{name}."): v for path, v in values.items() if path.startswith(f"{name}.")
         }
-        here[name] = _placed(getattr(part, name), inner)
-    return part.model_copy(update=here)
+        changes[name] = _replace_parameters(getattr(part, name), inner)
+    return part.model_copy(update=changes)

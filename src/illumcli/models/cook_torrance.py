@@ -61,10 +61,10 @@ class CookTorrance(IlluminationModel):
 
     def lobes(self) -> dict[str, Lobe]:
         """The lobes that are not black; the specular one asks for the light's colour only where F does."""
-        found = super().lobes()
-        if "specular" in found and isinstance(self.fresnel, Shifted) and self.fresnel.grazing == "light":
-            found["specular"] = self.colored_lobe
-        return found
+        lobes = super().lobes()
+        if "specular" in lobes and isinstance(self.fresnel, Shifted) and self.fresnel.grazing == "light":
+            lobes["specular"] = self.colored_lobe
+        return lobes
 
     def diffuse_color(self) -> Any:
         """kd * rho."""

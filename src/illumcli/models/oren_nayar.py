@@ -87,10 +87,10 @@ class OrenNayar(IlluminationModel):
 
     def lobes(self) -> dict[str, Lobe]:
         """The diffuse lobe in the form chosen: the simple one asks for no angles."""
-        found = super().lobes()
-        if "diffuse" in found and self.form == "qualitative":
-            found["diffuse"] = self.qualitative_lobe
-        return found
+        lobes = super().lobes()
+        if "diffuse" in lobes and self.form == "qualitative":
+            lobes["diffuse"] = self.qualitative_lobe
+        return lobes
 
     def diffuse_lobe(
         self, n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, cos_phi: Floats

@@ -59,11 +59,11 @@ def refuse_outside(loaded: SceneFile, number: int, path: Path) -> None:
 
 def file_problems(loaded: SceneFile) -> list[str]:
     """What is wrong with each path in the scene, a line each."""
-    found = [
+    files = [
         (at, node, file_inside(str(node.value), loaded.folder, loaded.roots))
         for at, node in paths_in(loaded.tree)
     ]
-    return problem_lines([problem_at(node.at, at, fact) for at, node, fact in found if isinstance(fact, str)])
+    return problem_lines([problem_at(node.at, at, fact) for at, node, fact in files if isinstance(fact, str)])
 
 
 def paths_in(tree: Node) -> Iterator[tuple[source.Path, Node]]:

@@ -30,20 +30,22 @@ class Applied(NamedTuple):
 
 
 def blamed(
-    found: Sequence[PlacedFault],
+    tree_faults: Sequence[PlacedFault],
     tree: Node,
     applied: Sequence[Applied],
-    judged: Callable[[Node], Sequence[PlacedFault]],
+    faults_of: Callable[[Node], Sequence[PlacedFault]],
 ) -> Iterator[Problem | PlacedFault]:
     """Each fault of `tree` that stands in a file, but comes from an override, as a problem of that; the
     others as they are.
 
-    `judged` gives the faults of a tree. A fault is the same in two trees where its place and its fact are.
+    `faults_of` gives the faults of a tree. A fault is the same in two trees where its place and its fact are.
     """
-    written = [fault for fault in found if fault.place.line]
-    known = [{(each.place, each.fact) for each in judged(step.before)} for step in applied] if written else []
+    written = [fault for fault in tree_faults if fault.place.line]
+    known = (
+        [{(each.place, each.fact) for each in faults_of(step.before)} for step in applied] if written else []
+    )
     left_over: dict[int, list[PlacedFault]] = {}
-    for fault in found:
+    for fault in tree_faults:
         new = [k for k, faults in enumerate(known) if (fault.place, fault.fact) not in faults]
         if not fault.place.line or not new:
             yield fault

@@ -43,9 +43,9 @@ def parse(text: str, problems: list[Problem]) -> Override | None:
         return None
     if value.strip().startswith("#"):  # a colour; YAML would take it for a comment
         return Override(steps, Node(value.strip(), place), path.strip())
-    node, found = source.read(value.encode("utf-8", "surrogateescape"), "", place)
-    problems += found
-    return None if node is None or found else Override(steps, node, path.strip())
+    node, node_problems = source.read(value.encode("utf-8", "surrogateescape"), "", place)
+    problems += node_problems
+    return None if node is None or node_problems else Override(steps, node, path.strip())
 
 
 def assign(tree: Node, override: Override, problems: list[Problem]) -> Node | None:
@@ -121,13 +121,13 @@ def _element_names(parts: list[Node], path: tuple[str, ...]) -> tuple[str, ...]:
     if path not in (("objects",), ("lights",)):
         return ()
 
-    def said(part: Node, key: str) -> Any:
-        found = part.find((key,))
-        return found.value if found else None
+    def text_of(part: Node, key: str) -> Any:
+        node = part.find((key,))
+        return node.value if node else None
 
     def name(part: Node, number: int) -> str:
-        kind = "object" if path == ("objects",) else said(part, "light")
-        return str(said(part, "name") or f"{kind}{number}")
+        kind = "object" if path == ("objects",) else text_of(part, "light")
+        return str(text_of(part, "name") or f"{kind}{number}")
 
     return tuple(name(part, i + 1) for i, part in enumerate(parts))
 

@@ -151,9 +151,9 @@ def read(text: bytes, name: str, fixed: Place | None = None) -> tuple[Node | Non
         before = text[: error.start].decode("utf-8-sig")
         at = fixed or _place_after(before, name)
         return None, [Problem(at, (), f"byte 0x{text[error.start]:02x} is not UTF-8; save the file as UTF-8")]
-    if found := _CONTROL.search(decoded):
-        at = fixed or _place_after(decoded[: found.start()], name)
-        return None, [Problem(at, (), f"character U+{ord(found[0]):04X} is not text; remove it")]
+    if control := _CONTROL.search(decoded):
+        at = fixed or _place_after(decoded[: control.start()], name)
+        return None, [Problem(at, (), f"character U+{ord(control[0]):04X} is not text; remove it")]
     composer = _Composer(decoded, lambda mark: fixed or Place(name, mark.line + 1, mark.column + 1))
     return composer.document(place), composer.problems
 
@@ -302,13 +302,13 @@ class _Composer:
 
     def merged(self, value: Node, path: Path, mark: Any) -> dict[str, Node]:
         """What `<<:` brings: the entries of a mapping or of several, the first of which wins."""
-        found: dict[str, Node] = {}
+        entries: dict[str, Node] = {}
         for part in value.value if isinstance(value.value, list) else [value]:
             if isinstance(part.value, dict):
-                found = part.value | found
+                entries = part.value | entries
             else:
                 self.problem(mark, path, "<< must name mappings, as in `<<: *name`")
-        return found
+        return entries
 
     def scalar(self, event: Any, mark: Any, path: Path) -> Scalar:
         text = event.value
@@ -322,13 +322,13 @@ class _Composer:
         if _NOT_FINITE.fullmatch(text):
             self.problem(mark, path, f"must be a finite number, is {text}")
             return text
-        whole = _INTEGER.fullmatch(text)
-        if not whole and not _FLOAT.fullmatch(text):
+        integer = _INTEGER.fullmatch(text)
+        if not integer and not _FLOAT.fullmatch(text):
             return text
         if len(text) > MAX_DIGITS:
             self.problem(mark, path, f"a number of {len(text)} digits; at most {MAX_DIGITS} count")
             return text
-        if whole:
+        if integer:
             base = {"0o": 8, "0x": 16}.get(text[:2], 10)
             return int(text, base)
         number = float(text)
@@ -347,6 +347,8 @@ def _branch(value: list[Node] | dict[str, Node], parts: Iterable[Node], place: P
 
 
 def _syntax(error: yaml.MarkedYAMLError) -> str:
-    said = " ".join(f"{error.problem or ''} {error.context or ''}".split())
-    way = next((way for words, way in _WAYS_OUT if words in said), "correct the text here or just above")
-    return f"not YAML: {short(said, 160)}; {way}"
+    message = " ".join(f"{error.problem or ''} {error.context or ''}".split())
+    way_out = next(
+        (way_out for words, way_out in _WAYS_OUT if words in message), "correct the text here or just above"
+    )
+    return f"not YAML: {short(message, 160)}; {way_out}"

@@ -424,8 +424,8 @@ class Scene(Description):
 
     def material_of(self, thing: Object) -> AnyModel | None:
         """The object's own material with its overrides; None where the mesh selects materials."""
-        own = thing.material
-        model = self.materials[own] if isinstance(own, str) else own
+        material = thing.material
+        model = self.materials[material] if isinstance(material, str) else material
         if not thing.override:
             return model
         base = model or self.fallback_of(thing) or default_material()
@@ -433,10 +433,10 @@ class Scene(Description):
 
     def fallback_of(self, thing: Object) -> AnyModel | None:
         """The object's fallback; None where it has a material or asks for no other."""
-        own = thing.fallback
+        fallback = thing.fallback
         if thing.material is not None:
             return None
-        return self.materials[own] if isinstance(own, str) else own
+        return self.materials[fallback] if isinstance(fallback, str) else fallback
 
     def named_cameras(self) -> dict[str, Perspective | Orthographic]:
         """The cameras by name, at least one."""

@@ -89,17 +89,17 @@ def arranged(tree: Node, studio: Studio) -> Node:
 
 
 def _numbers(tree: Node, path: tuple[str | int, ...]) -> tuple[float, float, float]:
-    found = tree.find(path)
-    assert found is not None
-    x, y, z = found.plain()
+    node = tree.find(path)
+    assert node is not None
+    x, y, z = node.plain()
     return x, y, z
 
 
 def _parts(tree: Node, name: str) -> list[Node]:
-    found = tree.find((name,))
-    assert found is not None
-    assert isinstance(found.value, list)
-    return found.value
+    node = tree.find((name,))
+    assert node is not None
+    assert isinstance(node.value, list)
+    return node.value
 
 
 def _turned(position: tuple[float, float, float], angle: float) -> tuple[float, float, float]:

@@ -1,7 +1,7 @@
-"""What a scene says and what changes nothing beside the rest of it: told once, with the way out.
+"""Keys of a scene that have no effect beside the rest of it, with the way out.
 
-Arithmetic is none of it (a light of intensity 0), nor what no layer asked for shows, nor a material, mesh or
-camera that nothing names: scenes share them by `extends`.
+Not reported: arithmetic (a light of intensity 0), what no requested layer shows, and materials, meshes or
+cameras that nothing names, since scenes share them by `extends`.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from illumcli.schema.description import Description
 
 
 def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:
-    """The part and the fact of whatever has no effect where it is said; what is not said is among them.
+    """The part and the fact of whatever has no effect; parts that the scene does not write are among them.
 
     Parameters
     ----------
     layers : collection of str
-        Layers that are made.
+        Layers that are rendered.
     files : collection of str
         Name patterns of the files that are written; none where the scene's own are not.
     """
@@ -54,10 +54,10 @@ LIT = {"beauty", "ambient", "diffuse", "specular"}
 def _may_emit(scene: Scene) -> bool:
     """May some surface send light of its own?"""
     for (_, source), thing in zip(_sources(scene), scene.objects, strict=True):
-        own = scene.material_of(thing)
-        if own is None and (thing.fallback is not None or getattr(source, "materials", False)):
+        material = scene.material_of(thing)
+        if material is None and (thing.fallback is not None or getattr(source, "materials", False)):
             return True
-        models = scene.materials.values() if own is None else [own]
+        models = scene.materials.values() if material is None else [material]
         if any(model.emission != (0.0, 0.0, 0.0) for model in models):
             return True
     return False
@@ -136,18 +136,18 @@ def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
     model = scene.material_of(thing)
     if model is not None and model.isotropic:
         yield (*path, "grain"), f"is not used, the model {dict(model)['model']} has none; leave it out"
-    own = _sources(scene)[number][1]
+    source = _sources(scene)[number][1]
     if thing.material is not None:
         yield (*path, "fallback"), "is not used, the object has a material of its own; leave one of them out"
-    if thing.override and thing.material is None and (thing.fallback or getattr(own, "materials", False)):
+    if thing.override and thing.material is None and (thing.fallback or getattr(source, "materials", False)):
         fact = "replaces all that the mesh file selects by one material; give the object a material"
         yield (*path, "override"), fact
     x, y, z = thing.transform.scale
     if thing.transform.fit is not None and x == y == z > 0:
         yield (*path, "transform", "scale"), "is not used, fit says the size; leave one of them out"
     if model is not None:
-        said = ("materials", thing.material) if isinstance(thing.material, str) else (*path, "material")
-        for where in (said, (*path, "override")):
+        written = ("materials", thing.material) if isinstance(thing.material, str) else (*path, "material")
+        for where in (written, (*path, "override")):
             for name in _colored_by(model):
                 fact = "is not used, a colour reads r, g and b; leave it out"
                 yield (*where, *name.split("."), "channel"), fact

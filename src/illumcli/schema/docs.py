@@ -17,7 +17,7 @@ def field_docs(cls: type) -> dict[str, str]:
     """What each field of a class means, inherited ones included; fields without a text are left out."""
     docs: dict[str, str] = {}
     for base in reversed(cls.__mro__):
-        docs |= _written(base.__module__).get(base.__qualname__, {})
+        docs |= _docs_of_module(base.__module__).get(base.__qualname__, {})
     return docs
 
 
@@ -32,12 +32,12 @@ def choices(text: str, names: Sequence[str]) -> list[str]:
     one out."""
     quoted = "|".join(map(re.escape, names))
     parts = re.split(rf"`({quoted})`: ", text)
-    said = dict(zip(parts[1::2], parts[2::2], strict=True))
-    return [said[name].strip() for name in names] if said.keys() >= set(names) else []
+    sentences = dict(zip(parts[1::2], parts[2::2], strict=True))
+    return [sentences[name].strip() for name in names] if sentences.keys() >= set(names) else []
 
 
 @cache
-def _written(module: str) -> dict[str, dict[str, str]]:
+def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
     """By class, by field: the texts of a module; none for what is not ours."""
     if not module.startswith("illumcli."):
         return {}

@@ -1,0 +1,20 @@
+"""The page about the architecture names files that exist, and its picture is what the imports say."""
+
+from __future__ import annotations
+
+import re
+import runpy
+
+
+def test_the_picture_is_up_to_date(root):
+    drawn = runpy.run_path(str(root / "docs" / "make_architecture.py"))["svg"]()
+    assert (root / "docs" / "architecture.svg").read_text() == drawn, "python docs/make_architecture.py"
+
+
+def test_the_page_names_files_of_the_package(root):
+    page = (root / "docs" / "architecture.md").read_text()
+    named = re.findall(r"`([a-z_]+/[a-z_/]*(?:\.py)?)`", page)
+    assert len(named) > 20
+    for name in named:
+        if not name.startswith(("docs/", "src/")):
+            assert (root / "src" / "illumcli" / name).exists(), name

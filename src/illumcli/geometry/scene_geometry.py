@@ -174,17 +174,17 @@ def scene_geometry(
 def scene_normals(geometry: SceneGeometry, normals: Sequence[CornerNormals]) -> CornerVectors:
     """Unit shading normals of every corner in scene directions, from those of each object's mesh."""
     values, index, first = [], [], 0
-    for placed, own in zip(geometry.placed, normals, strict=True):
+    for placed, of_mesh in zip(geometry.placed, normals, strict=True):
         # Normals transform by the inverse transpose, up to a factor the cofactors; scaled against overflow.
         linear = placed.matrix[:3, :3]
         scale = np.abs(linear).max() or 1.0
-        transformed = own.normals @ cofactors(linear / scale).T
+        transformed = of_mesh.normals @ cofactors(linear / scale).T
         if placed.mirrored:
             transformed = -transformed
         size = np.linalg.norm(transformed, axis=1, keepdims=True)
         values.append(np.divide(transformed, size, out=np.zeros_like(transformed), where=size > 0))
-        index.append(np.where(own.index >= 0, own.index + first, -1).astype(np.int32))
-        first += len(own.normals)
+        index.append(np.where(of_mesh.index >= 0, of_mesh.index + first, -1).astype(np.int32))
+        first += len(of_mesh.normals)
     return CornerVectors(
         column_major(_concatenated(values, np.zeros((0, 3))), F), _concatenated(index, np.zeros(0, np.int32))
     )

@@ -40,7 +40,7 @@ class Baked(Record):
         return self._part(self.obscurance, "vertices", name, count)
 
     def of_corners(self, name: str, corners: NDArray[np.int32], count: int) -> NDArray[np.float32] | None:
-        """(C,) the same at the mesh's corners, (C,) vertex numbers: their own values, else the vertices'."""
+        """(C,) the same at the mesh's corners, (C,) vertex numbers: values of corners, else of vertices."""
         values, at_corners = self.of(name, count), None
         if self.corner_obscurance is not None:
             at_corners = self._part(self.corner_obscurance, "corners", name, len(corners))
@@ -59,16 +59,16 @@ class Baked(Record):
         return None
 
     def hashes(self) -> list[str]:
-        """Of the meshes that were baked."""
+        """Hashes of the meshes that were baked."""
         return list(dict(self.about.get("meshes", {})).values())
 
     def columns(self) -> dict[str, NDArray[np.float32]]:
-        """What is written of every vertex, by name."""
+        """The arrays of values per vertex, by name."""
         columns = {"obscurance": self.obscurance, "standard_error": self.standard_error}
         return columns if self.bent_normal is None else {**columns, "bent_normal": self.bent_normal}
 
     def corner_columns(self) -> dict[str, NDArray[np.float32]]:
-        """What is written of every corner, by name; nothing where no vertex has several values."""
+        """The arrays of values per corner, by name; none if no vertex has several values."""
         names = ("corner_obscurance", "corner_standard_error", "corner_bent_normal")
         return {name: values for name in names if (values := getattr(self, name)) is not None}
 

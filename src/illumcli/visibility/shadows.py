@@ -1,10 +1,10 @@
-"""Occlusion of lights: delta(p, j), asked by shadow rays for the samples that a light may reach.
+"""Shadows: delta(p, j), by shadow rays from the samples that a light may reach.
 
-A shadow ray starts on the polygon. Where polygons stand for a smooth surface that is a false terminator: on
-the lit side of the surface, polygons that face away from the light, or hide behind their neighbours, would be
-in shadow. So a sample whose own ray is blocked asks again from the surface that its normals imply. That ray
-must not jump over anything: the way to its start must be free, and nothing but the surface itself may stand
-nearby in the light's direction.
+A shadow ray starts on the polygon. Where polygons stand for a smooth surface this causes the shadow
+terminator problem: polygons on the lit side of the surface that face away from the light, or are hidden by
+their neighbours, would be in shadow. So where the ray of a sample is blocked, a second one starts from the
+surface that the normals imply. It must not jump over anything: the segment to its origin must be unoccluded,
+and nothing but the surface itself may be nearby in the light's direction.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.records import Record
 
 TERMINATOR_SHARE = 1 / 3
-"""Of the diagonal of a polygon's bounding box: how far off it a shadow ray may start at most; normals may say
-anything. A sphere wants up to 0.24 (a cube's faces) or 0.27 (an octahedron's), finer ones less."""
+"""Upper bound on the terminator offset, in diagonals of the polygon's bounding box: normals may be anything.
+A sphere needs up to 0.24 (a cube's faces) or 0.27 (an octahedron's), finer ones less."""
 NEARBY = 2.0
-"""Such diagonals within which whatever is not part of the same smooth surface shadows a sample."""
+"""Distance, in such diagonals, within which anything but the same smooth surface shadows a sample."""
 
 
 class SmoothSurface(Record):
-    """The samples of a tile on the smooth surfaces that their normals imply."""
+    """The samples of a tile, with what implies a smooth surface at each."""
 
     context: ShadingContext
     normals: CornerVectors
@@ -50,7 +50,7 @@ def smooth_surface(
 
 
 def ray_origins(interaction: SurfaceInteraction) -> Vectors:
-    """(M, 3) float32 where shadow and obscurance rays start: on the facet, off it by rounding alone."""
+    """(M, 3) float32 origins of shadow and obscurance rays: on the triangle, offset by rounding alone."""
     return offset_ray_origins(interaction.position, interaction.ng, interaction.edge)
 
 
@@ -62,20 +62,23 @@ def shadow(
 ) -> NDArray[np.float32]:
     """(M,) delta of one light: 1 where it arrives, 0 in shadow and on samples that it does not reach.
 
-    With `smooth_surface` a false terminator is taken away; the samples are then those of its tile.
+    With `smooth_surface` the shadow terminator is corrected; the samples are then those of its tile.
     """
+    # One shadow ray for each sample that the light may reach.
     lit, smooth = shadow_candidates, smooth_surface
     delta = np.zeros(lit.count, F)
     hidden = tracer.occluded(column_major(take_rows(ray_origins, lit.index)), lit.l, lit.distance)
+
+    # A second one, from the implied surface, where it is blocked.
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
         sample = lit.index.take(blocked)
         l, distance = column_major(take_rows(lit.l, blocked)), lit.distance.take(blocked)
-        hidden[blocked] = ~_implied_reached(tracer, smooth, ray_origins, sample, l, distance)
+        hidden[blocked] = ~_lit_on_implied_surface(tracer, smooth, ray_origins, sample, l, distance)
     delta[lit.index] = ~hidden
     return delta
 
 
-def _implied_reached(
+def _lit_on_implied_surface(
     tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Floats
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
@@ -91,24 +94,24 @@ def _implied_reached(
     flat = smooth.flat.take(geometry.objects.take(weights.hits.triangle))
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
-    # Ask the light from there, and of what it reaches, whether the way there is free.
+    # Samples whose shadow ray from there is unoccluded, and the segment to its origin, too.
     ng, edge = take_rows(interaction.ng, sample.take(curved)), interaction.edge.take(sample.take(curved))
     starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
     curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
     height = length(_at(offset, curved))
-    own = column_major(take_rows(origins, sample.take(curved)))
-    curved = curved[~tracer.occluded(own, column_major(_at(offset, curved) / height[:, None]), height)]
+    on_polygon = column_major(take_rows(origins, sample.take(curved)))
+    curved = curved[~tracer.occluded(on_polygon, column_major(_at(offset, curved) / height[:, None]), height)]
 
-    # What stands nearby in the light's direction shadows the sample, unless it is the surface itself.
-    own, ng = (
+    # Anything nearby in the light's direction shadows the sample, unless it is the surface itself.
+    on_polygon, ng = (
         column_major(take_rows(origins, sample.take(curved))),
         take_rows(interaction.ng, sample.take(curved)),
     )
-    hit = tracer.closest(own, _above(_at(l, curved), ng))
+    hit = tracer.closest(on_polygon, _above(_at(l, curved), ng))
     near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
-    same = smooth.parts.are_joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
+    is_same = smooth.parts.are_joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
     reached = np.zeros(len(sample), np.bool_)
-    reached[curved[(hit.distance >= near) | same]] = True
+    reached[curved[(hit.distance >= near) | is_same]] = True
     return reached
 
 
@@ -118,7 +121,7 @@ def _terminator_offset(
     """(B, 3) the way from samples on polygons to the surface that the normals at their corners imply."""
     geometry, normals = smooth.context.geometry, smooth.normals
 
-    def way(group: Corners, k: int) -> Vectors:
+    def corner_offset(group: Corners, k: int) -> Vectors:
         normal = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
         corner = take_rows(geometry.vertices, group.vertex(geometry, k))
         if group.lane is None:
@@ -127,11 +130,11 @@ def _terminator_offset(
             take_rows(position, group.lane), corner, facing(normal, back_facing.take(group.lane))
         )
 
-    return weights.joined(way)
+    return weights.joined(corner_offset)
 
 
 def _box_diagonals(geometry: SceneGeometry, weights: CornerWeights) -> Floats:
-    """(B,) the diagonal of the bounding box of the polygon under each sample, in radii."""
+    """(B,) diagonal of the bounding box of the polygon that each sample is on [radii]."""
     out = np.empty(len(weights), F)
     for group in weights.groups:
         corners = [take_rows(geometry.vertices, group.vertex(geometry, k)) for k in range(group.count)]
@@ -145,6 +148,6 @@ def _at(values: NDArray[Any], index: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def _above(l: Vectors, ng: Vectors) -> Vectors:
-    """(N, 3) float32 `l`, taken along the polygon's plane where it points below it."""
+    """(N, 3) float32 `l`, projected onto the polygon's plane where it points below it."""
     below = np.minimum(dot(l, ng), 0)
     return column_major(unit(l - below[:, None] * ng), F)

@@ -1,6 +1,6 @@
 """Built-in shapes, one file each: the file's name is the tag of ``shape:`` in a scene.
 
-All stand y up around the origin and, unless asked otherwise, fill the cube from -1 to 1.
+All have y up, are centred at the origin and by default fill the cube from -1 to 1.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What every shape is: frozen parameters that make a mesh."""
+"""Base of all shapes: frozen parameters that make a mesh."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from illumcli.records import Record
 
 
 class Profile(Record):
-    """A curve in the half plane of the axis, travelled so that its outside lies to the right."""
+    """A curve in a half plane that ends at the axis; the outside is on its right."""
 
     radius: NDArray[np.float64]  # (M,) 0 where the curve meets the axis, exactly
     height: NDArray[np.float64]  # (M,)

@@ -75,10 +75,13 @@ def draw_brdfs(
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
     """The models by name, with their parameters; those named twice are numbered by their place."""
+    # Parse the overrides; what is wrong is collected and raised at once.
     problems: list[str] = []
-    read: list[Problem] = []
-    changes = [(text, change) for text in overrides if (change := parse(text, read))]
-    problems += map(str, read)
+    unreadable: list[Problem] = []
+    changes = [(text, change) for text in overrides if (change := parse(text, unreadable))]
+    problems += map(str, unreadable)
+
+    # Each model with the overrides that are meant for it.
     models: dict[str, IlluminationModel] = {}
     applied: set[str] = set()
     parameters: list[str] = []
@@ -91,17 +94,23 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
             applied |= {text for text, change in changes if change.steps[0] in (name, str(place))}
             continue
         parameters += [name for name in Model.model_fields if name != "model"]
-        mine = [(text, own) for text, change in changes if (own := _for(change, name, place, Model, names))]
-        applied |= {text for text, _ in mine}
-        made, found = _described(Model, mine)
-        problems += [f"{title}: {fact}" if not fact.startswith("-D ") else fact for fact in found]
-        if made is not None:
-            models[title] = made
+        settings = [
+            (text, setting)
+            for text, change in changes
+            if (setting := _for(change, name, place, Model, names))
+        ]
+        applied |= {text for text, _ in settings}
+        model, facts = _described(Model, settings)
+        problems += [f"{title}: {fact}" if not fact.startswith("-D ") else fact for fact in facts]
+        if model is not None:
+            models[title] = model
+
+    # Overrides that are meant for none.
     known = tuple(dict.fromkeys([*names, *parameters]))
     for text, change in changes:
         if text not in applied:
-            way = suggestion(change.steps[0], known)
-            problems.append(f"-D {text}: no model or parameter '{change.steps[0]}'; {way}")
+            hint = suggestion(change.steps[0], known)
+            problems.append(f"-D {text}: no model or parameter '{change.steps[0]}'; {hint}")
     if problems:
         raise InputError(dict.fromkeys(problems))
     return models
@@ -110,7 +119,7 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
 def _for(
     change: Override, name: str, place: int, Model: type[Description], names: Sequence[str]
 ) -> tuple[tuple[str, ...], Any] | None:
-    """Steps within the model and the value, where the override is meant for it."""
+    """Steps within the model and the value, if the override is meant for it."""
     first, *rest = change.steps
     if first in (name, str(place)) and rest:
         return tuple(rest), change.value.plain()
@@ -122,9 +131,10 @@ def _for(
 def _described(
     Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
 ) -> tuple[IlluminationModel | None, list[str]]:
-    """The model with its changes, or None and what is wrong, after the override that it comes from."""
+    """The model with its changes, or None and what is wrong, with the override that it comes from."""
+    # Nested keys, as a scene would have them.
     keys: dict[str, Any] = {"model": tag_of(Model)}
-    said: dict[tuple[str, ...], str] = {}
+    text_of: dict[tuple[str, ...], str] = {}
     for text, (steps, value) in changes:
         here = keys
         for step in steps[:-1]:
@@ -134,16 +144,18 @@ def _described(
                     f"-D {text}: nothing is inside {step}, which has a value of its own; give it whole"
                 ]
         here[steps[-1]] = value
-        said[steps] = text
+        text_of[steps] = text
+
+    # Validate; each fault is named after the last override that set it.
     try:
         return Model.model_validate(keys), []
     except ValidationError as error:
-        found = []
+        facts = []
         for path, fact in faults(error, Model, keys):
             where = ".".join(map(str, path))
-            given = [text for steps, text in said.items() if path[: len(steps)] == steps]
-            found.append(f"-D {given[-1]}: {fact}" if given else f"{where}: {fact}" if where else fact)
-        return None, found
+            given = [text for steps, text in text_of.items() if path[: len(steps)] == steps]
+            facts.append(f"-D {given[-1]}: {fact}" if given else f"{where}: {fact}" if where else fact)
+        return None, facts
 
 
 def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:

@@ -140,10 +140,10 @@ def tried(cases: Iterator[bytes] | list[bytes], suffix: str, read: Callable[[Pat
 
 def load_and_plan(path: Path) -> None:
     """A scene as `illum plan` reads it."""
-    from illumcli.commands.render import prepared
-    from illumcli.scene.load import load
+    from illumcli.commands.options import RenderJob
+    from illumcli.commands.work import prepared
 
-    prepared(load(path))
+    prepared(RenderJob(path))
 
 
 def meshes() -> dict[str, tuple[str, bytes]]:

@@ -76,14 +76,14 @@ def layout(arrows: dict[str, set[str]]) -> tuple[list[list[Slot]], list[list[Slo
     """
     row_of = depths(arrows)
     rows: list[list[Slot]] = [[] for _ in range(max(row_of.values()) + 1)]
-    for folder, row in row_of.items():
-        rows[row].append((folder, ""))
+    for folder, number in row_of.items():
+        rows[number].append((folder, ""))
     chains = []
     for folder, others in arrows.items():
         for other in sorted(others):
-            between = [(f"{folder} {row}", other) for row in range(row_of[folder] + 1, row_of[other])]
-            for row, slot in enumerate(between, row_of[folder] + 1):
-                rows[row].append(slot)
+            between = [(f"{folder} {number}", other) for number in range(row_of[folder] + 1, row_of[other])]
+            for number, slot in enumerate(between, row_of[folder] + 1):
+                rows[number].append(slot)
             chains.append([(folder, ""), *between, (other, "")])
     links = [pair for chain in chains for pair in pairwise(chain)]
     place = {slot: (k + 0.5) / len(row) for row in rows for k, slot in enumerate(row)}

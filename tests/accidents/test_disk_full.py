@@ -96,7 +96,9 @@ while True:
         complete = False
         refused += 1
         fault = known(error)
-        assert fault is not None and fault.exit_code in (4, 5), repr(error)
+        assert fault is not None, repr(error)
+        of_input = str(fault).startswith(("scene.yaml: ", "thing.obj: "))
+        assert fault.exit_code == 2 if of_input else fault.exit_code in (4, 5), repr(error)
         assert len(str(fault).splitlines()) <= 4, str(fault)
     done = state["calls"] < n
     state["fail"] = 0

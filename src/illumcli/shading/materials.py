@@ -205,7 +205,7 @@ def as_meant(model: IlluminationModel) -> IlluminationModel:
 
 def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> IlluminationModel:
     """The model with vertex colours in place of a diffuse colour that does not vary, or times that colour."""
-    if "diffuse" not in model.model_fields or "diffuse" in model.varying():
+    if "diffuse" not in type(model).model_fields or "diffuse" in model.varying():
         return model
     own = dict(model)["diffuse"] if is_factor else (1.0, 1.0, 1.0)
     return (

@@ -1,4 +1,4 @@
-"""Memory of the system: how much is free, what is too much, what is freed kept, and what is asked for."""
+"""Process memory: what is available, limits, keeping freed pages for reuse, checks before libraries load."""
 
 from __future__ import annotations
 

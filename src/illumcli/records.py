@@ -1,7 +1,7 @@
 """Frozen records that functions hand to each other.
 
-They behave as the standard library's frozen data classes. Those compile six methods for every class, 0.6 ms a
-class, and a render imports about a hundred; here all classes share their methods.
+They behave like frozen data classes of the standard library. Those compile six methods per class, which takes
+0.6 ms, and a render imports about a hundred classes; here all classes share their methods.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What is kept between runs: named arrays in files of a cache folder, checked whenever they are read.
+"""The cache on disk: named arrays in files of a cache folder, verified whenever they are read.
 
-A file is a header of 64 bytes, a description as JSON and the arrays behind it, each at a multiple of 64. The
-checksum in the header covers every other byte, so that an entry that is damaged, short or another's is found
-out and costs the time to make it again, no more. Entries are never changed: they are written under another
-name and renamed, and taken away; processes may share a folder. They are read, not mapped: a mapped file that
-somebody cuts short ends the process, and one that somebody changes is not what was checked.
+An entry is a header of 64 bytes, a description as JSON, and the arrays, each aligned to 64 bytes. The
+checksum in the header covers all other bytes, so a damaged or truncated entry is a miss and is computed
+again. Entries are never modified: they are written under a temporary name, renamed, and later removed;
+processes may share a folder. Entries are read, not mapped: truncating a mapped file kills the process, and
+changing one would bypass the check.
 
 The checksum finds accidents. What keeps strangers out is who may write to the folder and to the entry: the
 user and root alone, else nothing of it is read and nothing kept in it.

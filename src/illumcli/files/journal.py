@@ -1,8 +1,8 @@
-"""Finished pieces of one long computation in a file, for the run that takes it up again.
+"""A journal of finished pieces of one long computation, from which an interrupted run resumes.
 
-A header names the computation. Every record has a key, and a checksum over the computation, the key and the
-values, so that no record of another computation, and no damaged one, is ever taken. Records are appended,
-never changed. One process at a time holds a journal; another with the same computation goes without.
+A header names the computation. Every record has a key and a checksum over computation, key and values, so
+records of other computations and damaged records are never used. Records are appended, never changed. One
+process at a time holds a journal; a second process with the same computation runs without one.
 """
 
 from __future__ import annotations

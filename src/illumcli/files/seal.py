@@ -1,4 +1,4 @@
-"""A file's own hash in the file: what was changed or damaged since it was written is told.
+"""Files that contain their own hash, so that later damage and edits are detected.
 
 The metadata of every image and baked mesh hold `illum-body:` and 32 hexadecimal digits, the BLAKE2b-128 of
 the file with these digits 0. A PNG, whose pieces have checksums, has them in its last piece before the end,

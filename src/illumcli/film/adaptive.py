@@ -1,8 +1,8 @@
-"""Which pixels want more samples: those whose own samples, or their neighbours', do not agree.
+"""Adaptive antialiasing: pixels whose samples, or whose neighbours' samples, differ get all samples.
 
-A pixel that is not sampled further keeps the few samples that agreed. What they missed is missed: a thing
-smaller than the gaps between them, and noise that by chance was still. So pictures are not unbiased where
-this is used, and err towards what is smooth; pixels that are sampled further are as without it.
+A pixel that is not refined keeps its first few samples. Features smaller than the sample spacing, and noise
+that happened to agree, are missed. So adaptive pictures are biased, towards smoothness; refined pixels are
+the same as without it.
 
 References
 ----------

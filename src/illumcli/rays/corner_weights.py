@@ -1,4 +1,4 @@
-"""Weights of the corners of the polygon that a hit lies on: the one way values at corners reach hits.
+"""Interpolation weights of the corners of the polygon that was hit; all values at corners use them.
 
 Triangles have barycentric weights. Planar polygons of more corners are interpolated over the whole polygon,
 so that nothing depends on how they were cut: clearly convex quads by inverse bilinear coordinates, all others

@@ -1,8 +1,8 @@
-"""The ray core: what is hit first, and is the way free. The one home of embreex.
+"""Embree queries: closest hit and occlusion. No other folder imports embreex.
 
-embreex checks the type of its arrays and nothing else: it reads past short ones, overwrites the caller's
-distances, spends as long on one NaN ray as on 1500 good ones and only logs Embree's errors. Everything that
-goes through here is checked or copied first.
+embreex checks only the type of its arrays. It reads past the end of short ones, overwrites the caller's
+distances, takes as long for one NaN ray as for 1500 valid ones, and only logs Embree's errors. So all arrays
+are checked or copied here first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Hits to what shading asks of them: position, planes, normals, uv, tangents, ids."""
+"""Surface interactions: what shading needs of a hit, as position, planes, normals, uv, tangents and ids."""
 
 from __future__ import annotations
 

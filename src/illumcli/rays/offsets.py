@@ -1,4 +1,4 @@
-"""Where a secondary ray starts: off its own surface by the rounding of the arithmetic, and no more."""
+"""Ray offsets: secondary rays start off their own surface by the rounding error of the arithmetic alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs a plan over tiles on a pool of threads, frees dead buffers, counts and times each step."""
+"""Runs a plan over tiles on a thread pool, frees buffers after their last use, counts and times each step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run would take, against what the machine has, before anything is read or allocated."""
+"""Limits: the memory and disk that a run would take, checked before anything is read or allocated."""
 
 from __future__ import annotations
 

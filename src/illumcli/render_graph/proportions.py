@@ -1,8 +1,8 @@
-"""Objects beside which a scene is so large that rays start visibly far off the surfaces around them.
+"""Warns where a scene is so much larger than one of its objects that ray offsets become visible around it.
 
-A scene is traced in single precision, in radii from its centre, and secondary rays start off their surface by
-a share of the place and of the polygon's edge there (`rays.offsets`): on a floor 10^5 times as large as what
-stands on it by some hundredths of that, and shadows no longer meet what casts them.
+Rays are traced in single precision in render space, and secondary rays start off their surface by a fraction
+of their position and of the polygon's edge there (`rays.offsets`). On a floor 10^5 times as large as an
+object the offset is some hundredths of the object, and its shadow no longer meets it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What was put right or left out of a job's files: told, refused, reported."""
+"""Repairs of a job's input files: printed, refused with --strict, reported."""
 
 from __future__ import annotations
 

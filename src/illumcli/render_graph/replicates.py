@@ -1,9 +1,8 @@
-"""The standard error of a picture: some pixels are rendered once more, on random numbers of their own.
+"""Standard error of a picture: some pixels are rendered a second time, with separate random numbers.
 
-Half the squared difference of two independent pictures of a pixel is an unbiased sight of its variance, with
-whatever made it: edges within the pixel, obscurance, and both together. One pixel of every cell of 2 x 2 is
-doubled, and the 16 sights of a block of 8 x 8 pixels are averaged. The second pictures are never part of the
-first.
+Half the squared difference of two independent renders of a pixel is an unbiased estimate of its variance,
+whatever the source: edges within the pixel, obscurance, or both. One pixel of every 2 x 2 cell is replicated,
+and the 16 estimates of a block of 8 x 8 pixels are averaged. The replicates are never part of the picture.
 """
 
 from __future__ import annotations

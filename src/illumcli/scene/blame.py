@@ -1,4 +1,4 @@
-"""Which override a fault comes from: the last one before which the scene did not have it."""
+"""Finds the override that causes a fault: the last one without which the scene does not have it."""
 
 from __future__ import annotations
 

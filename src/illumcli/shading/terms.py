@@ -1,4 +1,4 @@
-"""The words an illumination model may ask for: cosines, gaps and frame components, each formed stably.
+"""Terms that an illumination model may ask for: cosines, gaps and frame components, each computed stably.
 
 A term is a function whose parameter names are the terms it needs; `evaluate` runs only those a lobe
 reaches. The given words are the unit vectors `n` (shading normal), `l` (to the light), `v` (to the eye), `t`

@@ -1,8 +1,8 @@
 """Parameters that vary over the surface: images looked up by uv, values at vertices interpolated.
 
 (0, 0) in uv is the lower left corner of an image and (1, 1) its upper right one; the centres of its texels
-lie half a texel inside. There are no smaller copies of an image for surfaces far away: the samples of a
-pixel average what the pixel covers, so a picture of fine textures wants more of them (`film.samples`).
+lie half a texel inside. Images have no MIP levels: the samples of a pixel average what it covers, so fine
+textures need more of them (`film.samples`).
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, length
 
-SHARE = 4 * 2.0**-24
-"""Four times the distance at which false self-hits begin; contact gaps of 1e-6 radii still shade."""
+ORIGIN_OFFSET = 4 * 2.0**-24
+"""Offset of a ray's origin, relative to position and edge: four times the smallest one without self-hits.
+Objects 1e-6 radii apart still shadow each other."""
 
 ULP = 2.0**-23
 LONGEST = 100.0
@@ -47,7 +48,7 @@ def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats)
         The facet's longest edge, or its `effective_edge`.
     """
     size = np.abs(position)
-    step = (SHARE * (dot(np.abs(ng), size) + edge))[:, None] * ng
+    step = (ORIGIN_OFFSET * (dot(np.abs(ng), size) + edge))[:, None] * ng
     # twice the rounding to float32 outwards, so that rounding never brings a component back inwards
     size *= ULP
     step += np.copysign(size, ng, out=size)

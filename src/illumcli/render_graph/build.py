@@ -142,7 +142,7 @@ def _surface_nodes(scene: Scene) -> list[Node]:
 
 
 def _data_nodes() -> list[Node]:
-    """What layers of data show. A new one is a line here and a row of `layers.FIXED`."""
+    """What layers of data show. To add one, add a line here and a row to `layers.LAYERS`."""
     return [
         Node.of(stages.alpha),
         Node.of(depth),

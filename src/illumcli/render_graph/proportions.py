@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds
-from illumcli.rays.offsets import SHARE
+from illumcli.rays.offsets import ORIGIN_OFFSET
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph
 from illumcli.scene.scene_file import SceneFile, message_at
@@ -50,7 +50,7 @@ def disproportion(object_bounds: ObjectBounds, views: Sequence[View]) -> Disprop
         apart = np.abs(centre - centre[i]) - size
         near = known[(apart[known] <= size[i] + radius[i]).all(axis=1)]
         place = float(np.linalg.norm(centre[i] - object_bounds.render_space.centre))
-        offset = SHARE * (place + float(_edges(radius, object_bounds.polygons)[near].max()))
+        offset = ORIGIN_OFFSET * (place + float(_edges(radius, object_bounds.polygons)[near].max()))
         if offset > VISIBLE * radius[i]:
             reach = np.linalg.norm(centre - centre[i], axis=1) + radius
             large = int(known[np.argmax(reach[known])])

@@ -37,7 +37,7 @@ def error_recipes(
     samples: Sequence[int],
     given: Sequence[str],
 ) -> dict[str, Node]:
-    """What the layer `error` takes beyond a book: copies of all recipes between samples and beauty.
+    """The extra nodes of the layer `error`: a copy of every node from `samples` to `beauty`.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from illumcli.arrays import F, Ids, Vectors, column_major, dot, take_rows
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facing, interact
-from illumcli.rays.offsets import SHARE
+from illumcli.rays.offsets import ORIGIN_OFFSET
 from illumcli.records import Record
 
 FANOUT = 8
@@ -304,7 +304,7 @@ def triangle_planes(
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
     # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre: no ray starts
     # lower than this
-    step = lowest + SHARE * (np.abs(dot(n, v0)) + interaction.edge)
+    step = lowest + ORIGIN_OFFSET * (np.abs(dot(n, v0)) + interaction.edge)
     o = v0 + step[:, None] * n
     return np.ascontiguousarray(o), np.ascontiguousarray(n)
 

@@ -62,7 +62,8 @@ def render_scenes(
     for number in batch.due():
         with batch.piece(number):
             done = _rendered(works.pop(number), progress)
-            whole.add(number, done.report.as_data())
+            if report is not None:
+                whole.add(number, done.report.as_data())
             written(done)
     return whole.finish(batch)
 

@@ -196,7 +196,7 @@ class Tally:
 
 @pytest.fixture
 def tried(folder):
-    """Run a command, or build the ray core, again and again; each time another allocation fails."""
+    """Run a command, or build Embree's tree, again and again; each time another allocation fails."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if sys.platform != "linux" or compiler is None:
         pytest.skip("needs Linux and a C compiler")
@@ -215,7 +215,7 @@ def tried(folder):
         )  # fmt: skip
         assert done.returncode == 0, done.stderr[-3000:]
         tally = Tally(done.stdout.splitlines())
-        print(*words[:1] or ["ray core"], dict(tally.counts))  # pytest -rP shows it
+        print(*words[:1] or ["Embree tree"], dict(tally.counts))  # pytest -rP shows it
         return tally
 
     return run

@@ -194,7 +194,7 @@ def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch, code, error):
     monkeypatch.setattr(library, "rtcGetDeviceError", lambda device: code)
     with pytest.raises(error) as caught:
         Tracer(vertices.astype(F), faces)
-    assert ("error 1 of Embree" in str(caught.value)) == (code == 1)
+    assert ("its tree: error 1" in str(caught.value)) == (code == 1)
 
 
 class Elsewhere:

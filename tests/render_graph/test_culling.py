@@ -249,7 +249,7 @@ FILTERS = st.sampled_from(
 
 
 def apart_by_a_little(objects):
-    """No two surfaces in one plane: which of them is seen is up to the ray core's tree."""
+    """No two surfaces in one plane: which of them is seen is up to Embree's tree."""
     for number, thing in enumerate(objects, 1):
         own = thing["transform"]
         for name, step in (("translate", (0.0123, 0.0217, 0.0319)), ("rotate", (1.23, 0.71, 0.37))):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, length, take_rows, unit
 from illumcli.baking.points import Points, Surfaces
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, triangle_corners
-from illumcli.rays.interaction import interact, with_facet
+from illumcli.rays.interaction import interact, or_geometric
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
 from illumcli.visibility.hemisphere import Hemispheres
@@ -59,7 +59,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
 
     # shading normals; the triangle's own where there is none
     interaction = interact(geometry, triangle, a, b, np.zeros((len(triangle), 3), F))
-    n = with_facet(_interpolated(surfaces.normals, geometry, triangle, a, b), interaction.ng)
+    n = or_geometric(_interpolated(surfaces.normals, geometry, triangle, a, b), interaction.ng)
     return AreaPoints(
         geometry,
         column_major(n, F),

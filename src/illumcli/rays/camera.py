@@ -33,35 +33,39 @@ def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
 
 
 MARGIN = 0.1
-"""Share of the picture's width and height that a framed object leaves free, half of it on either side."""
+"""Share of the image's width and height that stays empty around a framed object, half on either side."""
 
 
 def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
-    """The camera with its direction, placed so that all points are inside the picture and fill it.
+    """The camera, moved without turning so that all points lie inside the image and fill it.
 
-    A pinhole at e sees p between two edges of the picture where |r.(p - e)| <= s f.(p - e), r pointing right,
-    f forward, s the slope of the edges: the two edges together bound f.e. The same holds for up. At the
-    nearer of the two bounds e moves across to where the points reach as far to either side.
+    A pinhole at e sees p between the left and right edges of the image if |r.(p - e)| <= s f.(p - e), with
+    r pointing right, f forward and s the slope of the edges. Over all points this bounds f.e from above; the
+    lower and upper edges give a second bound. The eye takes the smaller one and is then centred: the
+    projected points extend equally far to both sides.
 
     Parameters
     ----------
     aspect : float
-        Width of the picture over its height.
+        Width of the image over its height.
     points : (N, 3) float64
         At least one [scene units].
     """
+    # Points in the camera's axes, relative to the centre of their bounding box.
     centre = (points.min(axis=0) + points.max(axis=0)) / 2
     x, y, z = ((points - centre) @ axis for axis in axes(camera))
     size = float(np.linalg.norm(points - centre, axis=1).max()) or 1.0
     nearest = float(z.min())
     inside = 1 - MARGIN
     if camera.projection == "perspective":
+        # Move back until all points project inside the margins, then across until they are centred.
         slope = inside * np.tan(np.radians(camera.fov) / 2)
-        bounds = _between_edges(x, z, slope * aspect), _between_edges(y, z, slope)
+        bounds = _depth_bound(x, z, slope * aspect), _depth_bound(y, z, slope)
         eye_z = min(*bounds, nearest - CLOSEST * size)
-        eye_x, eye_y = (_amid(part, z - eye_z) for part in (x, y))
+        eye_x, eye_y = (_centred(part, z - eye_z) for part in (x, y))
         changes = {}
     else:
+        # Parallel rays: the size of the image decides, not the distance.
         eye_x, eye_y = ((float(part.min()) + float(part.max())) / 2 for part in (x, y))
         extent = max(float(np.ptp(y)), float(np.ptp(x)) / aspect) / inside
         eye_z = nearest - size
@@ -75,13 +79,13 @@ def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
 
 
 Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], float | None]
-"""Position, target and, of orthographic cameras, extent."""
+"""Position, target and, for orthographic cameras, extent."""
 
 
 def framed(
     camera: Any, aspect: float, number: int, meshes: Sequence[Mesh], object_bounds: ObjectBounds
 ) -> Placement:
-    """Where a camera stands whose picture the object of this number fills."""
+    """Placement of the camera at which object `number` fills the image."""
     mesh = meshes[number]
     points = take_used(mesh, transformed_vertices(mesh, object_bounds.matrices[number]))
     placed = framing(camera, aspect, points)
@@ -89,18 +93,18 @@ def framed(
 
 
 CLOSEST = 1e-3
-"""A framed object that hides behind one of its own points is seen from this far off it, in its radii."""
+"""Least distance of the eye from the nearest point of a framed object, in radii of the object."""
 
 
-def _between_edges(x: Floats, z: Floats, slope: float) -> float:
-    """How far along the line of sight an eye can be that has all points between two edges of its view."""
+def _depth_bound(x: Floats, z: Floats, slope: float) -> float:
+    """Largest depth of an eye that sees all points between two opposite edges of the image."""
     return -float((x - slope * z).max() + (-x - slope * z).max()) / (2 * slope)
 
 
-def _amid(x: Floats, depth: Floats) -> float:
-    """The place across from which points of these depths reach as far to either side in the picture."""
+def _centred(x: Floats, depth: Floats) -> float:
+    """The eye's coordinate at which the projections x / depth extend equally far to both sides."""
     eye = float(x.min() + x.max()) / 2
-    for _ in range(16):  # two points decide; where they stay the same the place is exact
+    for _ in range(16):  # only the two outermost points count; once these no longer change, `eye` is exact
         slopes = (x - eye) / depth
         ends = [int(slopes.argmin()), int(slopes.argmax())]
         weights = 1 / depth[ends]
@@ -115,7 +119,7 @@ def _tuple(vector: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 class Rays(Record):
-    """Primary rays."""
+    """Camera rays, one for each of N samples."""
 
     origins: Vectors
     directions: Vectors
@@ -135,45 +139,50 @@ def camera_rays(
     Returns
     -------
     origins, directions : (N, 3) float32
-        Each ray starts where it enters the scene's sphere, found in float64, so that a camera a million
-        radii away loses nothing. Directions have unit length.
+        Each ray starts shortly before it enters the scene's bounding sphere; the start is computed in
+        float64, so that a camera a million radii away loses no precision. Directions have unit length.
     start_distance : (N,) float64
-        How far each origin lies from the eye or the view plane, in radii.
+        Distance of each origin from the eye or the view plane, in radii.
     """
+    # Coordinates on an image plane of height 2, y upwards.
     right, up, forward = axes(camera)
     x = (2 * points[:, 0] - width) / height
     y = 1 - 2 * points[:, 1] / height
     eye = render_space.from_world(camera.position)
     if camera.projection == "perspective":
+        # Unit directions; right, up and forward are orthonormal, so lengths need no vector.
         slope = np.tan(np.radians(camera.fov) / 2)
         x, y = slope * x, slope * y
-        # right, up and forward are orthonormal: the length needs no vector
         scale = 1 / np.sqrt(1 + x * x + y * y)
         x *= scale
         y *= scale
-        d = _combined((scale, forward), (x, right), (y, up))
+        d = _weighted_sum((scale, forward), (x, right), (y, up))
+
+        # Move each origin along its ray to the scene's sphere.
         along = -(scale * (forward @ eye) + x * (right @ eye) + y * (up @ eye))
         start_distance = np.maximum(along - CLEAR, 0)
         start = (
-            _combined((np.broadcast_to(1.0, len(x)), eye))
+            _weighted_sum((np.broadcast_to(1.0, len(x)), eye))
             if not start_distance.any()
             else eye + start_distance[:, None] * d
         )
     else:
+        # Parallel rays from the view plane, which moves to the sphere as a whole.
         half = camera.extent / 2 / render_space.radius
         d = np.broadcast_to(forward, (len(x), 3))
-        plane = _combined((half * x, right), (half * y, up))
+        plane = _weighted_sum((half * x, right), (half * y, up))
         start_distance = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
         start = eye + start_distance[0] * forward + plane if len(x) else plane
     return Rays(column_major(start, F), column_major(d, F), start_distance)
 
 
 CLEAR = 1.25
-"""Rays start this far before they pass the scene's centre, clear of its sphere of radius 1."""
+"""Rays start this far before the point where they are closest to the scene's centre: outside its sphere of
+radius 1."""
 
 
-def _combined(*terms: tuple[Floats, NDArray[np.float64]]) -> Vectors:
-    """(N, 3) float64 sum of a weight per lane times a vector."""
+def _weighted_sum(*terms: tuple[Floats, NDArray[np.float64]]) -> Vectors:
+    """(N, 3) float64 sum of vectors, (3,), each times a weight per ray, (N,)."""
     out = np.empty((len(terms[0][0]), 3), order="F")
     for k in range(3):
         weight, vector = terms[0]
@@ -186,17 +195,17 @@ def _combined(*terms: tuple[Floats, NDArray[np.float64]]) -> Vectors:
 def film_points(
     x: NDArray[np.int64], y: NDArray[np.int64], spread: NDArray[np.float64], film_filter: Any | None
 ) -> NDArray[np.float64]:
-    """(N, 2) film positions [pixels]: each pixel's centre plus `spread` in [0, 1)^2 through the filter.
+    """(N, 2) film positions [pixels]: each pixel's centre plus an offset drawn from the pixel filter.
 
-    Positions are drawn from the pixel filter itself, so that every sample weighs the same and no pixel
-    needs its neighbours' samples. Without a filter they are the centres.
+    Filter importance sampling: every sample has the same weight, and no pixel needs its neighbours' samples.
+    Without a filter the positions are the centres.
 
     Parameters
     ----------
     x, y : (P,) int
         Pixels.
     spread : (N, 2) float64
-        N / P points of each pixel, one pixel after the other.
+        In [0, 1)^2, N / P points per pixel, one pixel after the other.
     """
     out = np.empty((len(spread), 2), order="F")
     a, b = offsets(spread[:, 0], spread[:, 1], film_filter)
@@ -217,7 +226,7 @@ def offsets(u: Floats, v: Floats, film_filter: Any | None) -> tuple[Floats, Floa
             width / 2 * np.where(w < 0.5, np.sqrt(2 * w) - 1, 1 - np.sqrt(2 * (1 - w))) for w in (u, v)
         )
         return first, second
-    # the radius of a Gaussian of deviation width / 4, cut off at width
+    # Gaussian of standard deviation width / 4, cut off at `width`, in polar coordinates.
     deviation = width / 4
     inside = -np.expm1(-(width**2) / (2 * deviation**2))
     r = deviation * np.sqrt(-2 * np.log1p(-u * inside))

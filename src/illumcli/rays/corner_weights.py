@@ -1,9 +1,9 @@
-"""Interpolation weights of the corners of the polygon that was hit; all values at corners use them.
+"""Interpolation weights of a polygon's corners at a hit; every interpolation of corner values uses them.
 
 Triangles have barycentric weights. Planar polygons of more corners are interpolated over the whole polygon,
-so that nothing depends on how they were cut: clearly convex quads by inverse bilinear coordinates, all others
-by mean value coordinates. On an edge both are linear between its ends, as barycentric weights are: values
-are continuous from polygon to polygon.
+so that nothing depends on their triangulation: clearly convex quads by inverse bilinear coordinates, all
+others by mean value coordinates. On an edge both are linear between its ends, as barycentric weights are, so
+values are continuous across polygons.
 
 References
 ----------
@@ -28,17 +28,17 @@ from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, Scen
 from illumcli.records import Record
 
 BLOCK = 1 << 15
-"""Mean value coordinates are formed for about so many corners at once, which stay in a core's cache."""
+"""Corners per batch of mean value coordinates; a batch fits into a core's cache."""
 TINY = 1e-12
-"""In radii of a polygon: what lies nearer to an edge or a corner lies on it."""
+"""A hit closer than this to an edge or corner counts as on it [radii of the polygon]."""
 BELOW = -1e-6
-"""A weight below this lies outside: more than the rounding of a hit across an edge."""
+"""A weight below this counts as negative: beyond the rounding of a hit across an edge."""
 
 
 class Corners(Record):
-    """Hits on polygons of one class, and what each corner weighs there."""
+    """Hits on polygons of one kind, and the weight of each corner there."""
 
-    lane: Ids | None  # (m,) which of the M hits, ascending; None where these are all
+    index: Ids | None  # (m,) indices among the M hits, ascending; None: all of them
 
     @property
     def count(self) -> int:
@@ -50,11 +50,11 @@ class Corners(Record):
         raise NotImplementedError
 
     def end_weight(self, k: int) -> Floats:
-        """(m,) weight of corner k as an end of an edge."""
+        """(m,) weight of corner k as the end of an edge."""
         return self.weight(k)
 
     def corner(self, geometry: SceneGeometry, k: int) -> Ids:
-        """(m,) number of corner k among the World's corners."""
+        """(m,) number of corner k in the scene geometry."""
         raise NotImplementedError
 
     def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
@@ -63,19 +63,27 @@ class Corners(Record):
 
     @property
     def shape(self) -> Ids:
-        """(m,) which triangle or polygon of the class each hit lies on."""
+        """(m,) the triangle or polygon that each hit lies on."""
         raise NotImplementedError
 
-    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
-        """(m,) a triangle in which corner k lies, and its barycentric weights there."""
+    def corner_on_triangle(self, k: int) -> tuple[Ids, Floats, Floats]:
+        """(m,) each: a triangle that has corner k, and the corner's barycentric u and v there."""
         raise NotImplementedError
 
-    def of(self, hits: NDArray[Any], place: Ids) -> Corners:
-        """Those of some of the hits, at their new places."""
+    def take(self, hits: NDArray[Any], new_index: Ids) -> Corners:
+        """The group restricted to some hits.
+
+        Parameters
+        ----------
+        hits : (K,)
+            The hits to keep, ascending.
+        new_index : (M,) int32
+            The index of each hit among those kept, -1 for the others.
+        """
         raise NotImplementedError
 
     def mean(self, values: Callable[[int], NDArray[Any]]) -> NDArray[Any]:
-        """(m, j) means by weight of the values at the corners; `values` gives (m, j) those of corner k."""
+        """(m, j) weighted means of the values at the corners; ``values(k)`` gives those at corner k."""
         total = self.weight(0)[:, None] * values(0)
         for k in range(1, self.count):
             total = total + self.weight(k)[:, None] * values(k)
@@ -106,24 +114,24 @@ class TriangleCorners(Corners):
     def shape(self) -> Ids:
         return self.triangle
 
-    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
+    def corner_on_triangle(self, k: int) -> tuple[Ids, Floats, Floats]:
         return self.triangle, np.full_like(self.u, k == 1), np.full_like(self.v, k == 2)
 
-    def of(self, hits: NDArray[Any], place: Ids) -> TriangleCorners:
-        own = hits if self.lane is None else np.flatnonzero(place.take(self.lane) >= 0)
-        lane = None if self.lane is None else place.take(self.lane.take(own))
-        return TriangleCorners(lane, self.triangle.take(own), self.u.take(own), self.v.take(own))
+    def take(self, hits: NDArray[Any], new_index: Ids) -> TriangleCorners:
+        kept = hits if self.index is None else np.flatnonzero(new_index.take(self.index) >= 0)
+        index = None if self.index is None else new_index.take(self.index.take(kept))
+        return TriangleCorners(index, self.triangle.take(kept), self.u.take(kept), self.v.take(kept))
 
 
 class PolygonCorners(Corners):
-    """Weights in planar polygons; for corners that a polygon of the class lacks its first stands, without
-    any weight."""
+    """Weights over planar polygons. A polygon with fewer corners than the group's largest repeats its first
+    corner with weight 0."""
 
     planar: PlanarPolygons
     polygon: Ids  # (m,) row of `planar`
     last: Ids  # (m,) corners less 1
-    weights: NDArray[np.floating[Any]]  # (n, m) sum to 1; below 0 at places in concave polygons
-    outside: NDArray[np.bool_]  # (m,) some weight is below 0
+    weights: NDArray[np.floating[Any]]  # (n, m) sum to 1; may be negative in concave polygons
+    outside: NDArray[np.bool_]  # (m,) some weight is negative
 
     @property
     def count(self) -> int:
@@ -134,11 +142,11 @@ class PolygonCorners(Corners):
         return weight
 
     def end_weight(self, k: int) -> Floats:
-        """The same; beyond the last corner that of the first, where the last edge ends."""
+        """(m,) weight of corner k; beyond the last corner that of the first, where the last edge ends."""
         return np.where(self.last < k, self.weights[0], self.weights[k])
 
     def number(self, first: NDArray[np.int32], k: int) -> Ids:
-        """(m,) number of corner k, where those of polygon q have the numbers from ``first[q]`` on."""
+        """(m,) number of corner k, if the corners of polygon q are numbered from ``first[q]`` on."""
         return first.take(self.polygon) + np.where(self.last < k, np.int32(0), np.int32(k))
 
     def corner(self, geometry: SceneGeometry, k: int) -> Ids:
@@ -151,37 +159,37 @@ class PolygonCorners(Corners):
     def shape(self) -> Ids:
         return self.polygon
 
-    def place(self, k: int) -> tuple[Ids, Floats, Floats]:
+    def corner_on_triangle(self, k: int) -> tuple[Ids, Floats, Floats]:
         number = self.number(self.planar.starts, k)
         return self.planar.triangle.take(number), self.planar.u.take(number), self.planar.v.take(number)
 
-    def of(self, hits: NDArray[Any], place: Ids) -> PolygonCorners:
-        assert self.lane is not None
-        own = np.flatnonzero(place.take(self.lane) >= 0)
+    def take(self, hits: NDArray[Any], new_index: Ids) -> PolygonCorners:
+        assert self.index is not None
+        kept = np.flatnonzero(new_index.take(self.index) >= 0)
         return PolygonCorners(
-            place.take(self.lane.take(own)),
+            new_index.take(self.index.take(kept)),
             self.planar,
-            self.polygon.take(own),
-            self.last.take(own),
-            self.weights[:, own],
-            self.outside.take(own),
+            self.polygon.take(kept),
+            self.last.take(kept),
+            self.weights[:, kept],
+            self.outside.take(kept),
         )
 
     def mean(self, values: Callable[[int], NDArray[Any]]) -> NDArray[Any]:
-        """The same, clamped to the range of the corners where some weight is below 0."""
+        """(m, j) weighted means, clamped to the range of the corners' values where a weight is negative."""
         total = super().mean(values)
-        lanes = np.flatnonzero(self.outside)
-        if lanes.size:
-            low = high = take_rows(values(0), lanes)
+        outside = np.flatnonzero(self.outside)
+        if outside.size:
+            low = high = take_rows(values(0), outside)
             for k in range(1, self.count):
-                own = take_rows(values(k), lanes)
-                low, high = np.minimum(low, own), np.maximum(high, own)
-            total[lanes] = np.clip(total[lanes], low, high)
+                at_corner = take_rows(values(k), outside)
+                low, high = np.minimum(low, at_corner), np.maximum(high, at_corner)
+            total[outside] = np.clip(total[outside], low, high)
         return total
 
 
 class MeanCorners(Corners):
-    """Points that stand for whole polygons: the mean of their corners."""
+    """One point per polygon, at the mean of its corners."""
 
     centres: PolygonCentres
     polygon: Ids  # (m,) polygon number
@@ -203,56 +211,56 @@ class MeanCorners(Corners):
     def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
         return self.centres.vertex.take(self.corner(geometry, k))
 
-    def of(self, hits: NDArray[Any], place: Ids) -> MeanCorners:
-        own = hits if self.lane is None else np.flatnonzero(place.take(self.lane) >= 0)
-        lane = None if self.lane is None else place.take(self.lane.take(own))
-        return MeanCorners(lane, self.centres, self.polygon.take(own))
+    def take(self, hits: NDArray[Any], new_index: Ids) -> MeanCorners:
+        kept = hits if self.index is None else np.flatnonzero(new_index.take(self.index) >= 0)
+        index = None if self.index is None else new_index.take(self.index.take(kept))
+        return MeanCorners(index, self.centres, self.polygon.take(kept))
 
 
 class CornerWeights(Record):
-    """What the corners of the polygon that each of M hits lies on weigh there. Made by `corner_weights`.
+    """The weights of the corners of the polygon at each of M hits, computed by `corner_weights`.
 
-    Every interpolation goes through here: `interpolate` for vectors that corners have (normals),
-    `interpolate_vertices` for values at vertices (colours, baked obscurance). `joined` takes any function of
-    a group and the number k of a corner.
+    Every interpolation goes through here: `interpolate` for vectors at corners (normals),
+    `interpolate_vertices` for values at vertices (colours, baked obscurance), `weighted_mean` for any
+    function of a group and a corner k.
     """
 
     hits: TriangleCorners
-    """All M, by their triangles alone."""
+    """All M hits with barycentric weights on their triangles."""
     groups: tuple[Corners, ...]
-    """The hits by class of polygon: each in one group."""
+    """The hits by kind of polygon; each hit is in one group."""
 
     def __len__(self) -> int:
         return len(self.hits.triangle)
 
     def interpolate(self, geometry: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
-        """(M, j) the vectors that `table` has at corners, interpolated; not made unit."""
-        return self.joined(
+        """(M, j) the vectors that `table` has at corners, interpolated; not normalized."""
+        return self.weighted_mean(
             lambda group, k: take_rows(table.values, table.index.take(group.corner(geometry, k)))
         )
 
     def interpolate_vertices(self, geometry: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
-        """(M, j) of (V, j) values at the World's vertices."""
-        return self.joined(lambda group, k: take_rows(values, group.vertex(geometry, k)))
+        """(M, j) interpolated values; `values` holds those at the vertices of the scene, (V, j)."""
+        return self.weighted_mean(lambda group, k: take_rows(values, group.vertex(geometry, k)))
 
-    def joined(self, values: Callable[[Any, int], NDArray[Any]]) -> NDArray[Any]:
-        """(M, j) means by weight; `values` gives the (m, j) values at corner k of a group's hits."""
-        if len(self.groups) == 1 and self.groups[0].lane is None:
+    def weighted_mean(self, values: Callable[[Any, int], NDArray[Any]]) -> NDArray[Any]:
+        """(M, j) weighted means; ``values(group, k)`` gives (m, j) values at corner k of a group."""
+        if len(self.groups) == 1 and self.groups[0].index is None:
             return self.groups[0].mean(partial(values, self.groups[0]))
         means = [group.mean(partial(values, group)) for group in self.groups]
         out = np.empty((len(self), means[0].shape[1]), F, order="F")
         for group, mean in zip(self.groups, means, strict=True):
-            out[group.lane] = mean
+            out[group.index] = mean
         return out
 
     def take(self, hits: NDArray[Any]) -> CornerWeights:
-        """The weights at some of the hits, which ascend."""
+        """The weights at some of the hits, given by ascending indices."""
         if len(hits) == len(self):
             return self
-        place = np.full(len(self), -1, np.int32)
-        place[hits] = np.arange(len(hits), dtype=np.int32)
-        groups = tuple(group.of(hits, place) for group in self.groups)
-        return CornerWeights(self.hits.of(hits, place), groups)
+        new_index = np.full(len(self), -1, np.int32)
+        new_index[hits] = np.arange(len(hits), dtype=np.int32)
+        groups = tuple(group.take(hits, new_index) for group in self.groups)
+        return CornerWeights(self.hits.take(hits, new_index), groups)
 
 
 def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
@@ -261,8 +269,8 @@ def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
     count = 0
     for part in parts:
         for group in part.groups:
-            lane = np.arange(len(part), dtype=np.int32) if group.lane is None else group.lane
-            groups.append(replace(group, lane=lane + np.int32(count)))
+            index = np.arange(len(part), dtype=np.int32) if group.index is None else group.index
+            groups.append(replace(group, index=index + np.int32(count)))
         count += len(part)
     triangle = np.concatenate([part.hits.triangle for part in parts])
     u, v = (np.concatenate([getattr(part.hits, name) for part in parts]) for name in ("u", "v"))
@@ -288,7 +296,7 @@ class OnTriangles(Protocol):
 def corner_weights(
     geometry: SceneGeometry, hits: OnTriangles, planar_polygons: PlanarPolygons | None = None
 ) -> CornerWeights:
-    """The weights at M hits: over planar polygons where these are given, else over triangles alone."""
+    """The weights at M hits: over planar polygons if these are given, otherwise over triangles."""
     triangle, u, v = hits.triangle, hits.u, hits.v
     by_triangle = TriangleCorners(None, triangle, u, v)
     planar = planar_polygons
@@ -297,27 +305,27 @@ def corner_weights(
 
     # Hits on polygons that are not planar keep barycentric weights.
     row = planar.row.take(triangle)
-    alone = np.flatnonzero(row < 0).astype(np.int32)
-    groups: list[Corners] = [TriangleCorners(alone, triangle.take(alone), u.take(alone), v.take(alone))]
+    uneven = np.flatnonzero(row < 0).astype(np.int32)
+    groups: list[Corners] = [TriangleCorners(uneven, triangle.take(uneven), u.take(uneven), v.take(uneven))]
 
     # The others are grouped by the number of corners: quads (0) by bilinear, larger polygons by mean value
     # coordinates.
     padded = planar.padded.take(row)
-    padded[alone] = -1
+    padded[uneven] = -1
     for size in np.flatnonzero(np.bincount(planar.padded)):
-        lane = np.flatnonzero(padded == size).astype(np.int32)
-        polygon = row.take(lane)
+        index = np.flatnonzero(padded == size).astype(np.int32)
+        polygon = row.take(index)
         start = planar.starts.take(polygon)
         last = planar.starts.take(polygon + 1) - start - 1
-        x, y = _in_plane(geometry, planar, triangle.take(lane), u.take(lane), v.take(lane))
+        x, y = _in_plane(geometry, planar, triangle.take(index), u.take(index), v.take(index))
         if size:
             weights: NDArray[Any] = _mean_value(planar.flat, start, last, int(size), x, y)
         else:
             weights = _bilinear([take_rows(planar.flat, start + k) for k in range(4)], x, y)
         outside = np.any(weights < BELOW, axis=0)
-        groups.append(PolygonCorners(lane, planar, polygon, last, weights, outside))
-    some = tuple(group for group in groups if group.lane is not None and group.lane.size)
-    return CornerWeights(by_triangle, some or tuple(groups[:1]))
+        groups.append(PolygonCorners(index, planar, polygon, last, weights, outside))
+    not_empty = tuple(group for group in groups if group.index is not None and group.index.size)
+    return CornerWeights(by_triangle, not_empty or tuple(groups[:1]))
 
 
 def _in_plane(
@@ -341,22 +349,27 @@ def _bilinear(
 ) -> NDArray[np.float32]:
     """(4, m) weights (1 - s)(1 - t), s (1 - t), s t, (1 - s) t of convex quads, counter-clockwise.
 
-    t solves k2 t^2 + k1 t + k0 = 0. Where the map from (s, t) keeps its orientation its Jacobian,
-    2 k2 t + k1, is the positive root of the discriminant, which says which t; either sign of k1 has a form
-    without cancellation, also for parallelograms (k2 = 0). s is then how far the hit lies along the line
-    between two opposite edges, at t on both.
+    t solves k2 t^2 + k1 t + k0 = 0. Inside a convex quad the Jacobian of the map from (s, t), 2 k2 t + k1, is
+    the positive root of the discriminant, which selects t. There is a form without cancellation for either
+    sign of k1, also for parallelograms (k2 = 0). s is the hit's position along the line that joins two
+    opposite edges at t.
     """
+    # The quadratic's coefficients, after Quilez.
     (x0, y0), (x1, y1), (x2, y2), (x3, y3) = (corner.T for corner in corners)
     ex, ey, fx, fy = x1 - x0, y1 - y0, x3 - x0, y3 - y0
     gx, gy, hx, hy = x2 - x3 - ex, y2 - y3 - ey, x - x0, y - y0
     k2 = gx * fy - gy * fx
     k1 = ex * fy - ey * fx + hx * gy - hy * gx
     k0 = hx * ey - hy * ex
+
+    # The root that keeps orientation, as a ratio without cancellation.
     root = np.sqrt(np.maximum(k1 * k1 - 4 * k2 * k0, 0))
     is_rising = k1 >= 0
     over = np.where(is_rising, -2 * k0, root - k1)
     under = np.where(is_rising, k1 + root, 2 * k2)
     t = np.clip(_ratio(over, under), 0, 1)
+
+    # s by projection onto the line at t.
     ax, ay = ex + gx * t, ey + gy * t
     s = np.clip(_ratio((hx - fx * t) * ax + (hy - fy * t) * ay, ax * ax + ay * ay), 0, 1)
     weights = np.empty((4, len(x)), F)
@@ -373,7 +386,8 @@ def _mean_value(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(count, m) mean value coordinates in polygons whose first corner fills them up to `count`."""
+    """(count, m) mean value coordinates in polygons that are padded to `count` corners with their first."""
+    # A batch of hits at a time.
     weights = np.empty((count, len(x)))
     number = np.arange(count, dtype=np.int32)[:, None]
     width = max(BLOCK // count, 1)
@@ -381,32 +395,39 @@ def _mean_value(
         part = slice(begin, begin + width)
         at = start[part] + np.where(number <= last[part], number, 0)
         weights[:, part] = _mean_value_of(flat[:, 0].take(at) - x[part], flat[:, 1].take(at) - y[part])
-    for k in range(1, count):  # what the corners that fill up have is the first one's
+
+    # The weights of padding corners belong to the first corner.
+    for k in range(1, count):
         weights[0] += np.where(last < k, weights[k], 0)
         weights[k] = np.where(last < k, 0, weights[k])
     return weights
 
 
 def _mean_value_of(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, m) coordinates, by the vectors from each hit to its corners, in radii of the polygon.
+    """(n, m) coordinates from the vectors (x, y) of each hit to its n corners, in radii of the polygon.
 
-    w_i = (tan(a_{i-1} / 2) + tan(a_i / 2)) / r_i, where a_i is the angle that edge i is seen under. Tangents
-    are formed without cancellation; on an edge they are the inverse of `TINY` in place of infinite. Corners
-    that follow each other at one place share what one of them would weigh.
+    w_i = (tan(a_{i-1} / 2) + tan(a_i / 2)) / r_i, where a_i is the angle that edge i subtends. Tangents are
+    computed without cancellation; on an edge they are 1 / `TINY` instead of infinite. Consecutive corners at
+    one position share the weight that one of them would have.
     """
+    # |a| |b|, a.b and a x b of consecutive corners.
     following_x, following_y = np.roll(x, -1, axis=0), np.roll(y, -1, axis=0)
     r = np.sqrt(x * x + y * y)
     both = r * np.roll(r, -1, axis=0)
     inner = x * following_x + y * following_y
     outer = x * following_y - y * following_x
+
+    # tan(a / 2) = sin a / (1 + cos a), or (1 - cos a) / sin a for angles above 90 degrees.
     is_wide = inner < 0
     least = TINY * (both - inner)
     outer = np.where(is_wide & (np.abs(outer) < least), least, outer)
     tangent = _ratio(np.where(is_wide, both - inner, outer), np.where(is_wide, outer, both + inner))
+
+    # Normalize; the sum has a fixed order, which numpy's would take from the array's shape.
     weights = (np.roll(tangent, 1, axis=0) + tangent) / np.maximum(r, TINY)
-    weights[r <= TINY] = TINY**-3  # on a corner: above all that edges give
+    weights[r <= TINY] = TINY**-3  # on a corner: outweighs all others
     total = weights[0].copy()
-    for row in weights[1:]:  # in their order, whatever numpy makes of the shape
+    for row in weights[1:]:
         total += row
     return weights / total
 

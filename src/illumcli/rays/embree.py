@@ -1,6 +1,6 @@
 """Embree queries: closest hit and occlusion. No other folder imports embreex.
 
-embreex checks only the type of its arrays. It reads past the end of short ones, overwrites the caller's
+embreex checks only the dtype of its arrays. It reads past the end of short ones, overwrites the caller's
 distances, takes as long for one NaN ray as for 1500 valid ones, and only logs Embree's errors. So all arrays
 are checked or copied here first.
 """
@@ -20,17 +20,17 @@ from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.embree_upload import upload
 from illumcli.records import Record
 
-AT_ONCE = 1 << 18
-"""Rays per call: an interrupt waits for one call at most."""
-FARTHEST = F(1e37)
-"""A limit that stands for none."""
-TURN = F(2.0**-19)
-"""By how much [rad] a ray that missed is turned for its second shot: Embree's robust mode can miss at an
-exact vertex (0.2 to 1 % of rays aimed at one); of the second shots 0 in 3.2 million rays, 2 at 2^-20."""
+RAYS_PER_CALL = 1 << 18
+"""An interrupt waits for one call at most."""
+NO_LIMIT = F(1e37)
+"""Ray length that is passed to Embree for an unlimited ray."""
+RETRY_TURN = F(2.0**-19)
+"""Angle [rad] by which a ray that missed is turned for its retry. Embree's robust mode can miss at an exact
+vertex (0.2 to 1 % of rays aimed at one). Of the retries none in 3.2 million rays missed; with 2^-20, two."""
 
 
 class Closest(Record):
-    """First hits of N rays; a miss has triangle -1 and distance inf."""
+    """Closest hits of N rays; a miss has triangle -1 and distance inf."""
 
     triangle: Ids  # (N,)
     u: Floats  # (N,) weight of corner 1
@@ -39,13 +39,14 @@ class Closest(Record):
 
 
 class Interrupted(Exception):
-    """The run was stopped; nobody waits for the answer."""
+    """The run was stopped; the results are no longer needed."""
 
 
 class Tracer:
-    """Two questions about a set of triangles, asked with arrays; safe to ask from many threads.
+    """Closest-hit and occlusion queries for arrays of rays on a set of triangles; safe to use from many
+    threads.
 
-    There may be fewer origins than directions: each then stands for as many rays in a row.
+    There may be fewer origins than directions: each origin is then shared by equally many consecutive rays.
     """
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
@@ -61,53 +62,53 @@ class Tracer:
             self._stop: threading.Event | None = None
             if len(triangles):
                 upload(self._scene, vertices, triangles)
-            # the first ray builds the tree where it is not built yet, which must happen before threads ask
+            # the first query builds the tree if `upload` did not, which must happen before threads start
             probe = np.zeros((1, 3), F)
             self._scene.run(probe, probe + F(1), query="OCCLUDED")
         finally:
             log.removeHandler(errors)
         if errors.texts:
-            raise IllumError(f"the ray core failed to build: {'; '.join(errors.texts)}")
+            raise IllumError(f"Embree could not build its tree: {'; '.join(errors.texts)}")
 
     def counting(self, stop: threading.Event | None = None) -> Tracer:
-        """The same ray core with a count of `rays` of its own, for one thread.
+        """A tracer on the same tree with its own count of `rays`, for one thread.
 
-        Once `stop` is set every question raises `Interrupted`.
+        Once `stop` is set, every query raises `Interrupted`.
         """
-        own = copy(self)
-        own.rays, own._stop = 0, stop
-        return own
+        tracer = copy(self)
+        tracer.rays, tracer._stop = 0, stop
+        return tracer
 
     def closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        """What each ray hits first; a ray that misses is shot a second time, turned by 2^-19 rad."""
-        origins = self._asked(origins, directions)
+        """The closest hit of each ray; a ray that misses is traced again, turned by `RETRY_TURN`."""
+        origins = self._per_ray(origins, directions)
         hits = self._closest(origins, directions)
-        again = np.flatnonzero(hits.triangle < 0)
-        if again.size and self.triangle_count:
-            d = directions[again]
-            self.rays += len(again)
-            second = self._closest(origins[again], d + TURN * np.abs(d[:, [1, 2, 0]]))
-            for values, others in zip(vars(hits).values(), vars(second).values(), strict=True):
-                values[again] = others
+        missed = np.flatnonzero(hits.triangle < 0)
+        if missed.size and self.triangle_count:
+            d = directions[missed]
+            self.rays += len(missed)
+            retried = self._closest(origins[missed], d + RETRY_TURN * np.abs(d[:, [1, 2, 0]]))
+            for values, others in zip(vars(hits).values(), vars(retried).values(), strict=True):
+                values[missed] = others
         return hits
 
     def _closest(self, origins: Vectors, directions: Vectors) -> Closest:
         count = len(directions)
         hits = Closest(np.empty(count, np.int32), np.empty(count, F), np.empty(count, F), np.empty(count, F))
-        for part in _parts(count):
-            answer = self._scene.run(origins[part], directions[part], query="INTERSECT", output=1)
-            hits.triangle[part] = answer["primID"]
-            hits.u[part] = answer["u"]
-            hits.v[part] = answer["v"]
-            hits.distance[part] = answer["tfar"]
+        for part in _batches(count):
+            result = self._scene.run(origins[part], directions[part], query="INTERSECT", output=1)
+            hits.triangle[part] = result["primID"]
+            hits.u[part] = result["u"]
+            hits.v[part] = result["v"]
+            hits.distance[part] = result["tfar"]
         hits.distance[hits.triangle < 0] = np.inf
         return hits
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:
-        """(N,) distance to what each ray hits first, inf where it hits nothing."""
-        origins, count = self._asked(origins, directions), len(directions)
+        """(N,) distance of each ray's closest hit, inf if it misses; no ray is traced again."""
+        origins, count = self._per_ray(origins, directions), len(directions)
         far = np.empty(count, F)
-        for part in _parts(count):
+        for part in _batches(count):
             far[part] = self._scene.run(origins[part], directions[part], query="DISTANCE")
         far[far > 1e30] = np.inf
         return far
@@ -115,28 +116,28 @@ class Tracer:
     def occluded(
         self, origins: Vectors, directions: Vectors, limits: Floats | float = np.inf
     ) -> NDArray[np.bool_]:
-        """(N,) True where anything stands between an origin and `limits` along its direction.
+        """(N,) True where a triangle lies between a ray's origin and `limits` along its direction.
 
-        A limit of 0 or less asks nothing and answers False, where Embree would answer True.
+        The result is False for a limit of 0 or less, where Embree would say True.
         """
-        origins, count = self._asked(origins, directions), len(directions)
+        origins, count = self._per_ray(origins, directions), len(directions)
         reach = np.asarray(limits, F)
         if reach.ndim and len(reach) != count:
             raise ValueError(f"{len(reach)} limits for {count} rays")
         lowest = reach.min(initial=np.inf)
         if np.isnan(lowest):
             raise IllumError("a ray's limit is not a number")
-        far = np.minimum(reach, FARTHEST)
+        far = np.minimum(reach, NO_LIMIT)
         out = np.empty(count, np.bool_)
-        for part in _parts(count):
-            # embreex gets an array of its own: it may write to it
-            own = far[part] if far.ndim else np.full(part.stop - part.start, far)
-            hit = self._scene.run(origins[part], directions[part], own, query="OCCLUDED")
+        for part in _batches(count):
+            # embreex writes to the array of lengths that it is given, so it never gets the caller's
+            lengths = far[part] if far.ndim else np.full(part.stop - part.start, far)
+            hit = self._scene.run(origins[part], directions[part], lengths, query="OCCLUDED")
             np.greater_equal(hit, 0, out=out[part])
         return out if lowest > 0 else out & (reach > 0)
 
-    def _asked(self, origins: Vectors, directions: Vectors) -> Vectors:
-        """An origin for each direction, after a look at everything that Embree does not look at."""
+    def _per_ray(self, origins: Vectors, directions: Vectors) -> Vectors:
+        """(N, 3) an origin for each direction, after the checks that embreex leaves out; counts the rays."""
         if self._stop is not None and self._stop.is_set():
             raise Interrupted
         each = _checked(origins, directions)
@@ -155,16 +156,16 @@ class _Errors(logging.Handler):
         self.texts.append(record.getMessage())
 
 
-def _parts(count: int) -> list[slice]:
-    return [slice(a, min(a + AT_ONCE, count)) for a in range(0, count, AT_ONCE)]
+def _batches(count: int) -> list[slice]:
+    return [slice(first, min(first + RAYS_PER_CALL, count)) for first in range(0, count, RAYS_PER_CALL)]
 
 
 def _checked(origins: Vectors, directions: Vectors) -> int:
-    """How many directions there are to an origin; everything is finite and has its shape."""
+    """Number of directions per origin; raises where an array has another shape or is not finite."""
     for name, array in (("origins", origins), ("directions", directions)):
         if array.ndim != 2 or array.shape[1] != 3 or array.dtype != F:
             raise ValueError(f"{name} must be (N, 3) float32, are {array.shape} {array.dtype}")
-        # a sum of squares is three times faster than a look at each, and finite only where all of them are
+        # a sum of squares is three times faster than testing each value, and finite only if all of them are
         flat = array.ravel(order="K")
         with np.errstate(invalid="ignore", over="ignore"):
             total = flat @ flat
@@ -178,5 +179,5 @@ def _checked(origins: Vectors, directions: Vectors) -> int:
 
 
 def tracer(geometry: SceneGeometry) -> Tracer:
-    """The ray core over the triangles of a scene."""
+    """Embree's tree over the triangles of a scene, ready for queries."""
     return Tracer(geometry.vertices, geometry.triangles)

@@ -1,10 +1,10 @@
 """Triangles into an embreex scene, in one copy.
 
 embreex.TriangleMesh copies element by element through Python objects, 1.3 s per million triangles. The Embree
-library that embreex ships takes the arrays as they are, 3 ms per million, once the scene's handle is known:
-it is a private field of the EmbreeScene object. Its place is proven each time before it is used, by writing
-the public field next to it and reading that back from memory, and by asking Embree for the scene's flags;
-where anything is not as expected `TriangleMesh` does the work.
+library that embreex ships takes whole arrays, 3 ms per million, but needs the scene's handle, which is a
+private field of the EmbreeScene object. The field's offset is verified each time before it is used: the
+public field next to it is written and read back from memory, and Embree is asked for the scene's flags. If
+anything is not as expected, `TriangleMesh` is used instead.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ OUT_OF_MEMORY = 4  # RTC_ERROR_OUT_OF_MEMORY
 def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
     """Attach (V, 3) vertices and (T, 3) triangles to an EmbreeScene that is not committed yet.
 
-    The tree is built here and now, without the interpreter's lock, which embreex would hold meanwhile.
+    The tree is built at once and without holding the interpreter lock, as embreex would.
     """
     library = _library()
     handle = _handle(scene) if library else None
@@ -41,7 +41,7 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
         TriangleMesh(scene, np.ascontiguousarray(vertices), np.ascontiguousarray(triangles))
         return
     device = library.rtcGetSceneDevice(handle)
-    # embreex's own wants the interpreter's lock, which these calls do not hold
+    # embreex's error callback needs the interpreter lock, which these calls do not hold
     library.rtcSetDeviceErrorFunction(device, None, None)
     try:
         _commit(library, device, handle, vertices, triangles)
@@ -51,25 +51,25 @@ def upload(scene: Any, vertices: NDArray[np.float32], triangles: NDArray[np.int3
     if error == OUT_OF_MEMORY:
         raise MemoryError
     if error:
-        raise IllumError(f"the ray core failed to build: error {error} of Embree")
+        raise IllumError(f"Embree could not build its tree: error {error}")
     scene.is_committed = 1
 
 
 def _commit(
     library: Any, device: int, handle: int, vertices: NDArray[np.float32], triangles: NDArray[np.int32]
 ) -> None:
-    """Attach the triangles to Embree's scene and build it; MemoryError where a part of it cannot be made."""
+    """Attach the triangles to Embree's scene and build it; MemoryError where an allocation fails."""
     geometry = library.rtcNewGeometry(device, TRIANGLES)
-    if not geometry:  # every call that is given none ends the process
+    if not geometry:  # any call with a null handle ends the process
         raise MemoryError
     try:
-        # vertices lie 16 bytes apart: Embree reads each with one aligned load
+        # vertices are 16 bytes apart: Embree reads each with one aligned load
         for kind, form, width, array in ((VERTEX, FLOAT3, 4, vertices), (INDEX, UINT3, 3, triangles)):
-            place = library.rtcSetNewGeometryBuffer(geometry, kind, 0, form, 4 * width, len(array))
-            if not place:
+            address = library.rtcSetNewGeometryBuffer(geometry, kind, 0, form, 4 * width, len(array))
+            if not address:
                 raise MemoryError
-            room = (ctypes.c_uint32 * (width * len(array))).from_address(place)
-            np.frombuffer(memoryview(room), array.dtype).reshape(-1, width)[:, :3] = array
+            memory = (ctypes.c_uint32 * (width * len(array))).from_address(address)
+            np.frombuffer(memoryview(memory), array.dtype).reshape(-1, width)[:, :3] = array
         library.rtcCommitGeometry(geometry)
         library.rtcAttachGeometry(handle, geometry)
     finally:
@@ -78,7 +78,7 @@ def _commit(
 
 
 def _handle(scene: Any) -> int | None:
-    """Embree's handle of an EmbreeScene; None where the object is not laid out as expected."""
+    """Embree's handle of an EmbreeScene; None if the object's layout is not as expected."""
     if type(scene).__basicsize__ != SIZE or scene.is_committed:
         return None
     flag = ctypes.c_int.from_address(id(scene) + COMMITTED)
@@ -88,20 +88,20 @@ def _handle(scene: Any) -> int | None:
             scene.is_committed = 0
             return None
     handle = ctypes.c_void_p.from_address(id(scene) + HANDLE).value
-    if handle is None:  # embreex goes on with the scene that Embree could not make
+    if handle is None:  # Embree could not allocate the scene, which embreex does not check
         raise MemoryError
     return handle
 
 
 @cache
 def _library() -> Any:
-    """The Embree library that embreex loaded, its functions declared; None where it cannot be found."""
+    """The Embree library that embreex loaded, with declared functions; None if there is not exactly one."""
     import embreex
 
-    found = sorted(Path(embreex.__file__).parent.parent.glob("embreex.libs/libembree4*"))
-    if len(found) != 1:
+    libraries = sorted(Path(embreex.__file__).parent.parent.glob("embreex.libs/libembree4*"))
+    if len(libraries) != 1:
         return None
-    library = ctypes.CDLL(str(found[0]))
+    library = ctypes.CDLL(str(libraries[0]))
     pointer, number, size = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t
     signatures = {
         "rtcGetSceneFlags": (ctypes.c_int, [pointer]),

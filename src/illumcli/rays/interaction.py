@@ -1,4 +1,4 @@
-"""Surface interactions: what shading needs of a hit, as position, planes, normals, uv, tangents and ids."""
+"""Surface interactions: position, normals, uv, tangents and ids of hits."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from illumcli.render_space import RenderSpace
 
 
 class Hits(Record):
-    """The samples of a tile that see a surface; every surface buffer has these M lanes."""
+    """The M samples of a tile whose rays hit a surface; every surface buffer has a row for each."""
 
-    sample: Ids  # (M,) which sample of the tile, ascending
+    sample: Ids  # (M,) index of the sample in the tile, ascending
     triangle: Ids  # (M,)
     u: Floats  # (M,) float32 weight of corner 1
     v: Floats  # (M,) float32 weight of corner 2
@@ -37,16 +37,16 @@ def hits(tracer: Tracer, rays: Rays) -> Hits:
 
 
 class SurfaceInteraction(Record):
-    """Where hits lie on their triangles, and the triangles' own planes."""
+    """Positions of hits, and the planes of the triangles that were hit."""
 
-    position: NDArray[np.float64]  # (M, 3) in radii, on the triangle the ray core sees
-    ng: Vectors  # (M, 3) float32 unit facet normal, on the side the eye sees
+    position: NDArray[np.float64]  # (M, 3) in radii, on the float32 triangle that Embree has
+    ng: Vectors  # (M, 3) float32 unit normal of the triangle, on the eye's side
     edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
-    back_facing: NDArray[np.bool_]  # (M,) the eye sees the back: normals are turned over
+    back_facing: NDArray[np.bool_]  # (M,) the ray hit the back: normals are flipped
 
 
 def interaction(geometry: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
-    """Positions and planes of the hits, seen along their rays."""
+    """Surface interactions of the hits of camera rays."""
     towards_eye = -take_rows(rays.directions, hits.sample)
     return interact(geometry, hits.triangle, hits.u, hits.v, towards_eye)
 
@@ -54,13 +54,16 @@ def interaction(geometry: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInter
 def interact(
     geometry: SceneGeometry, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
 ) -> SurfaceInteraction:
-    """Positions and planes of hits, from float64 edges of the float32 vertices the ray core sees."""
+    """Surface interactions of hits, computed in float64 from the float32 vertices that Embree has."""
+    # The triangles' first vertices and edges.
     v0, e1, e2 = (
         column_major(take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)), np.float64)
         for k in range(3)
     )
     e1 -= v0
     e2 -= v0
+
+    # The longest edge in single precision, the normal in double.
     sides = column_major(e1, F), column_major(e2, F), column_major(e2 - e1, F)
     edge = np.sqrt(np.maximum(np.maximum(*(dot(side, side) for side in sides[:2])), dot(sides[2], sides[2])))
     normal = cross(e1, e2)
@@ -68,6 +71,8 @@ def interact(
     back_facing = dot(normal, towards_eye) < 0
     scale = np.divide(1 - 2 * back_facing.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
     normal *= scale[:, None]
+
+    # position = v0 + u e1 + v e2, in place
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
@@ -75,7 +80,7 @@ def interact(
 
 
 class ShadingContext(Record):
-    """The surface at M hits, as interpolation needs it."""
+    """The surface at M hits: what normals and other corner values are interpolated from."""
 
     geometry: SceneGeometry
     weights: CornerWeights
@@ -84,7 +89,7 @@ class ShadingContext(Record):
     """Shading normals at corners; None where every object is flat."""
 
     def take(self, index: NDArray[Any]) -> ShadingContext:
-        """The context of some of the hits, which ascend."""
+        """The context of some of the hits, given by ascending indices."""
         if len(index) == len(self.weights):
             return self
         interaction = SurfaceInteraction(
@@ -94,7 +99,7 @@ class ShadingContext(Record):
 
 
 def facing(n: Vectors, back_facing: NDArray[np.bool_]) -> Vectors:
-    """`n`, turned over where the eye sees the back."""
+    """`n`, flipped where the back was hit."""
     return n * (1 - 2 * back_facing.astype(n.dtype))[:, None]
 
 
@@ -107,9 +112,10 @@ def corner_rows(geometry: SceneGeometry, triangle: Ids, table: CornerVectors) ->
 def geometric_normal(
     hits: Hits, interaction: SurfaceInteraction, planar_polygons: PlanarPolygons | None = None
 ) -> Vectors:
-    """(M, 3) float32 unit normal of each hit's polygon, on the side the eye sees.
+    """(M, 3) float32 unit normal of each hit's polygon, on the eye's side.
 
-    Newell's normal of a planar polygon, else the triangle's. Rays keep to the triangle's, which they leave.
+    Newell's normal of a planar polygon, otherwise the triangle's. Secondary rays always use the normal of the
+    triangle that they leave.
     """
     row = np.zeros(0, np.int32) if planar_polygons is None else planar_polygons.row.take(hits.triangle)
     planar = np.flatnonzero(row >= 0)
@@ -122,22 +128,22 @@ def geometric_normal(
 
 
 def interpolated(context: ShadingContext) -> Vectors:
-    """(M, 3) unit normal, interpolated linearly and made unit at every sample (Phong 1975).
+    """(M, 3) unit normal on the eye's side, interpolated linearly and normalized (Phong 1975).
 
-    The facet's own where the interpolated one vanishes. On the side the eye sees.
+    Where the interpolated normal vanishes, the triangle's.
     """
     interaction = context.interaction
     if context.normals is None:
         return interaction.ng
     n = unit(context.weights.interpolate(context.geometry, context.normals))
-    return with_facet(facing(n, interaction.back_facing), interaction.ng)
+    return or_geometric(facing(n, interaction.back_facing), interaction.ng)
 
 
-def with_facet(n: Vectors, ng: Vectors) -> Vectors:
-    """`n`, or the facet's normal on lanes where `n` vanishes."""
-    gone = np.flatnonzero(~(dot(n, n) > 0.25))
-    if gone.size:
-        n[gone] = ng[gone]
+def or_geometric(n: Vectors, ng: Vectors) -> Vectors:
+    """`n`, replaced in place by the geometric normal `ng` where `n` vanishes."""
+    vanished = np.flatnonzero(~(dot(n, n) > 0.25))
+    if vanished.size:
+        n[vanished] = ng[vanished]
     return n
 
 
@@ -145,11 +151,10 @@ def quadratic(context: ShadingContext) -> Vectors:
     """(M, 3) unit normal, quadratic along every edge.
 
     Along an edge delta from n0 to n1 the normal is (1 - s) n0 + s n1 - s (1 - s) b with
-    b = 3 ((n0 + n1).delta / delta.delta) delta, so that on average it stays at right angles to the edge: an
-    inflection between two equal normals shows, which linear interpolation loses. Over a triangle the edge
-    terms are weighed by products w_i w_j of the weights of their ends, over a planar polygon of more corners
-    by w_i w_j / (w_i + w_j): each reduces to the edge's own form there, and between two parallel edges of a
-    quad the second is linear.
+    b = 3 ((n0 + n1).delta / delta.delta) delta, so that on average it is perpendicular to the edge. Linear
+    interpolation misses an inflection between two equal normals; this does not. Over a triangle the edge
+    terms have the weights w_i w_j of their ends, over a planar polygon of more corners w_i w_j / (w_i + w_j).
+    Both reduce to the formula above on an edge; the second is linear between two parallel edges of a quad.
 
     References
     ----------
@@ -167,17 +172,17 @@ def quadratic(context: ShadingContext) -> Vectors:
             return take_rows(geometry.vertices, group.vertex(geometry, k)), end, group.end_weight(k)
 
         share = np.multiply if isinstance(group, TriangleCorners) else between
-        if group.lane is None:
-            bend(n, group.count, corner, share)
+        if group.index is None:
+            subtract_edge_terms(n, group.count, corner, share)
         else:
-            part = take_rows(n, group.lane)
-            bend(part, group.count, corner, share)
-            n[group.lane] = part
-    return with_facet(facing(unit(n), interaction.back_facing), interaction.ng)
+            part = take_rows(n, group.index)
+            subtract_edge_terms(part, group.count, corner, share)
+            n[group.index] = part
+    return or_geometric(facing(unit(n), interaction.back_facing), interaction.ng)
 
 
 Corner: TypeAlias = tuple[Vectors, Vectors, Floats]
-"""(M, 3) place of a corner, its unit normal, (M,) its weight."""
+"""(M, 3) position of a corner, (M, 3) its unit normal, (M,) its weight."""
 
 
 def between(first: Floats, last: Floats) -> Floats:
@@ -186,15 +191,20 @@ def between(first: Floats, last: Floats) -> Floats:
     return np.divide(product, first + last, out=np.zeros_like(product), where=product > 0)
 
 
-def bend(
+def subtract_edge_terms(
     n: Vectors,
     count: int,
     corner: Callable[[int], Corner],
     share: Callable[[Floats, Floats], Floats] = np.multiply,
 ) -> None:
-    """Take the quadratic terms of a polygon's edges off its (M, 3) linear normals `n`, which are not unit.
+    """Subtract the quadratic terms of a polygon's edges from its linear normals `n`, (M, 3), in place.
 
-    `share` is how much of an edge's term there is, by the weights of its ends.
+    Parameters
+    ----------
+    n : (M, 3)
+        Linearly interpolated, not normalized.
+    share
+        The weight of an edge's term, from the weights of its ends.
     """
     first = last = corner(0)
     for k in range(1, count + 1):
@@ -209,42 +219,46 @@ def bend(
 
 
 def uv(geometry: SceneGeometry, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
-    """(M, 2) texture coordinates, linear on every triangle; 0 where a mesh has none."""
+    """(M, 2) texture coordinates of hits, linear on every triangle; 0 where a mesh has none."""
     return _with_all(geometry, uvs, TriangleCorners(None, hits.triangle, hits.u, hits.v))
 
 
 def uv_at(geometry: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
-    """(M, 2) texture coordinates; 0 where a mesh has none.
+    """(M, 2) texture coordinates of shading points; 0 where a mesh has none.
 
-    Linear on every triangle, as exporters and bakers have them; points that stand for polygons have the mean.
+    Linear on every triangle, as exporters and bakers assume; a polygon's point has the mean of its corners.
     """
     out = _with_all(geometry, uvs, weights.hits)
     for group in weights.groups:
         if isinstance(group, MeanCorners):
-            lane = slice(None) if group.lane is None else group.lane
-            out[lane] = _with_all(geometry, uvs, group)
+            index = slice(None) if group.index is None else group.index
+            out[index] = _with_all(geometry, uvs, group)
     return out
 
 
 def _with_all(geometry: SceneGeometry, uvs: CornerVectors, corners: Corners) -> NDArray[np.float32]:
-    """(m, 2) means by weight; 0 where a corner has none."""
+    """(m, 2) weighted means of the corners' uv; 0 where a corner has none."""
     index = [uvs.index.take(corners.corner(geometry, k)) for k in range(corners.count)]
     has = np.minimum.reduce(index) >= 0
     if not has.any():
         return np.zeros((len(has), 2), F, order="F")
-    found = corners.mean(lambda k: take_rows(uvs.values, index[k]))
-    return np.asarray(np.where(has[:, None], found, F(0)))
+    mean = corners.mean(lambda k: take_rows(uvs.values, index[k]))
+    return np.asarray(np.where(has[:, None], mean, F(0)))
 
 
 def uv_tangents(geometry: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
-    """Where u grows, at every corner.
+    """Unit tangent at every corner, in the direction of increasing u.
 
-    The mean, by angle, of the triangles around that share vertex, uv and the handedness of their uv, so that
-    the grain of a smooth surface is smooth up to its seams. Zero where there are no uv, or flat ones.
+    The mean, weighted by angle, over the adjacent triangles with the same vertex, uv and handedness of their
+    uv, so that the grain of a smooth surface is smooth up to its uv seams. Zero where there are no uv, or
+    degenerate ones.
     """
+    # The tangent of every triangle, and its handedness.
     points = [take_rows(geometry.vertices, corner).astype(np.float64) for corner in geometry.triangles.T]
     at = corner_rows(geometry, np.arange(len(geometry.triangles), dtype=np.int32), uvs)
     along, hand = _along_u(points, at, uvs)
+
+    # Sum those of corners with the same vertex, uv and handedness, weighted by the triangle's angle there.
     groups, parts = [], []
     for k in range(3):
         groups.append((geometry.triangles[:, k] * (len(uvs.values) + np.int64(1)) + at[k] + 1) * 3 + hand)
@@ -255,7 +269,9 @@ def uv_tangents(geometry: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
     sums: Vectors = np.stack(
         [np.bincount(index.ravel(), part) for part in weights.T], axis=1, dtype=np.float64
     )
-    none = np.zeros((1, 3))  # of corners that the cut skipped
+
+    # Corners that are in no triangle have none.
+    none = np.zeros((1, 3))
     corner = np.full(len(uvs.index), len(sums), np.int32)
     corner[geometry.corners.ravel()] = index.ravel()
     return CornerVectors(column_major(np.concatenate([unit(sums), none]), F), corner)
@@ -264,7 +280,10 @@ def uv_tangents(geometry: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
 def _along_u(
     points: Sequence[Vectors], at: Sequence[Ids], uvs: CornerVectors
 ) -> tuple[Vectors, NDArray[np.int64]]:
-    """(T, 3) unit vectors where u grows on each triangle, and (T,) the handedness of its uv: 0, 1 flat, 2."""
+    """(T, 3) unit tangents in the direction of increasing u, and (T,) the handedness of each triangle's uv.
+
+    The handedness is 0 for mirrored uv, 1 for degenerate ones or none, 2 otherwise.
+    """
     if not len(uvs.values):
         return np.zeros_like(points[0]), np.ones(len(points[0]), np.int64)
     t0, t1, t2 = (take_rows(uvs.values, np.maximum(index, 0)).astype(np.float64) for index in at)
@@ -272,8 +291,8 @@ def _along_u(
     has = (at[0] >= 0) & (at[1] >= 0) & (at[2] >= 0)
     hand = np.where(has, np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), 0)
     e1, e2 = points[1] - points[0], points[2] - points[0]
-    way: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
-    return unit(way) * hand[:, None], hand.astype(np.int64) + 1
+    along: Vectors = b[:, 1][:, None] * e1 - a[:, 1][:, None] * e2
+    return unit(along) * hand[:, None], hand.astype(np.int64) + 1
 
 
 def world_position(render_space: RenderSpace, interaction: SurfaceInteraction) -> Vectors:
@@ -294,29 +313,29 @@ def triangle_id(hits: Hits) -> NDArray[np.uint32]:
 def rings(
     matrix: NDArray[np.float64], axis: Sequence[float], centre: ArrayLike, position: Vectors
 ) -> Vectors:
-    """(M, 3) unit direction of the ring about an axis through each point; zero on the axis.
+    """(M, 3) unit tangent of the circle about an axis through each point; zero on the axis.
 
     Parameters
     ----------
     matrix : (3, 3)
-        From the object's own directions, in which axis and rings are meant, to those of the world: where it
-        stretches unevenly, rings become ellipses.
+        From object space, in which the axis and the circles are defined, to the space of `position`. A
+        non-uniform scale turns circles into ellipses.
     centre : (3,)
-        A point on the axis, in the world, as `position` is.
+        A point on the axis, in the space of `position`.
     """
-    own = (position - np.asarray(centre)) @ cofactors(matrix)  # by the inverse, times the determinant
-    ring = np.cross(axis, own) @ matrix.T
+    local = (position - np.asarray(centre)) @ cofactors(matrix)  # the inverse, times the determinant
+    ring = np.cross(axis, local) @ matrix.T
     return unit(ring * np.sign(np.linalg.det(matrix)))
 
 
 def tangent(n: Vectors, grain: Vectors) -> Vectors:
-    """(M, 3) unit `grain` made perpendicular to `n`; any perpendicular where it is parallel or zero."""
+    """(M, 3) `grain` projected perpendicular to `n`, unit; any perpendicular where it is parallel or zero."""
     t = grain - dot(grain, n)[:, None] * n
     size = length(t)
-    weak = np.flatnonzero(~(size > 1e-4))
-    if weak.size:
-        m = n[weak]
+    undefined = np.flatnonzero(~(size > 1e-4))
+    if undefined.size:
+        m = n[undefined]
         axis = np.zeros_like(m)
         axis[np.arange(len(m)), np.argmin(np.abs(m), axis=1)] = 1
-        t[weak] = axis - dot(axis, m)[:, None] * m
+        t[undefined] = axis - dot(axis, m)[:, None] * m
     return unit(t)

@@ -1,4 +1,4 @@
-"""Ray offsets: secondary rays start off their own surface by the rounding error of the arithmetic alone."""
+"""Ray offsets: secondary rays start above the triangle they leave, by little more than the rounding error."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, length
 
 ORIGIN_OFFSET = 4 * 2.0**-24
-"""Offset of a ray's origin, relative to position and edge: four times the smallest one without self-hits.
+"""Offset of a ray's origin, relative to position and edge: four times the smallest without self-intersection.
 Objects 1e-6 radii apart still shadow each other."""
 
 ULP = 2.0**-23
 LONGEST = 100.0
-"""No sliver counts as longer than this [radii]: its rays start 2.4e-5 radii off at most."""
+"""Upper bound on a sliver's effective edge [radii]: the offset stays below 2.4e-5 radii."""
 
 
 def effective_edge(edge: Floats, area: NDArray[np.floating]) -> Floats:
-    """(N,) float32 the length that the rounding of a hit goes with: the longest edge, for slivers more.
+    """(N,) float32 length that a hit's rounding error is proportional to: the longest edge, for slivers more.
 
-    The ray core forms a triangle's normal in single precision from edges that in a sliver are nearly
-    parallel, so its plane errs by a share that grows with edge / height. Measured on needles of aspect 100
-    to 10,000 that are turned out of their axes: with the longest edge alone up to 8 % of the rays hit their
-    own triangle, with a quarter of edge^2 / height none at 1000 and 200 ppm at 10,000.
+    Embree computes a triangle's normal in single precision from edges that in a sliver are nearly parallel,
+    so the relative error of its plane grows with edge / height. Measured on needles of aspect 100 to 10,000,
+    rotated off the axes: with the longest edge alone up to 8 % of the rays hit their own triangle, with a
+    quarter of edge^2 / height none at 1000 and 200 ppm at 10,000.
 
     Parameters
     ----------
@@ -36,20 +36,20 @@ def effective_edge(edge: Floats, area: NDArray[np.floating]) -> Floats:
 
 
 def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats) -> Vectors:
-    """(N, 3) float32 origins above the facet: position + 4 2^-24 (|ng|.|position| + edge) ng, and one ulp.
+    """(N, 3) float32 origins above the triangle: position + 4 2^-24 (|ng|.|position| + edge) ng, and one ulp.
 
     Parameters
     ----------
     position : (N, 3) float64
-        On the facet, in radii from the scene's centre.
+        On the triangle, in radii from the scene's centre.
     ng : (N, 3)
-        Unit facet normal on the side the ray leaves.
+        Unit normal of the triangle, on the side that the ray leaves.
     edge : (N,)
-        The facet's longest edge, or its `effective_edge`.
+        The triangle's longest edge, or its `effective_edge`.
     """
     size = np.abs(position)
     step = (ORIGIN_OFFSET * (dot(np.abs(ng), size) + edge))[:, None] * ng
-    # twice the rounding to float32 outwards, so that rounding never brings a component back inwards
+    # twice the rounding to float32, outwards, so that rounding never moves a component back inwards
     size *= ULP
     step += np.copysign(size, ng, out=size)
     step += position
@@ -57,10 +57,10 @@ def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats)
 
 
 def to_tangent_plane(position: Vectors, corner: Vectors, normal: Vectors) -> Vectors:
-    """(N, 3) the way from each position up to the plane through `corner` with unit `normal`; 0 from above it.
+    """(N, 3) vector from each position up to the plane through `corner` with unit `normal`; 0 above it.
 
-    The mean of these ways, by the weights of a polygon's corners, leads to the curved surface that the
-    corners' normals imply.
+    The mean of these vectors, weighted by a polygon's interpolation weights, leads to the smooth surface that
+    the normals at its corners imply.
 
     References
     ----------
@@ -70,7 +70,7 @@ def to_tangent_plane(position: Vectors, corner: Vectors, normal: Vectors) -> Vec
     return -below[:, None] * normal
 
 
-def bounded(way: Vectors, most: Floats) -> Vectors:
-    """(N, 3) `way`, no longer than `most`."""
-    size = length(way)
-    return way * np.divide(most, size, out=np.ones_like(size), where=size > most)[:, None]
+def bounded(offset: Vectors, max_length: Floats) -> Vectors:
+    """(N, 3) `offset`, shortened to `max_length` where it is longer."""
+    size = length(offset)
+    return offset * np.divide(max_length, size, out=np.ones_like(size), where=size > max_length)[:, None]

@@ -1,7 +1,7 @@
-"""Random numbers keyed by what they are for, and well-spread point sets.
+"""Random numbers keyed by their purpose, and low-discrepancy point sets.
 
-Every number is a hash of (seed, purpose, pixel or vertex number, sample): more outputs, other tiles, more
-threads and another order change none of them.
+Every number is a hash of (seed, purpose, pixel or vertex number, sample), so it does not depend on the other
+outputs, on tiles, threads or the order of calls.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ PLASTIC = 1.32471795724474602596
 
 
 def stream(seed: int, purpose: str) -> int:
-    """A 32-bit key for one use of random numbers."""
+    """The 32-bit key of the random numbers for one purpose."""
     return int.from_bytes(hashlib.blake2b(f"{seed}:{purpose}".encode(), digest_size=4).digest(), "little")
 
 
 def hashed(key: int, number: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """32 random bits per number: two rounds of multiply and xorshift (lowbias32, Wellons 2018)."""
+    """(N,) uint32 random bits for each number: multiply and xorshift, twice (lowbias32, Wellons 2018)."""
     x = number ^ U32(key)
     for multiplier in (0x7FEB352D, 0x846CA68B):
         x = (x ^ (x >> U32(16))) * U32(multiplier)
@@ -41,7 +41,7 @@ def unit_interval(bits: NDArray[np.uint32]) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=32)
 def sobol(count: int) -> NDArray[np.uint32]:
-    """(2, count) uint32: the first points of Sobol's (0, 2)-sequence, bit-reversed for `owen`."""
+    """(2, count) uint32 the first points of Sobol's (0, 2)-sequence, bit-reversed for `owen`."""
     number = np.arange(count, dtype=U32)
     second, matrix, rest = np.zeros_like(number), U32(1 << 31), number.copy()
     while rest.any():
@@ -62,10 +62,10 @@ def reverse_bits(x: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 
 def owen(reversed_bits: NDArray[np.uint32], seed: NDArray[np.uint32]) -> NDArray[np.float64]:
-    """[0, 1) coordinates: a nested uniform scramble of bit-reversed points, by hashing.
+    """Coordinates in [0, 1): a nested uniform scramble of bit-reversed points, by hashing.
 
-    Each step lets a bit depend on lower bits only, so that on reversed input a digit depends on the
-    digits before it, as Owen's scramble has it.
+    In each step a bit depends on lower bits only; on reversed input every digit therefore depends on the
+    digits before it, as in Owen's scramble.
 
     References
     ----------
@@ -85,7 +85,8 @@ def pixel_points(
 ) -> NDArray[np.float64]:
     """(N * count, 2) in [0, 1)^2: `count` points per pixel, an Owen-scrambled Sobol set each.
 
-    One point is the pixel's centre. With `first` they are those from this number on of a larger set.
+    A single point is the pixel's centre. With `first` they are points `first` to `first + count` of a larger
+    set.
     """
     if count == 1 and first is None:
         return np.full((len(pixel), 2), 0.5, order="F")
@@ -98,17 +99,17 @@ def pixel_points(
 
 
 SPIRAL_POINTS = 1 << 14
-"""Points of a table of spirals, 196 kB: half a core's share of its cache, with that of the rays."""
+"""Points in a table of spirals, 196 kB: with the arrays of the rays, half of a core's share of the cache."""
 
 
 @lru_cache(maxsize=64)
 def spiral_table(count: int) -> NDArray[np.float32]:
     """(phases, 3, count) unit directions about +z, cosine-weighted: golden-angle spirals on the disc.
 
-    r^2 = (i + (k + 1/2) / phases) / count. Projected on the disc the cosine disappears; with the phase drawn
-    at random every point is uniform in its own ring, so the mean is unbiased for any count. Phases are as
-    many as fit the table, at least 16: the rim of a disc about the zenith is resolved to 1 / (2 phases
-    count) of the hemisphere, 3e-5 up to 1024 rays.
+    Point i of phase k has r^2 = (i + (k + 1/2) / phases) / count. Directions that are uniform on the disc are
+    cosine-weighted on the hemisphere; with a random phase every point is uniform in its own ring, so the mean
+    is unbiased for any count. There are as many phases as fit the table, at least 16: the edge of an occluder
+    around the zenith is resolved to 1 / (2 phases count) of the hemisphere, 3e-5 up to 1024 rays.
     """
     phases = max(16, SPIRAL_POINTS // count)
     i = np.arange(count)
@@ -124,11 +125,11 @@ def spiral_table(count: int) -> NDArray[np.float32]:
 def dither(
     key: int, x: NDArray[np.int64], y: NDArray[np.int64], sample: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """(2, N) in [0, 1): turn and phase of each pixel's spiral from the R2 sequence over the pixel grid.
+    """(2, N) in [0, 1): rotation and phase of each pixel's spiral, from the R2 sequence over the pixel grid.
 
-    Neighbouring pixels then err in different directions, and a small blur removes more of the error than
-    it would of independent noise. Samples of one pixel step by sqrt(3) and the golden ratio, which no
-    integers relate: together their spirals fill the disc too.
+    The errors of neighbouring pixels then tend to cancel: a small blur removes more of them than it would of
+    independent noise. Samples of one pixel step by sqrt(3) and the golden ratio, which are rationally
+    independent, so that their spirals together fill the disc evenly, too.
     """
     a, b = 1 / PLASTIC, 1 / PLASTIC**2
     start = unit_interval(hashed(key, np.array([0, 1], U32)))

@@ -56,7 +56,7 @@ class Barycentric(Record):
     step: Mapping[Corners, int]  # group -> how many points further that of the next corner is
 
     def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
-        return self.weights.joined(
+        return self.weights.weighted_mean(
             lambda group, k: take_rows(values, self.first[group] + k * self.step[group])
         )
 
@@ -233,7 +233,7 @@ def _gouraud(
     for group in weights.groups:
         # The polygons of the group that are seen, each side once.
         back_facing = context.interaction.back_facing
-        back_facing = back_facing if group.lane is None else back_facing.take(group.lane)
+        back_facing = back_facing if group.index is None else back_facing.take(group.index)
         side = group.shape * np.int64(2) + back_facing
         _, first, number = np.unique(side, return_index=True, return_inverse=True)
         first_point[group], step[group] = number.ravel() + count, len(first)
@@ -244,7 +244,7 @@ def _gouraud(
                 take_rows(number(geometry, k), first) for number in (group.corner, group.vertex)
             )
             n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(back_facing, first))
-            at = (take_rows(part, first) for part in group.place(k))
+            at = (take_rows(part, first) for part in group.corner_on_triangle(k))
             corners.append((*at, take_rows(geometry.vertices, vertex), n))
             count += len(first)
     triangle, u, v, position, n = (

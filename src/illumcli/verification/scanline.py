@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import Floats, Vectors, column_major, unit
 from illumcli.geometry.single_normals import cross_normal
 from illumcli.models.blinn_phong import BlinnPhong
-from illumcli.rays.interaction import bend
+from illumcli.rays.interaction import subtract_edge_terms
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import response
 from illumcli.verification.phong import emitted_and_ambient, surface
@@ -97,7 +97,7 @@ def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
     origin, none = np.zeros_like(delta), np.zeros_like(s)
     corners = ((origin, n0, 1 - s), (delta, n1, s), (origin, n0, none))
     n = linear(n0, n1, delta, s)
-    bend(n, 3, corners.__getitem__)
+    subtract_edge_terms(n, 3, corners.__getitem__)
     return n
 
 

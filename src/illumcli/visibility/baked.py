@@ -35,12 +35,15 @@ class Baked(Record):
     corner_bent_normal: NDArray[np.float32] | None = None  # (C, 3)
 
     def of(self, name: str, count: int) -> NDArray[np.float32] | None:
-        """(V,) values of the mesh of `count` vertices, in a bake of several that of the object `name`; None
-        where there is none that long."""
+        """(V,) values at the `count` vertices of a mesh; in a bake of several meshes, of the object `name`.
+        None if there are none of this length."""
         return self._part(self.obscurance, "vertices", name, count)
 
     def of_corners(self, name: str, corners: NDArray[np.int32], count: int) -> NDArray[np.float32] | None:
-        """(C,) the same at the mesh's corners, (C,) vertex numbers: values of corners, else of vertices."""
+        """(C,) values at the corners of a mesh: those of corners if there are any, otherwise of vertices.
+
+        `corners` holds the vertex number of each, (C,); `count` is the number of vertices.
+        """
         values, at_corners = self.of(name, count), None
         if self.corner_obscurance is not None:
             at_corners = self._part(self.corner_obscurance, "corners", name, len(corners))
@@ -74,7 +77,7 @@ class Baked(Record):
 
 
 def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts: NDArray[np.int32]) -> str:
-    """Hash of a mesh's geometry, 32 hexadecimal digits, the same from whatever file it was read."""
+    """Hash of a mesh's geometry, 32 hexadecimal digits; the same for any file format it was read from."""
     digest = hashlib.blake2b(digest_size=16)
     for array in (vertices, corners, starts):
         digest.update(repr((array.dtype.str, array.shape)).encode())
@@ -88,13 +91,14 @@ def write_npz(path: Path, baked: Baked) -> None:
     with AtomicFile(path) as part:
         with part.path.open("wb") as file:
             np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
-            file.seek(-2, os.SEEK_END)  # the length of the archive's comment, which is its end
+            # The archive ends in the length of its comment: append an empty seal as the comment.
+            file.seek(-2, os.SEEK_END)
             file.write(struct.pack("<H", len(BLANK)) + BLANK.encode())
         seal(part.path)
 
 
 def refuse_unpacked(path: Path) -> None:
-    """Raise LimitError where what an archive packs does not fit into memory; a small file may hold much."""
+    """Raise LimitError if an archive's content, which may be far larger than its file, exceeds the memory."""
     with zipfile.ZipFile(path) as archive:
         length = sum(each.file_size for each in archive.infolist())
     refuse_beyond(3 * length, f"{path}: {in_words(length)} unpacked", "bake a smaller mesh")
@@ -117,7 +121,7 @@ def read_npz(path: Path) -> Baked:
             baked = Baked(**arrays, about=about)
     except LimitError:
         raise
-    except Exception as why:  # zipfile, numpy and json each have their own
+    except Exception as why:  # zipfile, numpy and json each have their own exceptions
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
     values = [baked.obscurance, *(() if baked.corner_obscurance is None else (baked.corner_obscurance,))]
     sound = all(w.ndim == 1 and np.isfinite(w).all() and (w >= 0).all() and (w <= 1).all() for w in values)
@@ -132,7 +136,7 @@ def read_about(path: Path) -> dict[str, Any]:
     Raises
     ------
     Exception
-        A file of others; zipfile, numpy and json each have their own.
+        Not such a file; zipfile, numpy and json each have their own exceptions.
     """
     refuse_unpacked(path)
     with np.load(path, allow_pickle=False) as data:

@@ -28,18 +28,18 @@ from illumcli.render_space import RenderSpace
 from illumcli.visibility.shadows import NEARBY, TERMINATOR_SHARE
 
 BOX_MARGIN = 1e-4
-"""By which boxes and hulls are enlarged [radii]: rounding of rays, the second shot of rays that miss and the
-offsets of secondary rays together move a ray by a tenth of it."""
+"""Enlargement of boxes and hulls [radii]. Rounding, the retry of rays that miss and the offsets of secondary
+rays together move a ray by a tenth of this."""
 SHADOW_REACH = 20.0
-"""Length at which a shadow ray counts as having left the scene, from any point near it [radii]."""
+"""Length at which a shadow ray from any point in or near the scene has left it [radii]."""
 MAX_STEPS = 40
 PARALLEL = 1e-9
-"""Determinant of three unit normals below which their planes meet in no point."""
+"""Determinant of three unit normals below which their planes count as having no common point."""
 PAIRS_AT_ONCE = 1 << 20
 """Pairs of a hull's point and a box that are compared at once."""
 LARGE_BOXES, GROUPED_BOXES = 8, 16
-"""Of many boxes, how many of the largest stay as they are, and how many boxes hold the others, neighbours
-together."""
+"""If there are many boxes, this many of the largest stay as they are, and the others are merged with their
+neighbours into this many."""
 
 Positions: TypeAlias = NDArray[np.float64]
 """(N, 3) in radii."""
@@ -68,23 +68,23 @@ class Planes(NamedTuple):
 
 
 class SecondaryRays(NamedTuple):
-    """The rays that visible geometry casts."""
+    """What decides the extent of secondary rays from visible geometry."""
 
-    lights: Sequence[Light]  # those that cast shadows
+    lights: Sequence[Light]  # lights that cast shadows
     obscurance_reach: float  # of obscurance rays [radii]; 0 where none are cast
 
 
 def frustum(
     camera: Any, render_space: RenderSpace, width: int, height: int, film_filter: Any | None
 ) -> Planes:
-    """Five planes around all rays of a view: four sides, and the eye's own; in radii.
+    """Five planes around all camera rays of a view, in radii: the four sides, and the plane through the eye.
 
     Parameters
     ----------
     film_filter
-        The pixel filter, None where each pixel looks through its centre.
+        The pixel filter, None if each pixel has one ray through its centre.
     """
-    # Half of the image plane, as wide as samples reach under the filter.
+    # Half the size of the image plane, enlarged by the reach of the filter.
     right, up, forward = axes(camera)
     eye = render_space.from_world(camera.position)
     ends = np.array([0.0, 0.5, 1 - 2.0**-32])
@@ -105,7 +105,7 @@ def frustum(
 
 
 def outside_frustum(planes: Planes, boxes: Boxes) -> NDArray[np.bool_]:
-    """(K,) True for boxes that lie wholly beyond one of the planes."""
+    """(K,) True for boxes that lie wholly outside one of the planes."""
     n, d = planes
     nearest = np.where(n[:, None] > 0, boxes.low, boxes.high)
     beyond = np.einsum("pki,pi->pk", nearest, n) > d[:, None] + BOX_MARGIN
@@ -128,23 +128,24 @@ def clip_boxes(planes: Planes, boxes: Boxes) -> Positions:
 
 
 def shadow_hull(points: Positions, light: Light, render_space: RenderSpace) -> Positions:
-    """The points and the ends of their shadow rays, whose hull holds all shadow rays from the points' hull.
+    """The points and the ends of their shadow rays; the hull of both contains all shadow rays from the hull
+    of the points.
 
-    A light is a point or infinitely far away. Long rays are cut beyond the scene, all at the same
-    share of their length.
+    A light is a point or infinitely far away. Long rays are cut outside the scene, all at the same fraction
+    of their length.
     """
-    arriving = light.sample_at(column_major(points), render_space)
-    nearest = float(arriving.distance.min())
+    to_light = light.sample_at(column_major(points), render_space)
+    nearest = float(to_light.distance.min())
     if np.isinf(nearest):
-        ends = points + SHADOW_REACH * arriving.l
+        ends = points + SHADOW_REACH * to_light.l
     else:
-        share = min(1.0, SHADOW_REACH / max(nearest, SHADOW_REACH / 2))
-        ends = points + share * arriving.distance[:, None] * arriving.l
+        fraction = min(1.0, SHADOW_REACH / max(nearest, SHADOW_REACH / 2))
+        ends = points + fraction * to_light.distance[:, None] * to_light.l
     return np.concatenate([points, ends])
 
 
 def separated(points: Positions, boxes: Boxes, gap: float) -> NDArray[np.bool_]:
-    """(K,) True for boxes that a plane proves to be farther than `gap` from the hull of the points."""
+    """(K,) True for boxes that a separating plane proves to be farther than `gap` from the points' hull."""
     count = len(boxes.low)
     if count > (at_once := max(1, PAIRS_AT_ONCE // len(points))):
         parts = [slice(first, first + at_once) for first in range(0, count, at_once)]
@@ -155,21 +156,21 @@ def separated(points: Positions, boxes: Boxes, gap: float) -> NDArray[np.bool_]:
     nearest = points.mean(axis=0) - (boxes.low + boxes.high) / 2
     undecided = np.arange(count)
     for _ in range(MAX_STEPS):
-        # The corner of hull - box that lies farthest back along `nearest`: a plane through it separates them
-        # if it is still more than the gap ahead.
+        # The support point of hull - box against `nearest`. If it is farther than the gap from the origin
+        # along `nearest`, the plane through it separates the two.
         corner = np.where(nearest > 0, boxes.high[undecided], boxes.low[undecided])
         back = points[np.argmin(points @ nearest.T, axis=0)] - corner
         size = np.linalg.norm(nearest, axis=1)
         is_separated = np.einsum("ki,ki->k", back, nearest) > gap * size
         out[undecided[is_separated]] = True
 
-        # `nearest` leads from a point of the box to one of the hull: a short one proves the opposite.
+        # `nearest` is the difference of a point of each: if it is short, the two are closer than the gap.
         rest = np.flatnonzero(~is_separated & (size > gap))
         undecided, nearest = undecided[rest], nearest[rest]
         if not len(undecided):
             break
 
-        # The point nearest to the origin on the segment towards that corner.
+        # Continue from the point nearest to the origin on the segment to the support point.
         step = back[rest] - nearest
         length2 = np.einsum("ki,ki->k", step, step)
         share = -np.einsum("ki,ki->k", nearest, step) / np.maximum(length2, np.finfo(np.float64).tiny)
@@ -178,7 +179,7 @@ def separated(points: Positions, boxes: Boxes, gap: float) -> NDArray[np.bool_]:
 
 
 def merge_boxes(boxes: Boxes) -> Boxes:
-    """Boxes that together hold all of K boxes: these if they are few, otherwise fewer and larger ones."""
+    """Boxes that together contain all of K boxes: the same if there are few, otherwise fewer, larger ones."""
     low, high = boxes
     if len(low) <= LARGE_BOXES + GROUPED_BOXES:
         return boxes
@@ -204,12 +205,12 @@ def culled_objects(
     Parameters
     ----------
     boxes : Boxes
-        Bounds of the objects [radii]; inf and -inf for one without polygons, which is never culled.
+        Bounds of the objects [radii]; inf and -inf for an object without polygons, which is never culled.
     widths : (O,)
-        The widest polygon of each object whose shadow rays may start on the surface that its normals imply
-        [radii]: they start within a share of it and look for other things nearby (`shadows`).
+        Diagonal of each object's largest polygon [radii], 0 without terminator correction. It bounds the
+        terminator offset and the search for nearby objects (`shadows`).
     views : sequence of Planes
-        What bounds each view, at least one (`frustum`).
+        The frustum of each view, at least one.
     """
     # Only objects outside every frustum can be culled.
     real = np.isfinite(boxes.low).all(axis=1)
@@ -218,7 +219,7 @@ def culled_objects(
     if not out.any():
         return out
 
-    # The visible part of the others, with the offsets of their rays.
+    # The visible part of the other objects, enlarged by the offsets of their secondary rays.
     enlarged = boxes.enlarged(BOX_MARGIN + TERMINATOR_SHARE * widths)
     visible = np.concatenate(
         [
@@ -229,7 +230,7 @@ def culled_objects(
     if not len(visible):
         return out
 
-    # Keep those that its obscurance rays, its search for nearby objects, or its shadow rays can reach.
+    # Keep the candidates that its obscurance rays, search for nearby objects or shadow rays can reach.
     nearby = NEARBY * widths[real & ~outside.all(axis=0)].max(initial=0)
     hulls = [(visible, BOX_MARGIN + max(rays.obscurance_reach, nearby))]
     hulls += [(shadow_hull(visible, light, render_space), BOX_MARGIN) for light in rays.lights]

@@ -1,4 +1,4 @@
-"""Directions over the hemisphere: cosine-weighted sample patterns, their frames, and the rays' origins."""
+"""Rays over the hemisphere: cosine-weighted directions, the frames they are turned by, and their origins."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from illumcli.records import Record
 from illumcli.visibility.samplers import GRAZING, SAMPLERS
 
 ORIGIN_STRIDE = 13
-"""From the origin of one ray to that of the next: neither neighbours on a spiral nor rays of one ring share
-theirs, for 16 origins."""
+"""Step from the origin of one ray to that of the next. With 16 origins, neither neighbours on a spiral nor
+rays of one ring have the same origin."""
 
 
 class Hemispheres(Record):
-    """The hemispheres that M points are sampled over, and where their rays start.
+    """The hemispheres of M points, and the origins of the rays over them.
 
-    Ray i of a point starts at origin i ORIGIN_STRIDE, modulo the E origins that each point has.
+    Ray i of a point starts at the point's origin number i * ORIGIN_STRIDE modulo E, the origins per point.
     """
 
     n: Vectors  # (M, 3) float32 unit shading normals, the axes
     origins: Vectors  # (M * E, 3) float32 off the surface [radii]; those of a point follow each other
     ng: Vectors | None = None
-    """(M * E, 3) float32 unit normals of the triangles that the rays leave; None where they are `n`."""
+    """(M * E, 3) float32 unit normals of the triangles that the rays leave; None if they equal `n`."""
     known_open: NDArray[np.bool_] | None = None
-    """(M,) points that are known to be open, which cast no rays; None: no point is."""
+    """(M,) True for points that are known to be open, which cast no rays; None: for no point."""
 
     @property
     def origins_per_point(self) -> int:
@@ -56,7 +56,7 @@ class Hemispheres(Record):
         )
 
     def origin_of_rays(self, samples: int) -> NDArray[np.int64]:
-        """(M * samples,) the origin of every ray, one point after the other."""
+        """(M * samples,) index of every ray's origin, one point after the other."""
         each = self.origins_per_point
         of_point = np.arange(samples) * ORIGIN_STRIDE % each
         return (np.arange(len(self.n))[:, None] * each + of_point).ravel()
@@ -68,14 +68,14 @@ def hemispheres(
     known_open: NDArray[np.bool_] | None,
     obscurance_normals: Vectors | None = None,
 ) -> Hemispheres:
-    """The hemispheres of hits, about the triangles' own normals where no others are given."""
+    """The hemispheres of hits, about `obscurance_normals`; without these, about the triangles' normals."""
     if obscurance_normals is None:
         return Hemispheres(interaction.ng, ray_origins, known_open=known_open)
     return Hemispheres(obscurance_normals, ray_origins, interaction.ng, known_open)
 
 
 def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: str) -> NDArray[np.float32]:
-    """(M, 3, 3) float32 the axes of each point's pattern, as rows; some are turned at random."""
+    """(M, 3, 3) float32 rows tangent, bitangent, `n` of each point; some samplers turn them at random."""
     angle = 2 * np.pi * draws[0] if SAMPLERS[sampler].turned else np.zeros(len(n))
     return turned_frame(n, angle.astype(F))
 
@@ -116,7 +116,7 @@ def directions(
         From `sample_frames`.
     """
     out = np.empty((3, len(frames), samples), F)
-    # a long row per component: three times as fast as one of three numbers per ray
+    # one long row per component: three times as fast as rows of three numbers, one per ray
     pattern = SAMPLERS[sampler].directions(draws, samples)
     np.matmul(frames.transpose(0, 2, 1), pattern, out=out.transpose(1, 0, 2))
     return out.reshape(3, -1).T
@@ -132,7 +132,7 @@ def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: str) -> N
     over : Hemispheres
         With the triangles' normals.
     """
-    # Candidates are the last rays of each pattern, so many that no ray before them can point below.
+    # Only the last rays of a pattern can point below the plane: spirals are ordered from the axis outwards.
     assert over.ng is not None
     each = over.origins_per_point
     axes = over.n if each == 1 else repeat_rows(over.n, each)

@@ -1,4 +1,4 @@
-"""Obscurance w(p), of which ambient occlusion is the case of a step falloff, by Monte Carlo.
+"""Obscurance w(p) by Monte Carlo; with a step falloff it is ambient occlusion.
 
 Pixels, vertices and texels share this code. Standard errors are in `obscurance_error`, sample patterns in
 `hemisphere`.
@@ -23,10 +23,10 @@ from illumcli.visibility.samplers import SAMPLERS
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
 RAYS_AT_ONCE = 1 << 17
-"""So many that the ray core keeps its own data in the processor's cache for long: a tenth faster than 2^14,
-whose directions, origins and answers would all fit beside it; with two threads a fifth."""
+"""Rays per batch: a tenth faster than 2^14, with two threads a fifth, although the arrays of 2^14 rays would
+fit into the processor's cache. In long batches Embree's own data stay there."""
 MAX_BACK_FACES = 64
-"""How many back faces in a row a ray passes through, when it does."""
+"""Back faces in a row that a ray passes through if back faces are ignored."""
 
 
 class Method(Record):
@@ -37,16 +37,16 @@ class Method(Record):
     radius: float  # of the scene [scene units]
     sampler: str = "spiral"
     faces: Faces = "count"
-    triangle_normals: Vectors | None = None  # (T, 3) float32, unless every face counts
+    triangle_normals: Vectors | None = None  # (T, 3) float32; None if every face counts
 
     @property
     def any_hit(self) -> bool:
-        """Is an occlusion query enough, without the distance?"""
+        """True if an occlusion query is enough and the distance is not needed."""
         return self.falloff.step and self.faces == "count"
 
 
 class ObscuranceSettings(Protocol):
-    """What a scene says of its obscurance (`scene.spec.Obscurance`)."""
+    """The part of a scene's obscurance settings that is used here (`scene.spec.Obscurance`)."""
 
     @property
     def samples(self) -> int: ...
@@ -61,7 +61,7 @@ class ObscuranceSettings(Protocol):
 def obscurance_method(
     settings: ObscuranceSettings, render_space: RenderSpace, triangle_normals: Vectors | None = None
 ) -> Method:
-    """How w is estimated in pictures; (T, 3) `triangle_normals` are given unless every face counts."""
+    """How a render estimates w; `triangle_normals`, (T, 3), are given unless every face counts."""
     return Method(
         settings.samples,
         settings.falloff,
@@ -79,12 +79,12 @@ def obscurance(
     obscurance_method: Method,
     baked_obscurance: Floats | None = None,
 ) -> NDArray[np.float32]:
-    """(M,) w of every hit; on meshes with baked values these, and rays for the others.
+    """(M,) w of every hit: baked values on meshes that have them, ray-traced estimates on the others.
 
     Parameters
     ----------
     obscurance_draws : (2, M) float64
-        As `draws` of `estimates`.
+        See `draws` of `estimates`.
     baked_obscurance : (M,) float32, optional
         NaN on meshes that have no baked values.
     """
@@ -113,20 +113,20 @@ def estimates(
     """w = 1/pi * integral of mu(d) cos(theta) over the hemisphere about the shading normal: 1 where open.
 
     A direction that points below the triangle it leaves is mirrored at that triangle's plane, so that no
-    triangle shades itself.
+    triangle occludes itself.
 
-    The default sampler is a golden-angle spiral on the disc, turned and phased per point: unbiased for any
-    count, and within 6 to 16 % of the least error any point set can have on visibility. Every estimate
-    depends on its own point alone.
+    The default sampler is a golden-angle spiral on the disc, with a random rotation and phase per point:
+    unbiased for any count, and within 6 to 16 % of the least error that any point set can have on visibility.
+    Every estimate depends on its own point alone.
 
     Parameters
     ----------
     draws : (2, M) float64
-        In [0, 1): turn and phase of each point's spiral, or what another sampler is scrambled by.
+        In [0, 1): rotation and phase of each point's spiral, or the scramble of another sampler.
     bent : bool
-        Also the bent normal, the mean direction of what is open.
+        Also compute the bent normal, the mean unoccluded direction.
     errors : bool
-        Also the variation between neighbouring rays, which `Errors` needs; 0 otherwise.
+        Also compute the variation between neighbouring rays, which `Errors` needs; otherwise it is 0.
     """
     count = len(over.n)
     w, variation = np.ones(count, F), np.zeros(count, F)
@@ -141,7 +141,7 @@ def estimates(
     frames = sample_frames(over.n, draws, method.sampler)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, casting, at_once):
-        # The rays of a batch of points.
+        # Directions and origins of the rays of a batch of points.
         end = min(first + at_once, casting)
         points = slice(first, end) if unknown is None else unknown[first:end]
         batch = over.between(first, end) if unknown is None else over.take(unknown[first:end])
@@ -152,7 +152,7 @@ def estimates(
         if batch.origins_per_point > 1:
             origins = take_rows(origins, batch.origin_of_rays(method.samples))
 
-        # What they meet, and what that says of each point.
+        # Trace them, and average over each point's rays.
         mu = occluder_weights(tracer, origins, d, method).reshape(-1, method.samples)
         w[points] = mean_openness(mu)
         if errors:
@@ -163,15 +163,15 @@ def estimates(
 
 
 def mean_openness(mu: NDArray[Any]) -> NDArray[np.float32]:
-    """(M,) float32 mean of each row of mu, (M, samples); exactly 1 where nothing is in the way."""
+    """(M,) float32 mean of each row of mu, (M, samples); exactly 1 where no ray is occluded."""
     if mu.dtype == np.bool_:  # exact: counts are below 2^24
         return (mu.astype(F) @ np.ones(mu.shape[1], F)) / F(mu.shape[1])
     return mu.mean(axis=1, dtype=np.float64).astype(F)
 
 
 def mean_open_direction(d: Vectors, mu: NDArray[Any]) -> NDArray[np.float32]:
-    """(M, 3) float32 unit mean of the directions, (M * samples, 3), weighted by mu, (M, samples); 0 if none
-    is open."""
+    """(M, 3) float32 unit mean of the directions, (M * samples, 3), weighted by mu, (M, samples); 0 if all
+    are occluded."""
     per_point = d.T.reshape(3, len(mu), -1).transpose(1, 0, 2)
     total = np.matmul(per_point, mu.astype(F)[:, :, None])[:, :, 0]
     size = np.linalg.norm(total, axis=1, keepdims=True)
@@ -179,9 +179,9 @@ def mean_open_direction(d: Vectors, mu: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def occluder_weights(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArray[Any]:
-    """(M * samples,) mu along each direction: bool where it is a step, float32 elsewhere.
+    """(M * samples,) mu along each direction: bool for a step falloff, float32 for others.
 
-    There is an origin for every ray, or one for all rays of each point.
+    `origins` has a row for every ray, or one for all rays of each point.
     """
     reach = method.falloff.reach(method.radius)
     if method.any_hit:
@@ -205,7 +205,7 @@ def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) 
     distance = np.full(len(o), np.inf, F)
     ray, start, travelled = np.arange(len(o)), o, np.zeros(len(o), F)
     for _ in range(MAX_BACK_FACES):
-        # Rays that meet a front face are done.
+        # Rays that hit a front face, or nothing, are done.
         closest = tracer.closest(start, d[ray])
         hit = closest.triangle >= 0
         normal = take_rows(method.triangle_normals, np.maximum(closest.triangle, 0))
@@ -215,7 +215,7 @@ def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) 
         if method.faces == "one_sided" or not is_back.any():
             break
 
-        # The others go on, past the back face by a few roundings of coordinates of at most about 1.
+        # The others continue behind the back face, by a few ulp of coordinates of about 1.
         step = closest.distance[is_back] + F(4 * 2.0**-23)
         ray, travelled = ray[is_back], travelled[is_back] + step
         start = column_major(start[is_back] + step[:, None] * d[ray], F)

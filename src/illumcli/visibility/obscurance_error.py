@@ -1,9 +1,9 @@
 """Standard errors of obscurance, predicted from each point's own rays.
 
-A low-discrepancy point set has less error than independent rays, but cannot reveal how much less:
-sqrt(p (1 - p) / N) is several times too wide. `Errors` is fitted to pairs of independent estimates at a few
-points; it relates the error to how much mu varies between neighbouring rays, and so gives every point a
-standard error of its own without splitting its rays.
+A low-discrepancy point set has less error than independent rays, but its own samples do not tell how much
+less: sqrt(p (1 - p) / N) is several times too large. `Errors` is fitted to pairs of independent estimates at
+a few points. It predicts the error from the variation of mu between neighbouring rays, and so gives every
+point its own standard error without splitting its rays.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from illumcli.arrays import F, Floats, Vectors
 from illumcli.records import Record, Value
 
 NO_HIT_QUANTILE = 3 / 1.96
-"""Rule of three: where none of K rays was blocked, at most 3 / K are, with 95 % confidence; as a standard
-error."""
+"""Rule of three, as a standard error: if none of K rays was blocked, the probability of a blocked ray is at
+most 3 / K with 95 % confidence."""
 
 
 class Estimates(Record):
-    """w at M points, and what was learned beside it."""
+    """Estimates of w at M points, with what predicts their errors."""
 
     w: NDArray[np.float32]  # (M,) in [0, 1]
     neighbor_variation: NDArray[np.float32]  # (M,) sum of squared differences of mu between neighbouring rays
-    bent: Vectors | None = None  # (M, 3) float32 bent normal: unit mean open direction; 0 where nothing is
+    bent: Vectors | None = None  # (M, 3) float32 bent normal: unit mean unoccluded direction, or 0
     skipped: int = 0  # points known to be open, which cast no rays
 
 
@@ -37,24 +37,24 @@ class Errors(Value):
     unbiased estimate of their variance.
     """
 
-    floor: float  # variance, times samples^2, of points whose rays all agree
+    floor: float  # variance, times samples^2, of points whose rays all have the same mu
     slope: float
-    rmse: float  # root of the mean variance over the points that the pairs were drawn from
-    pairs: int
+    rmse: float  # root of the mean variance over the points of the pairs
+    pairs: int  # points with two estimates
 
     @classmethod
     def of_pairs(cls, a: Estimates, b: Estimates, samples: NDArray[np.integer[Any]] | int) -> Errors:
-        """The model that fits K pairs of estimates, (K,) each, from independent scrambles."""
+        """The model fitted to K pairs of estimates, (K,) each, from independent scrambles."""
         if not len(a.w):
             return cls(0.0, 0.0, 0.0, 0)
 
-        # Regress the variance on the variation; a variance is known in proportion to itself.
+        # Regress the variance on the variation, weighted: the error of a variance is proportional to it.
         variance = np.square(a.w.astype(np.float64) - b.w) / 2
         scaled = np.tile(variance * np.square(samples, dtype=np.float64), 2)
         x = np.concatenate([a.neighbor_variation, b.neighbor_variation]).astype(np.float64)
         floor, slope = _line(x, scaled, 1 / np.square(1 + x))
 
-        # Where no ray of any pair met anything, that bounds the floor no further than this.
+        # If no ray of any pair was blocked, the floor is still not known to be lower than this.
         least = (NO_HIT_QUANTILE / (2 * len(a.w))) ** 2
         return cls(max(floor, least), slope, float(np.sqrt(variance.mean())), len(a.w))
 
@@ -65,7 +65,7 @@ class Errors(Value):
 
 
 def _line(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
-    """a and b of the weighted least-squares line y = a + b x with neither below 0."""
+    """a and b of the weighted least-squares line y = a + b x, both at least 0."""
     s, sx, sy, sxx, sxy = (float(np.sum(weight * v)) for v in (np.ones_like(x), x, y, x * x, x * y))
     determinant = s * sxx - sx * sx
     slope = (s * sxy - sx * sy) / determinant if determinant > 1e-12 * s * sxx else 0.0

@@ -1,9 +1,9 @@
 """Points with no geometry above their tangent plane: obscurance is 1 there, so no rays are cast.
 
 A point is open when every vertex of the occluders lies below its tangent plane. The vertices are kept in a
-tree of clusters, `FANOUT` to one. Each cluster is bounded by a round slab along the plane that fits it best:
-on a smooth surface its height falls with the square of its radius. Points are tested in groups of neighbours,
-so on a convex surface of any fineness a group visits some hundreds of clusters.
+tree of clusters with `FANOUT` children each. A cluster is bounded by a disc-shaped slab along its best-fit
+plane; on a smooth surface the slab's height falls with the square of its radius. Points are tested in groups
+of neighbours, so that on a convex surface a group visits some hundreds of clusters, however fine the mesh is.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from illumcli.rays.offsets import ORIGIN_OFFSET
 from illumcli.records import Record
 
 FANOUT = 8
-"""Points to a cluster of the finest level, and clusters to one of the next."""
+"""Points per cluster of the finest level, and clusters per cluster of the next level."""
 GROUP = 64
 """Neighbouring points that are tested together."""
 GROUPS_AT_ONCE = 64
 TRIAL_STEP = 16
-"""One group in so many is tested first; where none of its points is open, the groups beside it cast rays."""
+"""One group in this many is tested first; if no point of it is open, its neighbours cast rays untested."""
 MAX_CLUSTERS = 1 << 13
 """Groups that would visit more clusters than this cast rays instead."""
 MIN_CANDIDATES = 1 / 64
-"""Share of the points that must be left by the cheap tests for the tree to be used: building it takes as long
+"""Share of the points that must pass the cheap tests for the tree to be used; building the tree takes as long
 as a few rays from every vertex."""
 DIRECTIONS = 64
-"""Of which the farthest vertices are compared with every plane first."""
+"""Directions whose extreme vertices are compared with every plane first."""
 TRIAL_GROUPS = 64
-"""Groups of triangles, of both sides together, that decide whether a scene is worth testing."""
+"""Groups of triangles, both sides together, that decide whether the others are tested."""
 CLEARANCE = 1e-5
-"""Heights above a plane up to which the cheap tests, in single precision, decide nothing [radii]."""
+"""Height above a plane below which the cheap tests, in single precision, decide nothing [radii]."""
 BOUND_ROUNDING = 1e-12
-"""By which slabs are larger than their points, so that bounds hold in spite of rounding [radii]."""
+"""Enlargement of slabs, so that bounds hold in spite of rounding [radii]."""
 
 
 class Slabs(Record):
-    """One level of the tree: K round slabs, each around a cluster of vertices."""
+    """One level of the tree: K disc-shaped slabs, each around a cluster of vertices."""
 
     centre: NDArray[np.float64]  # (K, 3)
     axis: NDArray[np.float64]  # (K, 3) unit normal of the slab
@@ -66,9 +66,9 @@ class PlaneGroups(Record):
 
 
 class ClusterTree:
-    """The vertices of occluders, searched for any above a plane; safe to use from several threads.
+    """Tests whether any vertex of the occluders is above a plane; safe to use from several threads.
 
-    The tree is built when the first plane is tested that the cheap tests cannot decide.
+    The tree is built with the first plane that the cheap tests cannot decide.
     """
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
@@ -94,12 +94,12 @@ class ClusterTree:
     def is_open(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
         """(M,) True where no occluder reaches above the plane through an origin with unit normal `n`.
 
-        False may also mean undecided: the group of the point would visit more than `MAX_CLUSTERS`.
+        False may also mean undecided, if the point's group would visit more than `MAX_CLUSTERS`.
 
         Parameters
         ----------
         origins : (M, 3)
-            Origins of rays, off the surface by more than the rounding of this test [radii]. Consecutive
+            Origins of rays, above the surface by more than the rounding of this test [radii]. Consecutive
             points should be close together.
         """
         if not len(self._points):
@@ -111,13 +111,13 @@ class ClusterTree:
         out = np.zeros(len(origins), bool)
         self._test(out, np.flatnonzero(is_trial), origins, n)
 
-        # Test the groups beside those that had an open point.
+        # Test the neighbours of groups that have an open point.
         promising = np.bincount(group // TRIAL_STEP, out) > 0
         self._test(out, np.flatnonzero(~is_trial & promising[group // TRIAL_STEP]), origins, n)
         return out
 
     def _test(self, out: NDArray[np.bool_], points: NDArray[np.int64], origins: Vectors, n: Vectors) -> None:
-        """Write the answers for these points into `out`, a batch at a time."""
+        """Write the results for these points into `out`, a batch at a time."""
         for first in range(0, len(points), GROUP * GROUPS_AT_ONCE):
             batch = points[first : first + GROUP * GROUPS_AT_ONCE]
             o, up = np.asarray(origins[batch], np.float64), np.asarray(n[batch], np.float64)
@@ -135,10 +135,9 @@ class ClusterTree:
         return out
 
     def open_planes(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) as `is_open`, but each `GROUP` planes in a row, of which M is a multiple, are decided by
-        themselves alone.
+        """(M,) as `is_open`, but every `GROUP` consecutive planes are decided independently of all others.
 
-        The planes pass through points of occluders, offset as ray origins are.
+        The planes pass through points of occluders, offset as ray origins are. M is a multiple of `GROUP`.
         """
         out = self._candidates(o, n)
         tested = np.repeat(out.reshape(-1, GROUP).any(axis=1), GROUP)
@@ -147,13 +146,13 @@ class ClusterTree:
         return out
 
     def is_promising(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> bool:
-        """Do the cheap tests leave enough of these planes for `open_planes` to be worth its time?"""
+        """True if enough of these planes pass the cheap tests for `open_planes` to be worth its time."""
         return bool(self._candidates(o, n).sum() >= MIN_CANDIDATES * len(o))
 
     def _candidates(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) planes that pass the cheap tests, of the groups in which at least half do.
+        """(M,) True for planes that pass the cheap tests, in groups where at least half of the planes do.
 
-        The tree decides little about groups whose planes mostly have something above them.
+        In other groups most planes have geometry above them, and the tree would decide few of the rest.
         """
         out = self._passes_cheap_tests(o, n)
         groups = out.reshape(-1, GROUP)
@@ -171,7 +170,7 @@ class ClusterTree:
         return out
 
     def _all_below(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(M,) True where all vertices are below the plane; False where that is undecided."""
+        """(M,) True where all vertices are below the plane; False where one is above, or undecided."""
         planes = plane_groups(o, n)
         group, cluster, resolved = self._clusters_above(planes)
         out = np.zeros(len(o), bool)
@@ -196,13 +195,13 @@ class ClusterTree:
         group, cluster : (K,) int64
             Pairs, ordered by group.
         resolved : (G,) bool
-            True for groups all of whose pairs are there, False for those with more than `MAX_CLUSTERS`.
+            True for groups with all their pairs, False for groups with more than `MAX_CLUSTERS`.
         """
         count = len(planes.centre)
         resolved = np.ones(count, bool)
         group, cluster = np.arange(count), np.zeros(count, np.int64)  # the root, which holds all vertices
         for level in reversed(self._tree()):
-            # Give up on groups with too many clusters, and go down to the children of all others.
+            # Give up groups with too many clusters; of the others, descend to the children.
             is_small = np.bincount(group, minlength=count) <= MAX_CLUSTERS // FANOUT
             resolved &= is_small
             group, cluster = group[is_small[group]], cluster[is_small[group]]
@@ -227,11 +226,11 @@ class ClusterTree:
 
 
 class OpenTriangles:
-    """Triangles with nothing above their plane, on either side; safe to use from several threads.
+    """Triangles with nothing above their plane, for both sides; safe to use from several threads.
 
-    All samples of a triangle share one plane, so each triangle is tested once, with the 63 others of its
-    group: the answer depends on these alone, whichever sample asks first. Where almost no triangle of some
-    groups spread over the scene is open, as on a scanned mesh, no other group is tested.
+    All samples of a triangle share one plane, so each triangle is tested once, together with the 63 others of
+    its group. The result depends on the group alone, whichever sample needs it first. If almost no triangle
+    of a few trial groups over the scene is open, as on a scanned mesh, no other group is tested.
     """
 
     def __init__(self, geometry: SceneGeometry) -> None:
@@ -244,12 +243,14 @@ class OpenTriangles:
         self._promising = len(trial) > 0 and self._tree.is_promising(*self._planes(trial))
 
     def is_open(self, triangle: Ids, back_facing: NDArray[np.bool_], min_samples: int) -> NDArray[np.bool_]:
-        """(M,) True where nothing is above the triangle of a sample, on the side that the eye sees.
+        """(M,) True where nothing is above a sample's triangle, on the eye's side.
 
         Groups of triangles with fewer than `min_samples` of the samples are not tested.
         """
         if not self._promising:
             return np.zeros(len(triangle), bool)
+
+        # Test the groups that enough samples lie on and that no other call has tested.
         plane = triangle + back_facing * np.int64(self._groups * GROUP)
         group = plane // GROUP
         is_wanted = np.bincount(group, minlength=2 * self._groups) >= min_samples
@@ -270,20 +271,20 @@ class OpenTriangles:
 
 
 MAX_TREE_VERTICES = 1 << 17
-"""Scenes of more vertices are not searched for triangles with nothing above them."""
+"""Scenes with more vertices are not searched for open triangles."""
 RAYS_PER_TEST = 1 << 11
-"""To test a group of triangles takes about as long as so many rays."""
+"""Rays that take about as long as testing a group of triangles."""
 
 
 def open_triangles(geometry: SceneGeometry) -> OpenTriangles | None:
-    """The search for triangles with nothing above them; None for scenes so large that it does not pay."""
+    """The search for triangles with nothing above them; None if the scene is too large for it to pay off."""
     return OpenTriangles(geometry) if len(geometry.vertices) <= MAX_TREE_VERTICES else None
 
 
 def known_open(
     samples: int, hits: Hits, interaction: SurfaceInteraction, open_triangles: OpenTriangles | None
 ) -> NDArray[np.bool_] | None:
-    """(M,) True for hits that are known to have nothing above them, where each would cast `samples` rays."""
+    """(M,) True for hits that are known to have nothing above them; the others cast `samples` rays each."""
     if open_triangles is None:
         return None
     return open_triangles.is_open(hits.triangle, interaction.back_facing, RAYS_PER_TEST // samples)
@@ -292,9 +293,9 @@ def known_open(
 def triangle_planes(
     geometry: SceneGeometry, triangle: Ids, back_facing: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origins and unit normals of the planes of N triangles on the side that is seen, (N, 3) float64 each.
+    """Origins and unit normals of the planes of N triangles, (N, 3) float64 each; `back_facing` is the side.
 
-    A plane is offset from its triangle no farther than any ray origin on that triangle.
+    A plane's offset from its triangle is at most that of any ray origin on the triangle.
     """
     zero = np.zeros(len(triangle), F)
     interaction = interact(geometry, triangle, zero, zero, np.zeros((len(triangle), 3), F))
@@ -302,30 +303,31 @@ def triangle_planes(
     v0 = interaction.position
     others = (take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
-    # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre: no ray starts
-    # lower than this
+
+    # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre, so no ray starts
+    # lower than this.
     step = lowest + ORIGIN_OFFSET * (np.abs(dot(n, v0)) + interaction.edge)
     o = v0 + step[:, None] * n
     return np.ascontiguousarray(o), np.ascontiguousarray(n)
 
 
 def _members(groups: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(64 K,) numbers of the planes in each of K groups."""
+    """(64 K,) numbers of the planes in K groups."""
     return (groups[:, None] * GROUP + np.arange(GROUP)).ravel()
 
 
 def is_above_group(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(M,) False where one of the points is clearly above the plane of another.
 
-    The points lie on occluders, offset by a hundredth of `CLEARANCE`: in a hollow this decides at once.
+    The points lie on occluders, offset by a hundredth of `CLEARANCE`, so this decides most concave regions.
     """
     near, up = (o - o[0]).astype(F), n.astype(F)
     return (up @ near.T).max(axis=1) <= np.einsum("ij,ij->i", up, near) + CLEARANCE
 
 
 def plane_groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> PlaneGroups:
-    """The bounds of every `GROUP` planes in a row, through `o` with unit normals `n`, (M, 3) each."""
-    # Fill the last group up with copies of the last plane.
+    """The bounds of every `GROUP` consecutive planes, through `o` with unit normals `n`, (M, 3) each."""
+    # Pad the last group with copies of the last plane.
     count = -(-len(o) // GROUP)
     missing = count * GROUP - len(o)
     o = np.concatenate([o, np.repeat(o[-1:], missing, axis=0)]).reshape(count, GROUP, 3)
@@ -341,7 +343,7 @@ def plane_groups(o: NDArray[np.float64], n: NDArray[np.float64]) -> PlaneGroups:
 
 
 def slabs(points: NDArray[np.float64], size: int) -> Slabs:
-    """A slab around each `size` points in a row, along the plane that fits them best."""
+    """A slab around every `size` consecutive points, along the plane that fits them best."""
     count = -(-len(points) // size)
     padded = np.concatenate([points, np.repeat(points[-1:], count * size - len(points), axis=0)])
     group = padded.reshape(count, size, 3)
@@ -361,7 +363,7 @@ def slabs(points: NDArray[np.float64], size: int) -> Slabs:
 
 
 def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(K, 3) the points farthest out in directions spread over the sphere; most others are below these."""
+    """(K, 3) the extreme points in `DIRECTIONS` directions, which are spread evenly over the sphere."""
     k = np.arange(DIRECTIONS)
     z = 1 - (2 * k + 1) / DIRECTIONS
     angle = np.pi * (3 - 5**0.5) * k

@@ -14,7 +14,7 @@ from illumcli.records import Value
 
 Directions: TypeAlias = Callable[[NDArray[np.float64], int], NDArray[np.float32]]
 GRAZING = 2.0**-20
-"""Cosine of the flattest mirrored ray above the triangle that it leaves: rounding takes none below it."""
+"""Least cosine between a mirrored ray and its triangle's normal, so that rounding turns none below it."""
 
 
 def variance(mu: NDArray[Any]) -> NDArray[np.float32]:
@@ -25,7 +25,7 @@ def variance(mu: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def every_ray(cosine: Floats, samples: int) -> NDArray[np.int64]:
-    """(M,) `samples`: a pattern in no order bounds nothing."""
+    """(M,) `samples`: in a pattern without order any ray may point below."""
     return np.full(len(cosine), samples)
 
 
@@ -33,33 +33,33 @@ class Sampler(Value):
     """A point set over the hemisphere."""
 
     mark: str
-    """The letter that stands for it in plots of letters."""
+    """Its marker in text plots, one letter."""
     directions: Directions
-    """(M, 3, samples) float32 cosine-weighted unit directions about the third axis, from (2, M) draws in
-    [0, 1) that each point's pattern is phased or scrambled by, and the number of samples."""
+    """Function of draws, (2, M) in [0, 1), and the number of samples: (M, 3, samples) float32 cosine-weighted
+    unit directions about the third axis. The draws phase or scramble each point's pattern."""
     turned: bool = False
-    """Is the pattern turned about the normal, too, by the first draw?"""
+    """True if the pattern is also turned about the normal, by the first draw."""
     variation: Callable[[NDArray[Any]], NDArray[np.float32]] = variance
     """(M,) variation of mu, (M, samples), that predicts the error of the point set."""
     max_below: Callable[[Floats, int], NDArray[np.int64]] = every_ray
-    """(M,) upper bound on how many rays, the last of each pattern, point below a plane whose normal is at an
-    angle of this cosine, (M,), to the pattern's axis."""
+    """(M,) upper bound on the number of rays that point below a plane whose normal has this cosine, (M,), to
+    the pattern's axis; they are the last rays of each pattern."""
 
 
 # --- from points of the unit square -------------------------------------------------------------------
 
 
 def malley(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(M, 3, N) cosine-weighted directions of points of the unit square, (M, N) each.
+    """(M, 3, N) cosine-weighted directions from points (u, v) of the unit square, (M, N) each.
 
-    Malley's method: uniform on the disc, projected up to the hemisphere.
+    Malley's method: points uniform on the disc, projected up to the hemisphere.
     """
     r, angle = np.sqrt(u), 2 * np.pi * v
     return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - u)], axis=1).astype(F)
 
 
 def owen_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.float32]:
-    """Owen-scrambled Sobol points, another scramble for each point."""
+    """Owen-scrambled Sobol points, with its own scramble for each point."""
     seeds = (draws * 2.0**32).astype(np.uint32)
     u, v = (owen(base[None, :], seed[:, None]) for base, seed in zip(sobol(samples), seeds, strict=True))
     return malley(u, v)
@@ -86,7 +86,7 @@ def spiral_variation(mu: NDArray[Any]) -> NDArray[np.float32]:
     """(M,) sum of squared differences of mu between neighbouring rays.
 
     On a golden-angle spiral, points whose numbers differ by a Fibonacci number near sqrt(N) are neighbours.
-    Their squared differences count how many cells the edges of occluders cross, and only those cause error.
+    The squared differences count the cells that edges of occluders cross; only these cells contribute error.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def spiral_variation(mu: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def neighbor_steps(samples: int) -> list[int]:
-    """Two consecutive Fibonacci numbers from 3/4 sqrt(samples) on, as far as they are below `samples`."""
+    """Two consecutive Fibonacci numbers from 3/4 sqrt(samples) on, those that are below `samples`."""
     a, b = 1, 2
     while a < 0.75 * samples**0.5:
         a, b = b, a + b
@@ -111,12 +111,12 @@ def neighbor_steps(samples: int) -> list[int]:
 
 
 def spiral_max_below(cosine: Floats, samples: int) -> NDArray[np.int64]:
-    """(M,) how many rays at most point below the plane.
+    """(M,) upper bound on the number of rays below the plane.
 
-    Ray i leaves the axis at sin^2 = (i + phase) / samples, and none points below a plane whose normal is at
-    an angle t to the axis unless sin^2 > cos^2 t.
+    Ray i is at an angle s to the axis with sin^2 s = (i + phase) / samples. It can point below a plane whose
+    normal is at an angle t to the axis only if sin^2 s > cos^2 t.
     """
-    least = 1 / (4 * len(spiral_table(samples)))  # half of what the last phase leaves of the rim
+    least = 1 / (4 * len(spiral_table(samples)))  # half of the gap between the last phase and the rim
     sine2 = 1 - np.square(np.clip(cosine, 0, 1).astype(np.float64)) + GRAZING
     return np.clip(np.ceil(sine2 * samples - least), 0, samples).astype(np.int64)
 

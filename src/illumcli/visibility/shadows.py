@@ -1,10 +1,10 @@
-"""Shadows: delta(p, j), by shadow rays from the samples that a light may reach.
+"""Shadows: delta(p, j), by a shadow ray from each sample that light j may reach.
 
-A shadow ray starts on the polygon. Where polygons stand for a smooth surface this causes the shadow
+A shadow ray starts on the polygon. Where polygons approximate a smooth surface this causes the shadow
 terminator problem: polygons on the lit side of the surface that face away from the light, or are hidden by
-their neighbours, would be in shadow. So where the ray of a sample is blocked, a second one starts from the
-surface that the normals imply. It must not jump over anything: the segment to its origin must be unoccluded,
-and nothing but the surface itself may be nearby in the light's direction.
+their neighbours, would be in shadow. So if the ray of a sample is blocked, a second ray starts from the
+smooth surface that the normals imply. It must not skip an occluder: the segment to its origin must be
+unoccluded, and nothing but the surface itself may be nearby in the light's direction.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
 from illumcli.records import Record
 
 TERMINATOR_SHARE = 1 / 3
-"""Upper bound on the terminator offset, in diagonals of the polygon's bounding box: normals may be anything.
-A sphere needs up to 0.24 (a cube's faces) or 0.27 (an octahedron's), finer ones less."""
+"""Upper bound on the terminator offset, in diagonals of the polygon's bounding box, against arbitrary
+normals. A sphere from a cube's faces needs up to 0.24, from an octahedron's 0.27, finer spheres less."""
 NEARBY = 2.0
 """Distance, in such diagonals, within which anything but the same smooth surface shadows a sample."""
 
 
 class SmoothSurface(Record):
-    """The samples of a tile, with what implies a smooth surface at each."""
+    """The samples of a tile, with the normals that imply a smooth surface at each."""
 
     context: ShadingContext
     normals: CornerVectors
     parts: SmoothParts
-    flat: NDArray[np.bool_]  # (O,) objects whose shadow rays start on their polygons
+    flat: NDArray[np.bool_]  # (O,) True for objects whose shadow rays start on their polygons
 
 
 def smooth_surface(
     flat: Sequence[bool], shading_context: ShadingContext, smooth_parts: SmoothParts
 ) -> SmoothSurface:
-    """The samples on the surface that their normals imply; those of `flat` objects stay on their polygons."""
+    """The samples with the smooth surface that their normals imply; `flat` objects have none."""
     assert shading_context.normals is not None
     return SmoothSurface(shading_context, shading_context.normals, smooth_parts, np.array(flat, np.bool_))
 
 
 def ray_origins(interaction: SurfaceInteraction) -> Vectors:
-    """(M, 3) float32 origins of shadow and obscurance rays: on the triangle, offset by rounding alone."""
+    """(M, 3) float32 origins of shadow and obscurance rays, offset from the triangle by rounding errors."""
     return offset_ray_origins(interaction.position, interaction.ng, interaction.edge)
 
 
@@ -60,9 +60,9 @@ def shadow(
     shadow_candidates: LitPoints,
     smooth_surface: SmoothSurface | None = None,
 ) -> NDArray[np.float32]:
-    """(M,) delta of one light: 1 where it arrives, 0 in shadow and on samples that it does not reach.
+    """(M,) delta of one light: 1 where it is unoccluded, 0 in shadow and on samples that it cannot reach.
 
-    With `smooth_surface` the shadow terminator is corrected; the samples are then those of its tile.
+    With `smooth_surface`, which holds the same samples, the shadow terminator is corrected.
     """
     # One shadow ray for each sample that the light may reach.
     lit, smooth = shadow_candidates, smooth_surface
@@ -82,7 +82,7 @@ def _lit_on_implied_surface(
     tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Floats
 ) -> NDArray[np.bool_]:
     """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
-    # Where the implied surface lies above each sample; on flat polygons and objects it is the polygon itself.
+    # The offset from each sample to the implied surface; it is 0 on flat polygons and objects.
     interaction, geometry = smooth.context.interaction, smooth.context.geometry
     weights = smooth.context.weights.take(sample)
     position = take_rows(interaction.position, sample)
@@ -94,7 +94,7 @@ def _lit_on_implied_surface(
     flat = smooth.flat.take(geometry.objects.take(weights.hits.triangle))
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
-    # Samples whose shadow ray from there is unoccluded, and the segment to its origin, too.
+    # Keep the samples whose shadow ray from there is unoccluded, as is the segment to the ray's origin.
     ng, edge = take_rows(interaction.ng, sample.take(curved)), interaction.edge.take(sample.take(curved))
     starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
     curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
@@ -102,7 +102,7 @@ def _lit_on_implied_surface(
     on_polygon = column_major(take_rows(origins, sample.take(curved)))
     curved = curved[~tracer.occluded(on_polygon, column_major(_at(offset, curved) / height[:, None]), height)]
 
-    # Anything nearby in the light's direction shadows the sample, unless it is the surface itself.
+    # Anything nearby in the light's direction shadows the sample, except the surface itself.
     on_polygon, ng = (
         column_major(take_rows(origins, sample.take(curved))),
         take_rows(interaction.ng, sample.take(curved)),
@@ -118,28 +118,28 @@ def _lit_on_implied_surface(
 def _terminator_offset(
     smooth: SmoothSurface, weights: CornerWeights, position: Vectors, back_facing: NDArray[np.bool_]
 ) -> Vectors:
-    """(B, 3) the way from samples on polygons to the surface that the normals at their corners imply."""
+    """(B, 3) offset of samples on polygons to the smooth surface that the normals at the corners imply."""
     geometry, normals = smooth.context.geometry, smooth.normals
 
     def corner_offset(group: Corners, k: int) -> Vectors:
         normal = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
         corner = take_rows(geometry.vertices, group.vertex(geometry, k))
-        if group.lane is None:
+        if group.index is None:
             return to_tangent_plane(position, corner, facing(normal, back_facing))
         return to_tangent_plane(
-            take_rows(position, group.lane), corner, facing(normal, back_facing.take(group.lane))
+            take_rows(position, group.index), corner, facing(normal, back_facing.take(group.index))
         )
 
-    return weights.joined(corner_offset)
+    return weights.weighted_mean(corner_offset)
 
 
 def _box_diagonals(geometry: SceneGeometry, weights: CornerWeights) -> Floats:
-    """(B,) diagonal of the bounding box of the polygon that each sample is on [radii]."""
+    """(B,) diagonal of the bounding box of each sample's polygon [radii]."""
     out = np.empty(len(weights), F)
     for group in weights.groups:
         corners = [take_rows(geometry.vertices, group.vertex(geometry, k)) for k in range(group.count)]
         size = length(np.maximum.reduce(corners) - np.minimum.reduce(corners))
-        out[slice(None) if group.lane is None else group.lane] = size
+        out[slice(None) if group.index is None else group.index] = size
     return out
 
 

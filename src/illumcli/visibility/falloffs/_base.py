@@ -1,4 +1,4 @@
-"""Base of all falloffs: the weight mu of an occluder at a distance, 0 at contact, 1 out of reach."""
+"""Base of all falloffs: mu(d), 0 for an occluder at contact, 1 for one out of reach."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Falloff(Description):
     by default any distance counts."""
 
     step: ClassVar[bool] = False
-    """True where mu is a step: an occlusion query is enough, the distance is not needed."""
+    """True if mu is a step function: an occlusion query is enough, the distance is not needed."""
 
     def reach(self, radius: float) -> float:
         """d_max in scene units; inf without a limit."""

@@ -2,8 +2,8 @@
 
 References
 ----------
-Zhukov, S., Iones, A. and Kronin, G. (1998). An ambient light illumination model. EGWR '98. The division by
-the value at d_max makes mu continuous there; without d_max it is 1 - exp(-tau d).
+Zhukov, S., Iones, A. and Kronin, G. (1998). An ambient light illumination model. EGWR '98. Dividing by the
+value at d_max makes mu continuous there; without d_max, mu = 1 - exp(-tau d).
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ class Power(Falloff):
     max_distance: Distance
     """d_max, scene units or `0.5r`."""
     exponent: Positive = 0.5
-    """Below 1 near occluders matter most; 1 is the linear falloff."""
+    """Below 1, near occluders count most; 1 is the linear falloff."""
 
     def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
         """(N,) min(1, d / d_max)^exponent."""

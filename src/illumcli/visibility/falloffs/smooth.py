@@ -1,4 +1,4 @@
-"""Smooth: mu = x^2 (3 - 2 x) of x = d / d_max, level at contact and at d_max."""
+"""Smooth: mu = x^2 (3 - 2 x) with x = d / d_max; its slope is 0 at contact and at d_max."""
 
 from __future__ import annotations
 
@@ -16,6 +16,6 @@ class Smooth(Falloff):
     """d_max, scene units or `0.5r`."""
 
     def weight(self, distance: Floats, reach: float, radius: float) -> Floats:
-        """(N,) the cubic step."""
+        """(N,) the cubic smoothstep."""
         x = np.minimum(distance / reach, 1)
         return (x * x * (3 - 2 * x)).astype(distance.dtype)

@@ -1,4 +1,4 @@
-"""Step: every occluder within reach counts fully, ambient occlusion."""
+"""Step: every occluder within reach counts fully; this is ambient occlusion."""
 
 from __future__ import annotations
 

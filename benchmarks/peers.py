@@ -1,16 +1,18 @@
 """How long do other renderers take for the same picture, at equal error, as whole processes?
 
 Ambient occlusion: the bunny of unit radius on a floor under a constant sky, white; Mitsuba 3 with its direct
-integrator (the surface alone sampled, multijittered, box filter), vectorised (llvm) and scalar. Phong with
-shadows: the same under two point lights, POV-Ray. Equal error decides: each renderer's error is measured
+integrator (the surface alone sampled, multijittered, box filter), vectorised (llvm), the same denoised by
+Intel's Open Image Denoise (albedo and normal of a second pass of 4 samples, told to be clean, which errs less
+than without), and scalar. Phong with shadows: the same under two point lights, POV-Ray. Equal error decides:
+each renderer's error is measured
 against a reference of its own with other seeds, and the time at the error asked for is interpolated on
 log-log; the references' difference says whether the pictures are equal. Everything counts, from the start of
 the process to the written file; meshes are the same PLY, nothing is kept between runs but in the row `warm`.
 
     PEERS=/path/to/venv/bin/python PYTHONPATH=src python benchmarks/peers.py [--small] [mitsuba povray]
 
-PEERS has `pip install mitsuba`, which wants an LLVM of 16 or later (DRJIT_LIBLLVM_PATH says where); POV-Ray
-is Debian's package `povray`.
+PEERS has `pip install mitsuba mitsuba-oidn`, which wants an LLVM of 16 or later (DRJIT_LIBLLVM_PATH says
+where); POV-Ray is Debian's package `povray`.
 """
 
 from __future__ import annotations
@@ -101,6 +103,7 @@ outputs: {{files: ["ambient.exr"], colour: float}}
 MITSUBA = """
 import sys
 variant, spp, seed, width, height, out = sys.argv[1], *map(int, sys.argv[2:6]), sys.argv[6]
+denoised = sys.argv[7:] == ["denoised"]
 import mitsuba as mi
 mi.set_variant(variant)
 from mitsuba import ScalarTransform4f as T
@@ -121,12 +124,21 @@ scene = mi.load_dict({
               "bsdf": {"type": "twosided", "nested": white}},
 })
 image = mi.render(scene, spp=spp, seed=seed)
+if denoised:
+    import numpy as np
+    from mitsuba_oidn import denoise
+    guides = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+    guides = np.array(mi.render(scene, integrator=guides, spp=4, seed=seed + 1_000_000))
+    albedo, normal = (np.ascontiguousarray(guides[..., k : k + 3]) for k in (0, 3))
+    image = mi.TensorXf(denoise(np.array(image), albedo, normal, hdr=True, clean_aux=True))
 mi.util.write_bitmap(out, image, write_async=False)
 """
 
 
 def mitsuba(folder: Path, python: str, variant: str, spp: int, seed: int, out: str = "m.exr") -> None:
+    variant, *denoised = variant.split(" + ")
     words = [python, "mitsuba_ambient.py", variant, *map(str, (spp, seed, *SIZE)), out]
+    words += ["denoised"] * len(denoised)
     process(words, folder, PYTHONPATH="")
 
 
@@ -147,21 +159,23 @@ def ambient(folder: Path, python: str) -> None:
     print(f"# difference of the references: RMSE {rmse(*truths.values()):.4f}")
 
     counts = [(2, 4), (4, 8)] if SMALL else [(4, 8), (8, 8), (16, 8)]
-    spps = [4, 16] if SMALL else [16, 64, 256]
+    spps = {
+        "llvm_ad_rgb": [4, 16] if SMALL else [16, 64, 256],
+        "llvm_ad_rgb + OIDN": [2, 4] if SMALL else [2, 4, 16],
+        "scalar_rgb": [4, 16] if SMALL else [16, 64],
+    }
     makers: dict[str, tuple[str, list[tuple[str, Callable[[int], None]]]]] = {
         "illum": (
             "illum",
             [(f"{p} x {m}", lambda s, p=p, m=m: own(p, m, s, "i.exr", "--no-cache")) for p, m in counts],
         )
     }
-    for variant in ("llvm_ad_rgb", "scalar_rgb"):
-        makers[f"mitsuba {variant}"] = (
-            "mitsuba",
-            [
-                (f"{n} spp", lambda s, v=variant, n=n: mitsuba(folder, python, v, n, s))
-                for n in (spps if variant == "llvm_ad_rgb" else spps[:2])
-            ],
-        )
+    for variant, counts_of_variant in spps.items():
+        runs = [
+            (f"{n} spp", lambda s, v=variant, n=n: mitsuba(folder, python, v, n, s))
+            for n in counts_of_variant
+        ]
+        makers[f"mitsuba {variant}"] = ("mitsuba", runs)
     files = {"illum": "i.exr", "mitsuba": "m.exr"}
     taken: dict[str, list[list[tuple[float, float, float]]]] = {name: [] for name in makers}
     for repeat in range(REPEATS):
@@ -172,11 +186,11 @@ def ambient(folder: Path, python: str) -> None:
                 error = rmse(picture(folder / files[kind]), truths[kind])
                 curve.append((error, time.wall, time.cpu))
             taken[name].append(curve)
-    print(f"{'':22s} {'':10s} {'RMSE':>10s} {'wall [s]':>26s} {'cpu [s]':>26s}")
+    print(f"{'':26s} {'':10s} {'RMSE':>10s} {'wall [s]':>26s} {'cpu [s]':>26s}")
     for name, (_, runs) in makers.items():
         for k, (label, _) in enumerate(runs):
             errors, walls, cpus = zip(*(curve[k] for curve in taken[name]), strict=True)
-            print(f"{name:22s} {label:>10s} {np.mean(errors):10.4f} {spread(walls):>26s} {spread(cpus):>26s}")
+            print(f"{name:26s} {label:>10s} {np.mean(errors):10.4f} {spread(walls):>26s} {spread(cpus):>26s}")
     at = {
         name: [Took(at_error(curve, 1), at_error(curve, 2)) for curve in curves]
         for name, curves in taken.items()

@@ -29,8 +29,8 @@ def smooth(tmp_path_factory):
 
 
 def angles(words, term):
-    named = {name: term(name, **words) for name in ("nxs", "n_s", "s_s")}
-    return rusinkiewicz(named["nxs"], named["n_s"], words["n"], words["l"], words["v"], named["s_s"])
+    nxs, n_s, d, s_s = (term(name, **words) for name in ("nxs", "n_s", "d", "s_s"))
+    return rusinkiewicz(nxs, n_s, words["n"], d, s_s)
 
 
 def test_published_angles(cases, frame, term, agree):

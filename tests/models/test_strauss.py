@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.models.strauss import Strauss, strauss_fresnel, strauss_geometry, strauss_specular
+from illumcli.models.strauss import Strauss, Surface, strauss_fresnel, strauss_geometry, strauss_specular
 
 MIRRORED = {"n": [0, 0, 1], "l": [0.6, 0, 0.8], "v": [-0.6, 0, 0.8]}
 
@@ -30,7 +30,7 @@ def test_published_terms(cases, frame, term, agree):
         n_l, n_v = ((words["n"] * words[word]).sum(1) for word in "lv")
         named = [term(name, **words) for name in ("sin_l", "sin_v", "gap_rv")]
         s, t = i["smoothness"], i["transparency"]
-        parts = strauss_specular(n_l, n_v, *named, s, t, i["kj"], i["kf"], i["kg"])
+        parts = strauss_specular(n_l, n_v, *named, Surface(s, t, i["kj"], i["kf"], i["kg"]))
         r_d = (1 - s**3) * (1 - t)
         agree([r_d, 1 - t - r_d, *(part[0] for part in parts)], case)
 

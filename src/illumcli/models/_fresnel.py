@@ -25,7 +25,7 @@ from illumcli.schema.description import Description
 Array: TypeAlias = NDArray[np.floating[Any]]
 
 
-def dielectric(c: Any, eta: Any) -> Any:
+def dielectric(c: Array, eta: Array) -> Array:
     """Reflectance of a clear boundary for unpolarised light, 0..1; 1 where all is reflected inside.
 
     g^2 = eta^2 + c^2 - 1; Cook and Torrance's fraction, with (g - c) / (g + c) = (eta^2 - 1) / (g + c)^2 and
@@ -48,7 +48,7 @@ def dielectric(c: Any, eta: Any) -> Any:
     return rs * rs * (1 + ratio * ratio) / 2
 
 
-def conductor(c: Any, eta: Any, k: Any) -> Any:
+def conductor(c: Array, eta: Array, k: Array) -> Array:
     """Reflectance of a metal for unpolarised light, 0..1; k = 0 is the dielectric.
 
     In real arithmetic, with q = sqrt((eta + ik)^2 - 1 + c^2), |r_s| = |eps - 1| / |c + q|^2 and
@@ -74,25 +74,25 @@ def conductor(c: Any, eta: Any, k: Any) -> Any:
     return np.minimum(rs2 * (1 + (a * a + d) / np.maximum(b * b + d, tiny)) / 2, 1)
 
 
-def schlick(c: Any, f0: Any) -> Any:
+def schlick(c: Array, f0: Array) -> Array:
     """Schlick's approximation f0 + (1 - f0) (1 - c)^5; exact at c = 1 and c = 0."""
     x = 1 - c
     x2 = x * x
     return f0 + (1 - f0) * (x2 * x2 * x)
 
 
-def f0_from_eta(eta: Any, k: Any = 0) -> Any:
+def f0_from_eta(eta: Array, k: Array | float = 0.0) -> Array:
     """Reflectance at normal incidence, ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2)."""
     k2 = k * k
     return (np.square(eta - 1) + k2) / (np.square(eta + 1) + k2)
 
 
-def eta_from_f0(f0: Any) -> Any:
+def eta_from_f0(f0: Array) -> Array:
     """The index >= 1 of a dielectric that reflects f0 < 1 at normal incidence; a metal has no such index."""
     return np.square(1 + np.sqrt(f0)) / (1 - f0)
 
 
-def color_shift(c: Any, eta: Any, color0: Any, color90: Any) -> Any:
+def color_shift(c: Array, eta: Array, color0: Array, color90: Array) -> Array:
     """Cook and Torrance's colour between `color0` at normal incidence and `color90` at grazing.
 
     It stands in place of F; texts that multiply it by F again count Fresnel twice, and one swaps the colours.

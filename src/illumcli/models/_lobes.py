@@ -6,13 +6,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors
 from illumcli.schema.description import Description
 
 
-def lobe(gap: Floats, exponent: Any) -> Floats:
+def lobe(gap: Floats, exponent: Floats | float) -> Floats:
     """(N,) max(0, cos(angle))^exponent from gap = 1 - cos(angle); an exponent of 0 gives 1 at any angle.
 
     A power of a rounded cosine loses exponent * 2^-53 of its value; with the gap formed as half the squared
@@ -28,7 +27,7 @@ def log_cos(cosine: Floats, sin2: Floats) -> Floats:
     return np.log1p(-np.minimum(sin2, 0.5)) / 2 * near + np.log(cosine) * ~near
 
 
-def channels(lanes: Floats, color: Any) -> NDArray[Any]:
+def channels(lanes: Floats, color: object) -> Floats:
     """A colour in the precision of `lanes`, channel by channel: (3, 1), or (3, N) where it varies.
 
     Its product with (N,) lanes is (3, N), whose transpose is (N, 3) column by column in memory.
@@ -37,12 +36,12 @@ def channels(lanes: Floats, color: Any) -> NDArray[Any]:
     return values[:, None] if values.ndim == 1 else values.T
 
 
-def tint(color: Any, lanes: Floats) -> Vectors:
+def tint(color: object, lanes: Floats) -> Vectors:
     """(N, 3) the lanes weighted by a colour, or by one colour per lane."""
     return (channels(lanes, color) * lanes).T
 
 
-def weighed(color: Any, weight: Any) -> Any:
+def weighed(color: object, weight: object) -> Any:
     """A colour times a number, or (N, 3) where either varies; unchanged while either is still a texture."""
     if isinstance(color, Description) or isinstance(weight, Description):
         return color

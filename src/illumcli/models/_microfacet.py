@@ -18,7 +18,7 @@ Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-bas
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Discriminator
@@ -26,15 +26,16 @@ from pydantic import Discriminator
 from illumcli.arrays import Floats, as_dtype_of
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
+from illumcli.models._terms import Angle
 from illumcli.schema.description import Description
 
 
-def gaussian(n_h: Any, sin2_h: Any, m: Any) -> Any:
+def gaussian(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
     """exp(-(theta / m)^2), 1 at the normal; `gaussian_constant(m)` times this is normalised."""
     return np.exp(-np.square(np.arctan2(np.sqrt(sin2_h), n_h) / m))
 
 
-def gaussian_constant(m: Any) -> Any:
+def gaussian_constant(m: Floats) -> Floats:
     """The c that normalises c exp(-(theta / m)^2), in float64; near 1 / (pi m^2) for small m.
 
     1 / c = pi times the integral of exp(-(theta / m)^2) sin(2 theta) over 0..pi/2.
@@ -48,7 +49,7 @@ def gaussian_constant(m: Any) -> Any:
     return 2 / (np.pi * end * area)
 
 
-def beckmann(n_h: Any, sin2_h: Any, m: Any) -> Any:
+def beckmann(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
     """exp(-tan^2 / m^2) / (pi m^2 cos^4), normalised; m is the RMS slope.
 
     The exponential meets 1 / cos^4 = (1 + tan^2)^2 only where it is not yet 0.
@@ -57,7 +58,7 @@ def beckmann(n_h: Any, sin2_h: Any, m: Any) -> Any:
     return np.exp(-tan2 / np.square(m)) * np.square((1 + tan2) / m) / np.pi
 
 
-def beckmann_slope1d(n_h: Any, sin2_h: Any, m: Any) -> Any:
+def beckmann_slope1d(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
     """exp(-tan^2 / m^2) / (sqrt(pi) m cos^2): density of one profile's slope angle.
 
     One text prints m^2 in place of m; its integral is 1 / m then.
@@ -66,33 +67,33 @@ def beckmann_slope1d(n_h: Any, sin2_h: Any, m: Any) -> Any:
     return np.exp(-tan2 / np.square(m)) * (1 + tan2) / (np.sqrt(np.pi) * m)
 
 
-def power_cosine(n_h: Any, sin2_h: Any, exponent: Any) -> Any:
+def power_cosine(n_h: Floats, sin2_h: Floats, exponent: Floats) -> Floats:
     """cos(theta)^exponent, 1 at the normal; (exponent + 2) / (2 pi) times this is normalised."""
     return np.exp(exponent * log_cos(n_h, sin2_h))
 
 
-def ggx(n_h: Any, sin2_h: Any, alpha: Any) -> Any:
+def ggx(n_h: Floats, sin2_h: Floats, alpha: Floats) -> Floats:
     """alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), normalised."""
     wide = np.square(alpha * n_h) + sin2_h
     return np.square(alpha / wide) / np.pi
 
 
-def power_of_half_height(beta: Any) -> Any:
+def power_of_half_height(beta: Floats) -> Floats:
     """c1 = -ln 2 / ln cos(beta): cos^c1 is one half at beta. One text prints it without the minus."""
     return -2 * np.log(2) / np.log1p(-np.square(np.sin(beta)))
 
 
-def m_of_half_height(beta: Any) -> Any:
+def m_of_half_height(beta: Floats) -> Floats:
     """m = beta / sqrt(ln 2): exp(-(theta / m)^2) is one half at beta. One text prints beta / sqrt(2)."""
     return beta / np.sqrt(np.log(2))
 
 
-def alpha_of_half_height(beta: Any) -> Any:
+def alpha_of_half_height(beta: Floats) -> Floats:
     """c3 = sin(beta) / sqrt(sqrt(2) - cos^2(beta)): pi alpha^2 GGX is one half at beta."""
     return np.sin(beta) / np.sqrt(np.sqrt(2) - np.square(np.cos(beta)))
 
 
-def vgroove(n_l: Any, n_v: Any, s_s: Any) -> Any:
+def vgroove(n_l: Floats, n_v: Floats, s_s: Floats) -> Floats:
     """Torrance and Sparrow's share of a V-groove that is lit and seen, 0..1.
 
     min(1, 2 n_h n_v / v_h, 2 n_h n_l / v_h) with n_h = (n_l + n_v) / |s|, v_h = |s| / 2. Texts print it
@@ -102,7 +103,7 @@ def vgroove(n_l: Any, n_v: Any, s_s: Any) -> Any:
     return np.minimum(1, 4 * np.minimum(n_l, n_v) * (n_l + n_v) / np.maximum(s_s, tiny))
 
 
-def vgroove_over_4ab(n_l: Any, n_v: Any, s_s: Any) -> Any:
+def vgroove_over_4ab(n_l: Floats, n_v: Floats, s_s: Floats) -> Floats:
     """G / (4 n_l n_v), finite where n_l or n_v goes to 0: 1 / max(4 a b, max(a, b) |s|^2 / (a + b))."""
     larger = np.maximum(n_l, n_v)
     blocked = larger * s_s / (n_l + n_v)
@@ -118,10 +119,11 @@ class Gaussian(Description):
     c: Positive | None = None
     """c, height at the normal [1/sr]; left out, the c that normalises D."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) c exp(-(theta / m)^2)."""
-        m, c = as_dtype_of(n_h, self.m, gaussian_constant(self.m) if self.c is None else self.c)
-        return c * gaussian(n_h, sin2_h, m)
+        height = gaussian_constant(np.asarray(self.m)) if self.c is None else self.c
+        m, c = as_dtype_of(theta.cosine, self.m, height)
+        return c * gaussian(*theta, m)
 
 
 class Beckmann(Description):
@@ -131,10 +133,10 @@ class Beckmann(Description):
     m: Roughness = 0.3
     """m, RMS slope: 0.05 polished, 1 very rough."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) normalised; printed with 1 / (m^2 cos^4), pi times that."""
-        (m,) = as_dtype_of(n_h, self.m)
-        density = beckmann(n_h, sin2_h, m)
+        (m,) = as_dtype_of(theta.cosine, self.m)
+        density = beckmann(*theta, m)
         return density * np.pi if printed else density
 
 
@@ -145,11 +147,11 @@ class Blinn(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
-        (exponent,) = as_dtype_of(n_h, power_of_half_height(self.beta))
+        (exponent,) = as_dtype_of(theta.cosine, power_of_half_height(np.asarray(self.beta)))
         height = 1 if printed else (exponent + 2) / (2 * np.pi)
-        return power_cosine(n_h, sin2_h, exponent) * height
+        return power_cosine(*theta, exponent) * height
 
 
 class PowerCosine(Description):
@@ -159,10 +161,10 @@ class PowerCosine(Description):
     exponent: NonNegative = 20.0
     """n, the exponent; 0 to 10^6 and beyond."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) (n + 2) / (2 pi) cos^n, normalised."""
-        (exponent,) = as_dtype_of(n_h, self.exponent)
-        return power_cosine(n_h, sin2_h, exponent) * ((exponent + 2) / (2 * np.pi))
+        (exponent,) = as_dtype_of(theta.cosine, self.exponent)
+        return power_cosine(*theta, exponent) * ((exponent + 2) / (2 * np.pi))
 
 
 class TorranceSparrow(Description):
@@ -172,11 +174,11 @@ class TorranceSparrow(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
-        width = m_of_half_height(self.beta)
-        m, c = as_dtype_of(n_h, width, 1 if printed else gaussian_constant(width))
-        return c * gaussian(n_h, sin2_h, m)
+        width = m_of_half_height(np.asarray(self.beta))
+        m, c = as_dtype_of(theta.cosine, width, 1 if printed else gaussian_constant(width))
+        return c * gaussian(*theta, m)
 
 
 class TrowbridgeReitz(Description):
@@ -186,10 +188,10 @@ class TrowbridgeReitz(Description):
     beta: HalfHeight = 0.3
     """beta, angle in radians at which D is half its height."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) normalised; printed with height 1."""
-        (alpha,) = as_dtype_of(n_h, alpha_of_half_height(self.beta))
-        density = ggx(n_h, sin2_h, alpha)
+        (alpha,) = as_dtype_of(theta.cosine, alpha_of_half_height(np.asarray(self.beta)))
+        density = ggx(*theta, alpha)
         return density * (np.pi * np.square(alpha)) if printed else density
 
 
@@ -200,10 +202,10 @@ class GGX(Description):
     alpha: Roughness = 0.3
     """alpha, slope scale: 0.05 polished, 1 very rough; longer tails than Beckmann."""
 
-    def density(self, n_h: Floats, sin2_h: Floats, printed: bool = False) -> Floats:
+    def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) normalised."""
-        (alpha,) = as_dtype_of(n_h, self.alpha)
-        return ggx(n_h, sin2_h, alpha)
+        (alpha,) = as_dtype_of(theta.cosine, self.alpha)
+        return ggx(*theta, alpha)
 
 
 Distribution: TypeAlias = Annotated[

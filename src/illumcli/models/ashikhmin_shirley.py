@@ -24,6 +24,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.models._fresnel import schlick
 from illumcli.models._lobes import channels, log_cos
 from illumcli.models._parameters import Albedo, NonNegative
+from illumcli.models._terms import Components
 
 
 class AshikhminShirley(IlluminationModel):
@@ -54,11 +55,11 @@ class AshikhminShirley(IlluminationModel):
         return (Rd * (1 - Rs) * seen).T
 
     def specular_lobe(
-        self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, t_s: Floats, b_s: Floats
+        self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, s_local: Components
     ) -> Vectors:
         """(N, 3) n_l * specular."""
         nu, nv = as_dtype_of(n_l, self.exponent_u, self.exponent_v)
-        along, across = np.square(t_s), np.square(b_s)
+        along, across = np.square(s_local.t), np.square(s_local.b)
         tiny = np.finfo(s_s.dtype).tiny
         sin2 = (along + across) / np.maximum(s_s, tiny)
         p = (nu * along + nv * across) / np.maximum(along + across, tiny)

@@ -30,6 +30,7 @@ from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
 from illumcli.models._microfacet import Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Albedo, Share
+from illumcli.models._terms import Angle
 from illumcli.schema.description import Description, default_of
 
 WHITE = (1.0, 1.0, 1.0)
@@ -75,11 +76,9 @@ class CookTorrance(IlluminationModel):
         (kd,) = as_dtype_of(n_l, self._diffuse_weight())
         return tint(self.diffuse, n_l * (kd / np.pi))
 
-    def specular_lobe(
-        self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, sin2_h: Floats
-    ) -> Vectors:
+    def specular_lobe(self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, theta_h: Angle) -> Vectors:
         """(N, 3) ks * D G F / (4 n_v)."""
-        return self.colored_lobe(n_l, n_v, s_s, v_h, n_h, sin2_h, None)
+        return self.colored_lobe(n_l, n_v, s_s, v_h, theta_h, None)
 
     def colored_lobe(
         self,
@@ -87,14 +86,13 @@ class CookTorrance(IlluminationModel):
         n_v: Floats,
         s_s: Floats,
         v_h: Floats,
-        n_h: Floats,
-        sin2_h: Floats,
+        theta_h: Angle,
         light: Vectors | None,
     ) -> Vectors:
         """(N, 3) the specular lobe of a facet whose colour goes over to the light's at grazing."""
         printed = self.convention == "printed"
         (ks,) = as_dtype_of(n_l, self.specular_weight)
-        shape = self.distribution.density(n_h, sin2_h, printed) * (n_l * vgroove_over_4ab(n_l, n_v, s_s))
+        shape = self.distribution.density(theta_h, printed) * (n_l * vgroove_over_4ab(n_l, n_v, s_s))
         shape *= ks * (4 / np.pi) if printed else ks
         F = self.fresnel.reflectance(v_h, light)
         return tint(WHITE, F * shape) if F.ndim == 1 else (F * shape).T

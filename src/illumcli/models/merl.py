@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,24 +31,25 @@ from illumcli.models._base import IlluminationModel, Lobe
 
 SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
 CELLS = 90 * 90 * 180
+Cells: TypeAlias = NDArray[np.int64]
 SCALE = (1 / 1500, 1.15 / 1500, 1.66 / 1500)
 
 
 def rusinkiewicz(
-    nxs: Vectors, n_s: Floats, n: Vectors, l: Vectors, v: Vectors, s_s: Floats
+    nxs: Vectors, n_s: Floats, n: Vectors, d: Vectors, s_s: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """theta_h, theta_d and phi_d in radians, phi_d within -pi..pi and 0 where it is undefined.
 
     With d = l - v and the frame whose X and Y point from the half vector away from the normal and across,
     l.Y = (n x s).d / (2 |n x s|) and l.X = -(n.d) |s| / (2 |n x s|): no azimuth of h is formed.
     """
-    d, size = l - v, np.sqrt(s_s)
+    size = np.sqrt(s_s)
     theta_h = np.arctan2(np.sqrt(dot(nxs, nxs)), n_s)
     theta_d = np.arctan2(np.sqrt(dot(d, d)), size)
     return theta_h, theta_d, np.arctan2(dot(nxs, d), -dot(n, d) * size)
 
 
-def merl_coordinates(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any]:
+def merl_coordinates(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Floats]:
     """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d and 0..180 by phi_d."""
     return (
         np.sqrt(theta_h * (2 / np.pi)) * 90,
@@ -57,13 +58,13 @@ def merl_coordinates(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, 
     )
 
 
-def merl_index(theta_h: Any, theta_d: Any, phi_d: Any) -> tuple[Any, Any, Any, Any]:
+def merl_index(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Cells, Cells, Cells, Cells]:
     """Cell numbers along theta_h, theta_d, phi_d, and in the flat table."""
-    cells: list[Any] = [
+    i, j, k = (
         np.clip(np.asarray(x, np.int64), 0, count - 1)
         for x, count in zip(merl_coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
-    ]
-    return *cells, (cells[0] * SHAPE[1] + cells[1]) * SHAPE[2] + cells[2]
+    )
+    return i, j, k, (i * SHAPE[1] + j) * SHAPE[2] + k
 
 
 class Merl(IlluminationModel):
@@ -79,17 +80,10 @@ class Merl(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def specular_lobe(
-        self,
-        n_l: Floats,
-        n_s: Floats,
-        s_s: Floats,
-        nxs: Vectors,
-        n: Vectors,
-        l: Vectors,
-        v: Vectors,
+        self, n_l: Floats, n_s: Floats, s_s: Floats, nxs: Vectors, n: Vectors, d: Vectors
     ) -> Vectors:
         """(N, 3) n_l times the measurement."""
-        angles = rusinkiewicz(nxs, n_s, n, l, v, s_s)
+        angles = rusinkiewicz(nxs, n_s, n, d, s_s)
         table = measurement(self.file)
         look = _linear if self.lookup == "linear" else _nearest
         values = look(table, *angles)
@@ -139,13 +133,13 @@ def _cells(table: NDArray[np.uint32], flat: NDArray[np.int64]) -> NDArray[np.flo
     return halves.view("<f8")[..., 0].astype(np.float64, copy=False)
 
 
-def _nearest(table: NDArray[np.uint32], *angles: Floats) -> NDArray[Any]:
+def _nearest(table: NDArray[np.uint32], *angles: Floats) -> Floats:
     """(3, N) the cells that the angles fall in; 0 without measurement."""
     flat = merl_index(*angles)[3]
     return _scaled(np.maximum(_cells(table, flat), 0), angles[0].dtype)
 
 
-def _linear(table: NDArray[np.uint32], *angles: Floats) -> NDArray[Any]:
+def _linear(table: NDArray[np.uint32], *angles: Floats) -> Floats:
     """(3, N) between the centres of cells, phi_d going round; 0 without any measurement nearby."""
     low, part = [], []
     for x in merl_coordinates(*angles):
@@ -167,5 +161,5 @@ def _linear(table: NDArray[np.uint32], *angles: Floats) -> NDArray[Any]:
     return _scaled(total / np.maximum(weights, np.finfo(np.float64).tiny), angles[0].dtype)
 
 
-def _scaled(values: NDArray[np.float64], dtype: Any) -> NDArray[Any]:
+def _scaled(values: NDArray[np.float64], dtype: np.dtype[np.floating[Any]]) -> Floats:
     return (values * np.array(SCALE)[:, None]).astype(dtype)

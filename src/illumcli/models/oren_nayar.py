@@ -24,7 +24,7 @@ Oren, M., Nayar, S. K. (1994). Generalization of Lambert's reflectance model. SI
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -34,7 +34,9 @@ from illumcli.models._lobes import channels, tint
 from illumcli.models._parameters import Albedo, Spread
 
 
-def oren_nayar_terms(n_l: Any, n_v: Any, sin_l: Any, sin_v: Any, cos_phi: Any, sigma: Any) -> tuple[Any, Any]:
+def oren_nayar_terms(
+    n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, cos_phi: Floats, sigma: Floats
+) -> tuple[Floats, Floats]:
     """f1 in units of rho / pi and f2 in units of rho^2 / pi, before the clamp.
 
     Angles enter as 1 - 2 alpha / pi and 1 - 2 beta / pi, which keep their digits at grazing, where
@@ -66,7 +68,7 @@ def oren_nayar_terms(n_l: Any, n_v: Any, sin_l: Any, sin_v: Any, cos_phi: Any, s
     return f1, f2
 
 
-def oren_nayar_ab(n_l: Any, n_v: Any, l_v: Any, sigma: Any) -> Any:
+def oren_nayar_ab(n_l: Floats, n_v: Floats, l_v: Floats, sigma: Floats) -> Floats:
     """A + B max(0, C) sin(alpha) tan(beta), of which C sin(alpha) tan(beta) = (l.v - a b) / max(a, b)."""
     s2 = np.square(sigma)
     A, B = 1 - s2 / (s2 + 0.33) / 2, 0.45 * s2 / (s2 + 0.09)

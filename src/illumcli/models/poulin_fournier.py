@@ -19,7 +19,7 @@ Poulin, P., Fournier, A. (1990). A model for anisotropic reflection. SIGGRAPH '9
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -28,6 +28,7 @@ from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
 from illumcli.models._parameters import Albedo, NonNegative, Varying
+from illumcli.models._terms import Components
 
 Slope = Varying[Annotated[float, Field(ge=1e-3, le=1.57)]]
 
@@ -53,97 +54,105 @@ class PoulinFournier(IlluminationModel):
     def diffuse_lobe(self, n_l: Floats, n_v: Floats, b_l: Floats, b_v: Floats) -> Vectors:
         """(N, 3) the diffuse part, integrated in closed form."""
         (steepest,) = as_dtype_of(n_l, self.slope)
-        low, high = lit_and_seen(n_l, n_v, b_l, b_v, steepest)
-        area = facing(n_l, n_v, b_l, b_v, low, high)
+        l, v = Across(n_l, b_l), Across(n_v, b_v)
+        area = facing(l, v, lit_and_seen(l, v, steepest))
         return tint(self.diffuse, area / (2 * np.pi * np.sin(steepest) * n_v))
 
     def specular_lobe(
-        self,
-        n_l: Floats,
-        n_v: Floats,
-        b_l: Floats,
-        b_v: Floats,
-        s_s: Floats,
-        n_s: Floats,
-        t_s: Floats,
-        b_s: Floats,
+        self, n_l: Floats, n_v: Floats, b_l: Floats, b_v: Floats, s_s: Floats, s_local: Components
     ) -> Vectors:
         """(N, 3) the specular part, by quadrature: to 1e-5 in single precision, 1e-12 in double."""
         e, steepest = as_dtype_of(n_l, self.exponent, self.slope)
-        low, high = lit_and_seen(n_l, n_v, b_l, b_v, steepest)
-        area = highlight(n_l, n_v, b_l, b_v, s_s, n_s, t_s, b_s, e, low, high)
+        l, v = Across(n_l, b_l), Across(n_v, b_v)
+        area = highlight(l, v, s_s, s_local, e, lit_and_seen(l, v, steepest))
         return tint(self.specular, area * ((e + 2) / (4 * np.pi * np.sin(steepest))) / n_v)
 
 
-def lit_and_seen(n_l: Any, n_v: Any, b_l: Any, b_v: Any, steepest: Any) -> tuple[Any, Any]:
-    """(low, high) slopes of the facets that face light and eye; equal where there are none."""
-    from_light, from_eye = -np.arctan2(n_l, b_l), -np.arctan2(n_v, b_v)
+class Across(NamedTuple):
+    """A direction in the plane across the grooves."""
+
+    n: Floats
+    """(N,) along the normal."""
+    b: Floats
+    """(N,) along b."""
+
+    def turned(self, cosine: Floats, sine: Floats) -> Across:
+        """The same direction by the normal n_psi of the slope psi of this cosine and sine, and across it."""
+        return Across(self.n * cosine + self.b * sine, self.b * cosine - self.n * sine)
+
+
+class Arc(NamedTuple):
+    """Slopes of facets [rad]."""
+
+    low: Floats
+    """(N,)."""
+    high: Floats
+    """(N,); equal to `low` where there are none."""
+
+
+def lit_and_seen(l: Across, v: Across, steepest: Floats) -> Arc:
+    """The slopes of the facets that face light and eye."""
+    from_light, from_eye = -np.arctan2(l.n, l.b), -np.arctan2(v.n, v.b)
     low = np.maximum(np.maximum(from_light, from_eye), -steepest)
     high = np.minimum(np.minimum(from_light, from_eye) + np.pi, steepest)
-    return low, np.maximum(low, high)
+    return Arc(low, np.maximum(low, high))
 
 
-def facing(n_l: Any, n_v: Any, b_l: Any, b_v: Any, low: Any, high: Any) -> Any:
-    """The integral of (n_psi.l) (n_psi.v) over low..high.
+def facing(l: Across, v: Across, arc: Arc) -> Floats:
+    """The integral of (n_psi.l) (n_psi.v) over the arc.
 
     About the middle of the arc the odd part vanishes, and what is left has no cancellation on narrow arcs.
     """
+    low, high = arc
     width, middle = high - low, (high + low) / 2
     cosine, sine = np.cos(middle), np.sin(middle)
-    level = (n_l * cosine + b_l * sine) * (n_v * cosine + b_v * sine)
-    slope = (b_l * cosine - n_l * sine) * (b_v * cosine - n_v * sine)
+    l, v = l.turned(cosine, sine), v.turned(cosine, sine)
+    level, slope = l.n * v.n, l.b * v.b
     curve = np.sin(width)
     return np.maximum(level * (width + curve) + slope * _excess(width, curve), 0) / 2
 
 
-def _excess(x: Any, sine: Any) -> Any:
+def _excess(x: Floats, sine: Floats) -> Floats:
     """x - sin(x), by its series below 1/2."""
     small = x < 0.5
     x2 = np.square(np.minimum(x, 0.5))
-    series = 1.0
+    series: Floats = np.ones_like(x2)
     for k in (12, 10, 8, 6, 4):
         series = 1 - series * x2 / (k * (k + 1))
     return x * x2 / 6 * series * small + (x - sine) * ~small
 
 
-def highlight(
-    n_l: Any,
-    n_v: Any,
-    b_l: Any,
-    b_v: Any,
-    s_s: Any,
-    n_s: Any,
-    t_s: Any,
-    b_s: Any,
-    e: Any,
-    low: Any,
-    high: Any,
-) -> Any:
-    """The integral of <n_psi.h>^e (n_psi.l) (n_psi.v) over low..high.
+def highlight(l: Across, v: Across, s_s: Floats, s: Components, e: Floats, arc: Arc) -> Floats:
+    """The integral of <n_psi.h>^e (n_psi.l) (n_psi.v) over the arc.
 
     With u = psi - psi_h, n_psi.h is cos(u) times the length of h across the grooves. Nodes are spread over
     the slopes where cos(u)^e is above its greatest value times exp(-fall).
     """
-    nodes, fall = NODES[n_l.dtype]
-    limits = np.finfo(n_l.dtype)
+    t_s, b_s, n_s = s
+    nodes, fall = NODES[l.n.dtype]
+    limits = np.finfo(l.n.dtype)
     below_one = 1 - 8 * float(limits.eps)
+
+    # the part of the arc where the highlight is not negligible, as slopes from that of h
     psi_h = np.arctan2(b_s, n_s)
+    low, high = arc
     nearest = np.sin(np.clip(np.clip(psi_h, low, high) - psi_h, -np.pi / 2, np.pi / 2))
     shrink = -2 * fall / np.maximum(e, 2 * fall / 80)
     reach = np.arcsin(np.sqrt(np.clip(nearest * nearest * np.exp(shrink) - np.expm1(shrink), 0, below_one)))
     first, last = np.clip(low - psi_h, -reach, reach), np.clip(high - psi_h, -reach, reach)
     half, middle = (last - first) / 2, (last + first) / 2
 
+    # light and eye by the facet that h stands on, and what the part of h along the grooves takes away
     cos_h, sin_h = np.cos(psi_h), np.sin(psi_h)
-    l_h, v_h = n_l * cos_h + b_l * sin_h, n_v * cos_h + b_v * sin_h
-    l_x, v_x = b_l * cos_h - n_l * sin_h, b_v * cos_h - n_v * sin_h
+    l_h, v_h = l.turned(cos_h, sin_h), v.turned(cos_h, sin_h)
     along = np.log1p(-np.minimum(t_s * t_s / np.maximum(s_s, limits.tiny), below_one))
 
-    total, half_e = np.zeros_like(n_l), e / 2
+    # Gauss-Legendre over that part
+    total, half_e = np.zeros_like(l.n), e / 2
     for node, weight in gauss_legendre(nodes):
         sine = np.sin(middle + half * node)
         sine2 = sine * sine
         cosine = np.sqrt(1 - sine2)
         fade = np.exp((np.log1p(-sine2) + along) * half_e)
-        total += fade * weight * (l_h * cosine + l_x * sine) * (v_h * cosine + v_x * sine)
+        total += fade * weight * (l_h.n * cosine + l_h.b * sine) * (v_h.n * cosine + v_h.b * sine)
     return np.maximum(total * half, 0)

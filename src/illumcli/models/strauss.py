@@ -24,7 +24,7 @@ Strauss, P. S. (1990). A realistic lighting model for computer animators. IEEE C
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -37,15 +37,30 @@ from illumcli.models._parameters import Albedo, Share
 Offset = Annotated[float, Field(ge=1.001, le=10)]
 
 
-def strauss_fresnel(x: Any, kf: Any) -> Any:
+def strauss_fresnel(x: Floats, kf: Floats | float) -> Floats:
     """F(x), 0 at normal incidence and 1 at grazing."""
     return x * (2 * kf - x) * np.square((kf - 1) / (kf - x)) / (2 * kf - 1)
 
 
-def strauss_geometry(rise: Any, kg: Any) -> Any:
+def strauss_geometry(rise: Floats, kg: Floats | float) -> Floats:
     """G(x), 1 at normal incidence and 0 at grazing, from rise = 1 - x."""
     pole = (kg - 1) + rise
     return rise * (2 * (kg - 1) + rise) * np.square(kg / pole) / (2 * kg - 1)
+
+
+class Surface(NamedTuple):
+    """Parameters of the highlight, in the precision of the lanes."""
+
+    s: Floats
+    """Smoothness."""
+    t: Floats
+    """Transparency."""
+    kj: Floats | float
+    """k_j."""
+    kf: Floats | float
+    """k_f."""
+    kg: Floats | float
+    """k_g."""
 
 
 class Strauss(IlluminationModel):
@@ -86,27 +101,44 @@ class Strauss(IlluminationModel):
     ) -> Vectors:
         """(N, 3) r_s * c_s."""
         s, m, t = as_dtype_of(n_l, self.smoothness, self.metalness, self.transparency)
-        F, _, _, _, r_s = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, self.kj, self.kf, self.kg)
-        metal = m * (1 - F)
-        return ((1 + metal * (channels(n_l, self.color) - 1)) * r_s).T
+        surface = Surface(s, t, self.kj, self.kf, self.kg)
+        highlight = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, surface)
+        metal = m * (1 - highlight.F)
+        return ((1 + metal * (channels(n_l, self.color) - 1)) * highlight.r_s).T
+
+
+class Highlight(NamedTuple):
+    """The highlight's share of the light and its factors, (N,) each."""
+
+    F: Floats
+    """F(x_i)."""
+    G_l: Floats
+    """G(x_i)."""
+    G_v: Floats
+    """G(x_r)."""
+    r_j: Floats
+    """The share that does not depend on the angle to the mirror direction."""
+    r_s: Floats
+    """All of it."""
 
 
 def strauss_specular(
-    n_l: Any, n_v: Any, sin_l: Any, sin_v: Any, gap_rv: Any, s: Any, t: Any, kj: Any, kf: Any, kg: Any
-) -> tuple[Any, Any, Any, Any, Any]:
-    """F(x_i), G(x_i), G(x_r), r_j and r_s on (N,) lanes.
+    n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, gap_rv: Floats, surface: Surface
+) -> Highlight:
+    """The highlight's share r_s of the light, and its factors.
 
     Near s = 1 the exponent stops where |r - v|^2 is at rounding level: a mirror.
     """
+    s, t, kj, kf, kg = surface
     rise_l = np.arctan2(n_l, sin_l) * (2 / np.pi)
     rise_v = np.arctan2(n_v, sin_v) * (2 / np.pi)
     F, G_l, G_v = strauss_fresnel(1 - rise_l, kf), strauss_geometry(rise_l, kg), strauss_geometry(rise_v, kg)
     r_n = (1 - t) * s * s * s
     r_j = np.minimum(r_n + (r_n + kj) * (F * G_l * G_v), 1)
     exponent = 3 / np.maximum(1 - s, np.finfo(gap_rv.dtype).eps)
-    return F, G_l, G_v, r_j, lobe(gap_rv, exponent) * r_j
+    return Highlight(F, G_l, G_v, r_j, lobe(gap_rv, exponent) * r_j)
 
 
-def _diffuse_share(s: Any, t: Any) -> Any:
+def _diffuse_share(s: Floats, t: Floats) -> Floats:
     """r_d = (1 - s^3) (1 - t)."""
     return (1 - s) * (1 + s + s * s) * (1 - t)

@@ -19,6 +19,7 @@ import numpy as np
 
 from illumcli.arrays import Floats, Vectors, cross, dot, length, mirror, unit
 from illumcli.graph import Node, required, topological_order
+from illumcli.models._terms import Angle, Components
 
 GIVEN = ("n", "l", "v", "t", "light")
 
@@ -99,6 +100,11 @@ def sin2_h(nxs: Vectors, n_s: Floats, s_s: Floats) -> Floats:
     return np.maximum(sin2, n_s <= 0)
 
 
+def theta_h(n_h: Floats, sin2_h: Floats) -> Angle:
+    """Angle between normal and half vector."""
+    return Angle(n_h, sin2_h)
+
+
 def nxl(n: Vectors, l: Vectors) -> Vectors:
     return cross(n, l)
 
@@ -123,9 +129,14 @@ def cos_phi(nxl: Vectors, nxv: Vectors, sin_l: Floats, sin_v: Floats) -> Floats:
     return np.clip(dot(nxl, nxv) / np.maximum(sines, np.finfo(sines.dtype).tiny), -1, 1)
 
 
-def sin_theta_d(l: Vectors, v: Vectors) -> Floats:
+def d(l: Vectors, v: Vectors) -> Vectors:
+    """l - v, at right angles to s."""
+    return l - v
+
+
+def sin_theta_d(d: Vectors) -> Floats:
     """Sine of the angle between l and h = |l - v| / 2."""
-    return length(l - v) / 2
+    return length(d) / 2
 
 
 def b(n: Vectors, t: Vectors) -> Vectors:
@@ -157,6 +168,11 @@ def b_s(b: Vectors, s: Vectors) -> Floats:
     return dot(b, s)
 
 
+def s_local(t_s: Floats, b_s: Floats, n_s: Floats) -> Components:
+    """s along the grain, across it, and along the normal."""
+    return Components(t_s, b_s, n_s)
+
+
 def sin_tl(t: Vectors, l: Vectors) -> Floats:
     """Sine of the angle between tangent and light, |t x l|."""
     return length(cross(t, l))
@@ -170,8 +186,8 @@ def sin_tv(t: Vectors, v: Vectors) -> Floats:
 # fmt: off
 FUNCTIONS = (
     n_l, n_v, l_v, s, s_s, h, v_h, n_s, n_h, gap_nh, r, gap_rv,
-    nxs, sin2_h, nxl, nxv, sin_l, sin_v, cos_phi, sin_theta_d,
-    b, t_l, t_v, b_l, b_v, t_s, b_s, sin_tl, sin_tv,
+    nxs, sin2_h, theta_h, nxl, nxv, sin_l, sin_v, cos_phi, d, sin_theta_d,
+    b, t_l, t_v, b_l, b_v, t_s, b_s, s_local, sin_tl, sin_tv,
 )
 # fmt: on
 TERMS: dict[str, Node] = {function.__name__: Node.of(function) for function in FUNCTIONS}

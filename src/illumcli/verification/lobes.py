@@ -13,7 +13,7 @@ from illumcli.models.ashikhmin_shirley import AshikhminShirley
 from illumcli.models.kajiya_kay import KajiyaKay
 from illumcli.models.oren_nayar import OrenNayar, oren_nayar_terms
 from illumcli.models.poulin_fournier import PoulinFournier
-from illumcli.models.strauss import Strauss, strauss_fresnel, strauss_geometry, strauss_specular
+from illumcli.models.strauss import Strauss, Surface, strauss_fresnel, strauss_geometry, strauss_specular
 from illumcli.models.ward import Ward
 from illumcli.shading import terms
 from illumcli.shading.terms import evaluate
@@ -92,12 +92,11 @@ def strauss(inputs: Inputs) -> Vectors:
 def strauss_terms(inputs: Inputs) -> NDArray[Any]:
     """[r_d, r_n, F, G_i, G_r, r_j, r_s]."""
     white = Strauss(color=(1.0, 1.0, 1.0), **strauss_parameters(inputs))
-    s, t = inputs.scalars("smoothness"), inputs.scalars("transparency")
-    kj, kf, kg = (inputs.scalars(key) for key in ("kj", "kf", "kg"))
+    surface = Surface(*(inputs.scalars(key) for key in ("smoothness", "transparency", "kj", "kf", "kg")))
     n_l, n_v, sin_l, sin_v, gap_rv = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "gap_rv")
-    specular = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, s, t, kj, kf, kg)
+    specular = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, surface)
     r_d = np.asarray(white.diffuse_color(), inputs.dtype)[:1]
-    return np.concatenate([r_d, (1 - t) * s**3, *specular])
+    return np.concatenate([r_d, (1 - surface.t) * surface.s**3, *specular])
 
 
 def strauss_parameters(inputs: Inputs) -> dict[str, Any]:

@@ -27,8 +27,7 @@ def rusinkiewicz_theta(inputs: Inputs) -> Floats:
 
 def angles(inputs: Inputs) -> tuple[Floats, Floats, Floats]:
     """theta_h, theta_d and phi_d, as the model looks them up."""
-    nxs, n_s, n, l, v, s_s = formed(inputs, "nxs", "n_s", "n", "l", "v", "s_s")
-    return merl.rusinkiewicz(nxs, n_s, n, l, v, s_s)
+    return merl.rusinkiewicz(*formed(inputs, "nxs", "n_s", "n", "d", "s_s"))
 
 
 def merl_index(inputs: Inputs) -> NDArray[Any]:

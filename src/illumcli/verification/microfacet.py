@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, dot
 from illumcli.models import _fresnel, _microfacet
+from illumcli.models._terms import Angle
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.shading import terms
 from illumcli.verification.inputs import Inputs
@@ -50,7 +51,7 @@ def ndf(inputs: Inputs) -> Floats:
     if d.value("kind") == "beckmann_slope1d":
         return _microfacet.beckmann_slope1d(cosine, sin2, d.scalars("m"))
     distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
-    return share * distribution.density(cosine, sin2, printed)
+    return share * distribution.density(Angle(cosine, sin2), printed)
 
 
 def geometry_vgroove(inputs: Inputs) -> Floats:

@@ -3,43 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, LimitError
-from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.mesh_checks import Place, faults, numbered
 from illumcli.geometry.repairs import Repair, Repairs, note
+from illumcli.records import Record
 
 LARGEST = 1e18  # of a coordinate: products of two stay in the range of single precision
 MOST_CORNERS = 2**31 - 1  # corners are counted in int32
 
 Ints = NDArray[np.int64]
+Indices: TypeAlias = NDArray[np.integer[Any]]
 
 
-def polygons(
-    path: Path,
-    vertices: NDArray[np.float64],
-    corners: Ints,
-    counts: Ints,
-    *,
-    normals: NDArray[np.float64] | None = None,
-    corner_normals: NDArray[Any] | None = None,
-    uvs: NDArray[np.float64] | None = None,
-    corner_uvs: NDArray[Any] | None = None,
-    polygon_materials: NDArray[Any] | None = None,
-    polygon_groups: NDArray[Any] | None = None,
-    polygon_smoothing: NDArray[Any] | None = None,
-    attributes: Mapping[str, NDArray[Any]] | None = None,
-    repairs: Repairs | None = None,
-    place: Place = numbered,
-    **more: Any,
-) -> Mesh:
-    """The mesh of polygons with `counts` corners each, or `InputError` where it has none or is not finite.
+class RawMesh(Record):
+    """A mesh as its file has it, before anything is checked; the fields are those of `Mesh`."""
+
+    vertices: NDArray[np.float64]  # (V, 3)
+    corners: Ints  # (C,) vertex of each corner, in range
+    counts: Ints  # (P,) corners of each polygon
+    normals: NDArray[np.float64] | None = None  # (K, 3)
+    corner_normals: Indices | None = None  # (C,) row of each corner, -1 for none
+    uvs: NDArray[np.float64] | None = None  # (U, 2)
+    corner_uvs: Indices | None = None  # (C,)
+    material_names: tuple[str, ...] = ()
+    polygon_materials: Indices | None = None  # (P,)
+    group_names: tuple[str, ...] = ()
+    polygon_groups: Indices | None = None  # (P,)
+    polygon_smoothing: Indices | None = None  # (P,)
+    attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # (V,) or (V, k) each
+    materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
+    material_repairs: Repairs = field(default_factory=dict)
+    repairs: Repairs = field(default_factory=dict)  # what the reader itself put right
+
+
+def checked_mesh(path: Path, raw: RawMesh, place: Place = numbered) -> Mesh:
+    """The mesh, without what cannot be used; `InputError` where it has no faces or a corner is not finite.
 
     Polygons of fewer than three corners are dropped. Normals and uv that are not finite, and normals of
     no length, are taken from the corners that use them. Attributes that are not finite become 0, and so do
@@ -47,88 +54,89 @@ def polygons(
 
     Parameters
     ----------
-    vertices : (V, 3) float64
-    corners : (C,) int64
-        Vertex of each corner, in range.
-    counts : (P,) int64
-        Corners of each polygon.
-    normals, uvs : (K, 3), (U, 2) float64, or None
-    corner_normals, corner_uvs : (C,) int, or None
-        Row of each corner, -1 for none.
-    polygon_materials, polygon_groups, polygon_smoothing : (P,) int, or None
-    attributes : (V,) or (V, k) each
-    repairs
-        What the reader itself put right.
     place
         Where a part of the file stands.
-    **more
-        Other fields of `Mesh`.
     """
-    noted = dict(repairs or {})
-    few = counts < 3
-    if few.any():
-        _count(noted, "faces with fewer than three corners", "face", few, place)
-        kept = np.repeat(~few, counts)
-        corners, counts = corners[kept], counts[~few]
-        corner_normals, corner_uvs = _pick(corner_normals, kept), _pick(corner_uvs, kept)
-        polygon_materials, polygon_groups = _pick(polygon_materials, ~few), _pick(polygon_groups, ~few)
-        polygon_smoothing = _pick(polygon_smoothing, ~few)
-    if not len(counts):
+    noted = dict(raw.repairs)
+    kept = raw.counts >= 3
+    if not kept.all():
+        _count(noted, "faces with fewer than three corners", "face", ~kept, place)
+        raw = _with_polygons(raw, kept)
+    if not len(raw.counts):
         raise InputError(f"{path}: has no faces; export the mesh with its faces")
-    if len(corners) > MOST_CORNERS:
+    if len(raw.corners) > MOST_CORNERS:
         raise LimitError(
-            f"{path}: has {len(corners)} corners, the limit is {MOST_CORNERS}; use a smaller mesh"
+            f"{path}: has {len(raw.corners)} corners, the limit is {MOST_CORNERS}; use a smaller mesh"
         )
-    vertices = _finite_vertices(path, vertices, corners, noted, place)
-    if normals is not None and corner_normals is not None:
-        usable = _within(normals) & normals.any(axis=1)
+    vertices = _finite_vertices(path, raw, noted, place)
+    corner_normals, corner_uvs = raw.corner_normals, raw.corner_uvs
+    if raw.normals is not None and corner_normals is not None:
+        usable = _within(raw.normals) & raw.normals.any(axis=1)
         corner_normals = _unless(usable, corner_normals)
         _count(noted, "normals not finite or of no length", "normal", ~usable, place)
-    if uvs is not None and corner_uvs is not None:
-        usable = _within(uvs)
+    if raw.uvs is not None and corner_uvs is not None:
+        usable = _within(raw.uvs)
         corner_uvs = _unless(usable, corner_uvs)
         _count(noted, "uv not finite", "uv", ~usable, place)
     mesh = Mesh(
-        attributes={name: _finite(name, values, noted, place) for name, values in (attributes or {}).items()},
         vertices=vertices,
-        corners=corners.astype(np.int32),
-        starts=starts_of(counts).astype(np.int32),
-        normals=normals,
+        corners=raw.corners.astype(np.int32),
+        starts=starts_of(raw.counts).astype(np.int32),
+        normals=raw.normals,
         corner_normals=_ids(corner_normals),
-        uvs=uvs,
+        uvs=raw.uvs,
         corner_uvs=_ids(corner_uvs),
-        polygon_materials=_ids(polygon_materials),
-        polygon_groups=_ids(polygon_groups),
-        polygon_smoothing=_ids(polygon_smoothing),
+        material_names=raw.material_names,
+        polygon_materials=_ids(raw.polygon_materials),
+        group_names=raw.group_names,
+        polygon_groups=_ids(raw.polygon_groups),
+        polygon_smoothing=_ids(raw.polygon_smoothing),
+        attributes={name: _finite(name, values, noted, place) for name, values in raw.attributes.items()},
+        materials=raw.materials,
+        substitutes=raw.substitutes,
+        material_repairs=raw.material_repairs,
         repairs=noted,
-        **more,
     )
-    face = np.flatnonzero(~few)
+    face = np.flatnonzero(kept)
     return replace(
         mesh, repairs=faults(mesh, lambda part, n: place(part, int(face[n]) if part == "face" else n))
     )
 
 
-def starts_of(counts: NDArray[Any]) -> Ints:
+def _with_polygons(raw: RawMesh, kept: NDArray[np.bool_]) -> RawMesh:
+    """The mesh without the polygons that are not kept."""
+    kept_corners = np.repeat(kept, raw.counts)
+    return replace(
+        raw,
+        corners=raw.corners[kept_corners],
+        counts=raw.counts[kept],
+        corner_normals=_pick(raw.corner_normals, kept_corners),
+        corner_uvs=_pick(raw.corner_uvs, kept_corners),
+        polygon_materials=_pick(raw.polygon_materials, kept),
+        polygon_groups=_pick(raw.polygon_groups, kept),
+        polygon_smoothing=_pick(raw.polygon_smoothing, kept),
+    )
+
+
+def starts_of(counts: Indices) -> Ints:
     """(P + 1,) where each of consecutive runs of `counts` entries starts, and the end."""
     return np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
 
 
-def runs(starts: NDArray[Any], counts: NDArray[Any], step: int = 1) -> Ints:
+def runs(starts: Indices, counts: Indices, step: int = 1) -> Ints:
     """start, start + step, ... for `counts` entries of each start, one run after the other."""
     within = np.arange(counts.sum(), dtype=np.int64) - np.repeat(starts_of(counts)[:-1], counts)
     return np.repeat(starts, counts) + step * within
 
 
-def _finite_vertices(
-    path: Path, vertices: NDArray[np.float64], corners: Ints, noted: dict[str, Repair], place: Place
-) -> NDArray[np.float64]:
-    """`vertices`, 0 where one is NaN, infinite or beyond `LARGEST`; refused where a corner uses it."""
+def _finite_vertices(path: Path, raw: RawMesh, noted: dict[str, Repair], place: Place) -> NDArray[np.float64]:
+    """The vertices, 0 where one is NaN, infinite or beyond `LARGEST`; refused where a corner uses it."""
+    vertices = raw.vertices
     usable = _within(vertices)
     if usable.all():
         return vertices
     used = np.zeros(len(vertices), np.bool_)
-    used[corners] = True
+    used[raw.corners] = True
     if (bad := np.flatnonzero(used & ~usable)).size:
         raise InputError(
             f"{path}: {len(bad)} of {len(vertices)} vertices are not finite or beyond {LARGEST:g}, the first "
@@ -144,7 +152,7 @@ def check_range(indices: Ints, size: int, refuse: Callable[[int], InputError]) -
         raise refuse(int(np.argmax((indices < 0) | (indices >= size))))
 
 
-def strip(indices: NDArray[Any]) -> tuple[Ints, int]:
+def strip(indices: Indices) -> tuple[Ints, int]:
     """Triangles of strips, and how many were left out because they only join two strips.
 
     Parameters
@@ -173,11 +181,11 @@ def _within(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return inside
 
 
-def _pick(values: NDArray[Any] | None, kept: NDArray[np.bool_]) -> NDArray[Any] | None:
+def _pick(values: Indices | None, kept: NDArray[np.bool_]) -> Indices | None:
     return None if values is None else values[kept]
 
 
-def _unless(usable: NDArray[np.bool_], corner_rows: NDArray[Any]) -> NDArray[Any]:
+def _unless(usable: NDArray[np.bool_], corner_rows: Indices) -> Indices:
     """`corner_rows` with -1 where the row is not usable."""
     if usable.all():
         return corner_rows
@@ -200,5 +208,5 @@ def _count(noted: dict[str, Repair], what: str, part: str, wrong: NDArray[np.boo
         note(noted, what, place(part, int(np.argmax(wrong))), int(np.count_nonzero(wrong)))
 
 
-def _ids(values: NDArray[Any] | None) -> NDArray[np.int32] | None:
+def _ids(values: Indices | None) -> NDArray[np.int32] | None:
     return None if values is None else np.ascontiguousarray(values, np.int32)

@@ -30,7 +30,7 @@ from illumcli.mesh_files import mtl
 from illumcli.mesh_files._color import unit_range
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
-from illumcli.mesh_files._polygons import Ints, polygons
+from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh
 from illumcli.mesh_files._text import Block, Text, keyword
 from illumcli.records import Value
 
@@ -88,8 +88,7 @@ def read(path: Path) -> Mesh:
     repairs |= joined([repairs, library.repairs, _undefined(text, rest.materials, library)])
     material_names, polygon_materials = _selected(rest.materials, lines[b"f"])
     group_names, polygon_groups = _selected(rest.groups, lines[b"f"])
-    return polygons(
-        path,
+    raw = RawMesh(
         vertices,
         corners,
         counts,
@@ -107,8 +106,8 @@ def read(path: Path) -> Mesh:
         substitutes=library.substitutes,
         material_repairs=library.looks,
         repairs=repairs,
-        place=lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}",
     )
+    return checked_mesh(path, raw, lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}")
 
 
 _PARTS = {"vertex": b"v", "uv": b"vt", "normal": b"vn", "face": b"f"}

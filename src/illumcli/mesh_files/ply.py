@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from illumcli.mesh_files._color import unit_range
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._ply import Element, Lists, Table
-from illumcli.mesh_files._polygons import Ints, check_range, polygons, starts_of, strip
+from illumcli.mesh_files._polygons import Ints, RawMesh, check_range, checked_mesh, starts_of, strip
 from illumcli.mesh_files._text import Text
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
 from illumcli.records import Value
@@ -103,19 +103,16 @@ def read(path: Path) -> Mesh:
     vertices = _stacked(vertex, ("x", "y", "z"))
     corners, counts, wedges = _polygons(file, len(vertices))
     _refuse_words(file, vertices, corners)
-    more: dict[str, Any] = {}
+    raw = RawMesh(vertices, corners, counts)
     if _has(vertex, _NORMAL):
-        more.update(normals=_stacked(vertex, _NORMAL), corner_normals=corners)
+        raw = replace(raw, normals=_stacked(vertex, _NORMAL), corner_normals=corners)
     if wedges is not None:
-        more.update(uvs=wedges, corner_uvs=np.arange(len(corners)))
+        raw = replace(raw, uvs=wedges, corner_uvs=np.arange(len(corners)))
     elif pair := next((pair for pair in _UV if _has(vertex, pair)), None):
-        more.update(uvs=_stacked(vertex, pair), corner_uvs=corners)
-    more.update(_materials(file, "uvs" in more, len(counts)))
+        raw = replace(raw, uvs=_stacked(vertex, pair), corner_uvs=corners)
+    raw = _with_materials(file, raw)
     _count_what_is_left_out(file)
-    attributes = _attributes(file)
-    return polygons(
-        path, vertices, corners, counts, attributes=attributes, repairs=repairs, place=file.place, **more
-    )
+    return checked_mesh(path, replace(raw, attributes=_attributes(file), repairs=repairs), file.place)
 
 
 def companions(path: Path) -> list[Path]:
@@ -196,12 +193,12 @@ def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints
     return indices, lists_of_corners.counts
 
 
-def _materials(file: _File, has_uv: bool, count: int) -> dict[str, Any]:
-    """The fields of a mesh for the images that the header names."""
+def _with_materials(file: _File, raw: RawMesh) -> RawMesh:
+    """The mesh with materials of the images that the header names."""
     path, materials = file.path, {}
-    if file.head.textures and not has_uv:
+    if file.head.textures and raw.uvs is None:
         note(file.repairs, "textures without coordinates left out", f":{file.head.textures[0][1]}")
-        return {}
+        return raw
     for name, line in file.head.textures:
         image, matter = nearby(path, name, path.parent)
         if matter:
@@ -209,14 +206,15 @@ def _materials(file: _File, has_uv: bool, count: int) -> dict[str, Any]:
         diffuse = {} if image is None else {"diffuse": {"texture": str(image)}}
         materials[name] = {"model": "lambert", **diffuse}
     if not any("diffuse" in each for each in materials.values()):
-        return {}
+        return raw
     names = list(materials)
     by_number = np.array([names.index(name) for name, _ in file.head.textures])
+    count = len(raw.counts)
     number = file.tables.get("face", {}).get("texnumber", np.zeros(count))
     chosen = np.zeros(count, np.int64)
     if isinstance(number, np.ndarray):  # strips have the first image
         chosen[: len(number)] = np.where((number >= 0) & (number < len(by_number)), number, 0)
-    return {"material_names": tuple(names), "materials": materials, "polygon_materials": by_number[chosen]}
+    return replace(raw, material_names=tuple(names), materials=materials, polygon_materials=by_number[chosen])
 
 
 def _count_what_is_left_out(file: _File) -> None:

@@ -23,7 +23,7 @@ from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files._files import content
-from illumcli.mesh_files._polygons import polygons
+from illumcli.mesh_files._polygons import RawMesh, checked_mesh
 from illumcli.mesh_files._text import Text, keyword
 
 _HEADER = 84  # bytes before the first binary facet: 80 of any content, then the count
@@ -75,7 +75,7 @@ def _binary(path: Path, data: bytes, announced: int) -> Mesh:
         note(repairs, "colours of facets left out", first, int(np.count_nonzero(colored)))
     vertices = facets["vertices"].reshape(-1, 3).astype(np.float64)
     corners = np.arange(3 * count)
-    return polygons(path, vertices, corners, np.full(count, 3), repairs=repairs)
+    return checked_mesh(path, RawMesh(vertices, corners, np.full(count, 3), repairs=repairs))
 
 
 def _text(path: Path, data: bytes) -> Mesh:
@@ -117,14 +117,9 @@ def _text(path: Path, data: bytes) -> Mesh:
     vertices = values[first_numbers].reshape(-1, 3)
 
     parts = {"vertex": block.lines, "face": starts}
-    return polygons(
-        path,
-        vertices,
-        np.arange(len(vertices)),
-        np.bincount(loop, minlength=len(starts)),
-        repairs=repairs,
-        place=lambda part, n: f":{text.number(int(parts[part][n]))}",
-    )
+    counts = np.bincount(loop, minlength=len(starts))
+    raw = RawMesh(vertices, np.arange(len(vertices)), counts, repairs=repairs)
+    return checked_mesh(path, raw, lambda part, n: f":{text.number(int(parts[part][n]))}")
 
 
 def _statements_as_lines(data: bytes) -> bytes:

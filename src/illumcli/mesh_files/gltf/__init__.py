@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.mesh_files._companions import files_named
-from illumcli.mesh_files._polygons import Ints, polygons, starts_of
+from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh, starts_of
 from illumcli.mesh_files.gltf.document import Document, open_document, printable
 from illumcli.mesh_files.gltf.materials import Library
 from illumcli.mesh_files.gltf.primitives import Part, parts
@@ -62,8 +62,7 @@ def read(path: Path) -> Mesh:
     library = Library(document, primitives)
     material_names, materials = _numbered([library.name(part) for part in primitives])
     group_names, groups = _numbered([part.group for part in primitives])
-    return polygons(
-        path,
+    raw = RawMesh(
         np.concatenate([np.empty((0, 3)), *(part.vertices for part in primitives)]),
         corners,
         np.full(len(corners) // 3, 3),
@@ -81,8 +80,9 @@ def read(path: Path) -> Mesh:
         substitutes=library.substitutes,
         material_repairs=library.repairs,
         repairs=document.repairs,
-        place=partial(_place, primitives, firsts, starts_of(np.array(counts)).tolist()),
     )
+    place = partial(_place, primitives, firsts, starts_of(np.array(counts)).tolist())
+    return checked_mesh(path, raw, place)
 
 
 def companions(path: Path) -> list[Path]:

@@ -37,7 +37,7 @@ def error_recipes(
     samples: Sequence[int],
     given: Sequence[str],
 ) -> dict[str, Node]:
-    """The extra nodes of the layer `error`: a copy of every node from `samples` to `beauty`.
+    """The extra nodes of the layer `error`: a copy of every node from `samples` to the luminance of `beauty`.
 
     Parameters
     ----------
@@ -49,12 +49,13 @@ def error_recipes(
     given : names
         Buffers that need no recipe.
     """
-    steps = topological_order(book, ["beauty"], given)
+    picture = Node.of(partial(luminance, background or (0.0, 0.0, 0.0)), "luminance")
+    steps = topological_order({**book, "luminance": picture}, ["luminance"], given)
     traced = "obscurance_draws" in {step.output for step in steps}
     if max(samples) == 1 and not traced:
         return {"error": Node.of(no_error, "error")}
     copied = {"samples"}
-    made = [Node.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
+    made = [picture, Node.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
     for step in steps:
         if copied.isdisjoint(step.inputs.values()):
             continue
@@ -62,9 +63,8 @@ def error_recipes(
         needs = {p: f"{AGAIN}{need}" if need in copied else need for p, need in step.inputs.items()}
         function = partial(doubled_draws, seed) if step.output == "obscurance_draws" else step.function
         made.append(Node(f"{AGAIN}{step.output}", function, needs))
-    two = {f"{which}_{what}": f"{prefix}{what}" for which, prefix in (("first", ""), ("second", AGAIN))
-           for what in ("samples", "hits", "beauty")}  # fmt: skip
-    made.append(Node.of(partial(standard_error, background or (0.0, 0.0, 0.0)), "error", **two))
+    again = {"doubled": f"{AGAIN}samples", "second": f"{AGAIN}luminance"}
+    made.append(Node.of(standard_error, "error", first="luminance", **again))
     return {recipe.output: recipe for recipe in made}
 
 
@@ -119,24 +119,21 @@ def no_error(tile: Tile) -> Floats:
 
 
 def standard_error(
-    background: tuple[float, float, float],
-    view: View,
-    tile: Tile,
-    first_samples: Samples,
-    first_hits: Hits,
-    first_beauty: Vectors,
-    second_samples: Samples,
-    second_hits: Hits,
-    second_beauty: Vectors,
+    view: View, tile: Tile, doubled: Samples, first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> Floats:
     """(P,) float32 standard error of the luminance of every pixel, the same all over a block.
 
     The tile begins at a block's corner and ends at one or at the film's edge. Cells that the edge cuts have
     fewer pixels to draw from, and weigh less.
+
+    Parameters
+    ----------
+    doubled
+        The samples of the second picture.
+    first, second : (P,), (D,)
+        Luminance of the tile's pixels, and of the doubled ones as rendered the second time.
     """
-    first = luminance(background, first_samples, first_hits, first_beauty)
-    second = luminance(background, second_samples, second_hits, second_beauty)
-    x, y = second_samples.x, second_samples.y
+    x, y = doubled.x, doubled.y
     half = np.square(first[(y - tile.y) * tile.width + x - tile.x] - second) / 2
     wide, high = _cell(view, x, y)
     weight = wide * high

@@ -152,7 +152,7 @@ assert expected[0] == 0, expected
 number = first
 while True:
     code, text, report, found = tried(number)
-    if code >= 0 and int(report) < number:
+    if code >= 0 and report and int(report) < number:
         break
     print(json.dumps([number, code, text, report if code < 0 else "", found == expected[3],
                       all(expected[3].get(name) == digest for name, digest in found.items())]), flush=True)
@@ -164,6 +164,12 @@ NOBODY = (
 """Libraries through which others end a process."""
 ENDING = {"SIGABRT": ("_pydantic_core", "libembree"), "SIGSEGV": ("_multiarray_umath", "libOpenImageIO")}
 """Libraries that are known to end a process, and how."""
+
+LOADER = "cannot allocate memory for thread-local data: ABORT\n"
+"""What the C library prints before it ends a process with exit code 127."""
+
+UNKNOWN_TO_EMBREE = "Embree could not build its tree: error 1\n"
+"""Embree reports some allocations that fail as an error that it does not know: exit 1."""
 
 OPENEXR = re.compile(r"<\w+>: \(EXR_ERR_")
 """A line that OpenEXR prints by itself."""
@@ -188,6 +194,10 @@ class Tally:
             return f"{name} in {library.partition('.')[0]}" if library.startswith(ENDING[name]) else "fault"
         if code == 0 and is_all and "Traceback" not in text:
             return "finished"
+        if (code, text) == (127, LOADER):
+            return "exit 127 in the C library"
+        if (code, text) == (1, UNKNOWN_TO_EMBREE):
+            return "exit 1, unknown to Embree"
         lines = [line for line in text.splitlines() if not OPENEXR.match(line)]
         if code in (4, 5) and len(lines) == 1:
             return f"exit {code}"

@@ -17,6 +17,7 @@ from illumcli.commands.render import render_scene
 from illumcli.commands.sweep import sweep_scene
 from illumcli.geometry.bounds import object_bounds
 from illumcli.geometry.mesh import Mesh
+from illumcli.images.reader import read_image
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
 from illumcli.render_graph.culling import why_all
@@ -24,7 +25,7 @@ from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
-from illumcli.scene.variants import variants_of
+from illumcli.scene.variants import Variant, variants_of
 from illumcli.visibility.culling import (
     GROUPED_BOXES,
     LARGE_BOXES,
@@ -180,6 +181,27 @@ def test_a_sweep_shares_what_remains(scene, tmp_path, monkeypatch):
     rays = [sum(outcome.report.rays.values()) for outcome in done.outcomes]
     assert rays[0] > 0
     assert rays[1:] == [0, 0]
+
+
+def test_a_moving_camera_shares_the_geometry_of_what_any_variant_saw(scene, tmp_path, monkeypatch):
+    """The eye turns from one ball to another and back: each is triangulated once it is seen, and stays."""
+    monkeypatch.chdir(tmp_path)
+    targets = "[0, 0.4, 0]", "[6, 0.5, 3]", "[0, 0.4, 0]", "[6, 0.5, 3]"
+    options = RenderOptions(pattern="{film.exposure}.exr", cache=False)
+    rows = [{"camera.target": target, "film.exposure": str(k)} for k, target in enumerate(targets)]
+    done = sweep_scene(scene, [Variant(row) for row in rows], options)
+    reused = [
+        {"geometry", "tracer"} <= next(iter(outcome.report.reused.values())).keys()
+        for outcome in done.outcomes
+    ]
+    assert reused == [False, False, True, True]
+    for row in rows:
+        overrides = tuple(f"{path}={value}" for path, value in row.items())
+        single = RenderOptions(overrides, pattern="single.exr", cache=False, force=True)
+        render_scene(RenderJob(scene, single))
+        swept = read_image(tmp_path / f"{row['film.exposure']}.exr").channels
+        for name, values in read_image(tmp_path / "single.exr").channels.items():
+            np.testing.assert_array_equal(values, swept[name])
 
 
 def test_the_plan_tells_them_once_their_boxes_are_known(scene, tmp_path, monkeypatch):

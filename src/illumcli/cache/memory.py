@@ -25,6 +25,8 @@ class MemoryCache:
         self.limit = limit
         self.once: dict[str, Any] = {}
         """Buffers of the whole scene."""
+        self.needed: frozenset[int] = frozenset()
+        """Numbers of the objects that some variant so far needed."""
         self._tiles: dict[str, dict[Tile, Any]] = {}
         self._complete: set[str] = set()
         self._bytes = 0

@@ -103,7 +103,8 @@ def without_polygons(mesh: Mesh) -> Mesh:
 
 def without_culled(culled: Collection[int], meshes: Sequence[Mesh]) -> tuple[Mesh, ...]:
     """The meshes, those of culled objects (by number) without their polygons."""
-    return tuple(without_polygons(mesh) if number in culled else mesh for number, mesh in enumerate(meshes))
+    gone = frozenset(culled)
+    return tuple(without_polygons(mesh) if number in gone else mesh for number, mesh in enumerate(meshes))
 
 
 def bounds_of(transforms: Sequence[Any], meshes: Sequence[Mesh]) -> ObjectBounds:

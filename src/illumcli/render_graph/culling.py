@@ -95,9 +95,21 @@ def unaffecting(graph: Graph, outputs: Sequence[Layer], bounds: Bounds) -> tuple
     return tuple(int(number) for number in np.flatnonzero(culled))
 
 
-def cull(graph: Graph, outputs: Sequence[Layer], bounds: Bounds | None) -> Graph:
-    """The graph without the polygons of objects that change no view."""
-    return graph if bounds is None else without_objects(graph, unaffecting(graph, outputs, bounds))
+def cull(
+    graph: Graph, outputs: Sequence[Layer], bounds: Bounds | None, needed: Collection[int] = frozenset()
+) -> Graph:
+    """The graph without the polygons of objects that change no view.
+
+    Parameters
+    ----------
+    needed : collection of int
+        Numbers of objects that stay all the same: those that a variant before needed. Were each variant to
+        leave out others, none would find the geometry of another.
+    """
+    if bounds is None:
+        return graph
+    culled = unaffecting(graph, outputs, bounds)
+    return without_objects(graph, tuple(number for number in culled if number not in needed))
 
 
 def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
@@ -114,7 +126,8 @@ def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
         if name in ("object_bounds", "implied_widths") or name.startswith("camera:"):
             nodes[name] = replace(node, inputs={**node.inputs, "meshes": "every_mesh"})
     bound: Any = nodes["baked"].function
-    kept = tuple((name, None if k in numbers else file) for k, (name, file) in enumerate(bound.args[0]))
+    gone = frozenset(numbers)
+    kept = tuple((name, None if k in gone else file) for k, (name, file) in enumerate(bound.args[0]))
     nodes["baked"] = replace(nodes["baked"], function=partial(bound.func, kept))
     known = dict(graph.known)
     if "meshes" in known:

@@ -22,9 +22,12 @@ def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached
     """
     graph = place_cameras(graph, run, only_cached)
     graph, bounds = find_bounds(graph, outputs, run, only_cached)
+    memory = run.cache.memory
+    graph = cull(graph, outputs, bounds, frozenset() if memory is None else memory.needed)
+    if memory is not None:
+        memory.needed |= set(range(len(graph.scene.objects))).difference(graph.culled)
     if bounds is None:
         return graph
-    graph = cull(graph, outputs, bounds)
     polygons = int(bounds.objects.polygons[list(graph.culled)].sum())
     if polygons:
         run.stats.add({}, {}, {"polygons": polygons})

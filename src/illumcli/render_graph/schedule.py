@@ -127,14 +127,15 @@ def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> fro
     both compute once: kept in memory, they let the second skip everything upstream of them."""
     shared: set[str] = set()
     for view in following.views:
+        plan = schedule(following, outputs, view)
+        second = Keys(following.nodes, view, code())
+        shared |= {second(name) for name in ("implied_widths", *(node.output for node in plan.once))}
         if view not in graph.views:
             continue
-        plan = schedule(following, outputs, view)
-        first, second = (Keys(each.nodes, view, code()) for each in (graph, following))
+        first = Keys(graph.nodes, view, code())
         common = {node.output for node in plan.tile if node.output in graph.nodes}
         common = {name for name in common if first(name) == second(name)}
         read = {name for node in plan.tile if node.output not in common for name in node.inputs.values()}
         read |= {layer.buffer for layer in outputs} | COVERAGE
         shared |= {second(name) for name in common & read}
-        shared |= {second(name) for name in ("implied_widths", *(node.output for node in plan.once))}
     return frozenset(shared)

@@ -17,6 +17,7 @@ SCRIPTS = {
     "stages": "beside the job",
     "threads": "what the machine gives",
     "scaling": "peak [MiB]",
+    "growth": "exponent time",
     "memory": "cpu per pixel",
     "replay": "ratio whole / rays alone",
     "adaptive": "samples spared",

@@ -16,7 +16,7 @@ from illumcli.rays.camera import MARGIN
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 from illumcli.scene.studio import ROTATIONS
-from illumcli.shading.materials import as_meant
+from illumcli.shading.materials import as_intended
 
 SMALL = ["film={width: 80, height: 45, samples: 1}"]
 BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -304,7 +304,7 @@ def test_a_highlight_of_mtl_has_the_middle_it_says(exponent):
     mtl = BlinnPhong.model_validate({"model": "blinn_phong", "specular": [0.2, 0.5, 1], "exponent": exponent})
     n_l, gap = np.ones(1), np.zeros(1)
     np.testing.assert_allclose(
-        np.pi * as_meant(mtl).specular_lobe(n_l, gap), mtl.specular_lobe(n_l, gap), rtol=1e-12
+        np.pi * as_intended(mtl).specular_lobe(n_l, gap), mtl.specular_lobe(n_l, gap), rtol=1e-12
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from illumcli.arrays import column_major, dot, unit
-from illumcli.shading.terms import TERMS, evaluate, steps
+from illumcli.shading.terms import TERMS, evaluate, ordered_terms
 
 Case = dict[str, Any]
 
@@ -53,8 +53,8 @@ def term() -> Callable[..., Any]:
 
     def value(name: str, **given: np.ndarray) -> np.ndarray:
         buffers = dict(given)
-        for recipe in steps((name,), tuple(given)):
-            buffers[recipe.output] = recipe.run(buffers)
+        for node in ordered_terms((name,), tuple(given)):
+            buffers[node.output] = node.run(buffers)
         assert name in TERMS
         return buffers[name]
 

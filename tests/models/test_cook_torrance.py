@@ -56,10 +56,10 @@ def test_weights_share_one_unless_both_are_given(respond):
 
 
 def test_only_a_literal_color_shift_asks_for_the_light():
-    from illumcli.shading.terms import words
+    from illumcli.shading.terms import given_terms
 
-    assert "light" not in words(CookTorrance(fresnel={"F": "shifted"}).lobes())
-    assert "light" in words(CookTorrance(fresnel={"F": "shifted", "grazing": "light"}).lobes())
+    assert "light" not in given_terms(CookTorrance(fresnel={"F": "shifted"}).lobes())
+    assert "light" in given_terms(CookTorrance(fresnel={"F": "shifted", "grazing": "light"}).lobes())
 
 
 def test_roughness_may_vary_over_the_surface(respond):

@@ -12,13 +12,13 @@ from illumcli.graph import topological_order
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.lambert import Lambert
 from illumcli.models.ward import Ward
-from illumcli.shading.terms import GIVEN, TERMS, evaluate, steps, words
+from illumcli.shading.terms import GIVEN, TERMS, evaluate, given_terms, ordered_terms
 
 
 def term(name, **given):
     buffers = dict(given)
-    for recipe in steps((name,), tuple(given)):
-        buffers[recipe.output] = recipe.run(buffers)
+    for node in ordered_terms((name,), tuple(given)):
+        buffers[node.output] = node.run(buffers)
     return buffers[name]
 
 
@@ -27,13 +27,13 @@ def test_every_term_stands_on_given_words():
 
 
 def test_models_reach_only_the_words_they_need():
-    assert words(Lambert().lobes()) == {"n", "l"}
-    assert words(CookTorrance().lobes()) == {"n", "l", "v"}
-    assert words(Ward().lobes()) == {"n", "l", "v", "t"}
+    assert given_terms(Lambert().lobes()) == {"n", "l"}
+    assert given_terms(CookTorrance().lobes()) == {"n", "l", "v"}
+    assert given_terms(Ward().lobes()) == {"n", "l", "v", "t"}
 
 
 def test_terms_that_lobes_share_are_formed_once():
-    formed = [step.output for step in steps(("n_l", "n_v", "s_s", "v_h", "n_h", "sin2_h"))]
+    formed = [step.output for step in ordered_terms(("n_l", "n_v", "s_s", "v_h", "n_h", "sin2_h"))]
     assert len(formed) == len(set(formed))
 
 

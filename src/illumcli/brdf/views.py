@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, column_major, cross, dot, unit
 from illumcli.models._base import IlluminationModel
-from illumcli.shading.terms import evaluate, words
+from illumcli.shading.terms import evaluate, given_terms
 
 Doubles = NDArray[np.float64]
 
@@ -37,8 +37,10 @@ def values(
     if not (lit.size and lobes):
         return out
     vectors = {"n": n, "l": l, "v": v, "t": t}
-    given: dict[str, Any] = {word: column_major(vectors[word][lit]) for word in words(lobes) & vectors.keys()}
-    if "light" in words(lobes):
+    given: dict[str, Any] = {
+        word: column_major(vectors[word][lit]) for word in given_terms(lobes) & vectors.keys()
+    }
+    if "light" in given_terms(lobes):
         given["light"] = np.ones(3)
     out[lit] = sum(evaluate(lobes, given).values())
     if not times_cos:

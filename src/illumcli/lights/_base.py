@@ -1,4 +1,4 @@
-"""What every light is: a colour, a name, and the light it sends to points if nothing stands between."""
+"""Base of all lights: a colour, a name, and the light that is incident at points if nothing occludes it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from illumcli.schema.description import Description
 from illumcli.schema.fields import Name
 
 NEAREST = 1e-6
-"""Distances to a light are never taken below this share of the scene's radius: 1/d^2 stays finite."""
+"""Least distance to a light [radii]: 1/d^2 stays finite."""
 
 
 class LightSample(Record):
-    """Light arriving at N points if nothing stood between."""
+    """Light incident at N points if nothing occludes it."""
 
     l: Vectors  # (N, 3) unit, from the point to the light
     distance: Floats  # (N,) to the light in radii of the scene, inf for a light at infinity
@@ -40,7 +40,7 @@ class Light(Description):
         return getattr(self, self.emission_field)
 
     def without_color(self) -> Self:
-        """This light with neither colour nor name: all that `sample_at` depends on."""
+        """This light without colour, name and shadows: only what `sample_at` depends on."""
         return self.model_copy(update={self.emission_field: (1.0, 1.0, 1.0), "name": None, "shadows": True})
 
     def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
@@ -51,8 +51,8 @@ class Light(Description):
 def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Floats]:
     """Unit vectors from (N, 3) positions to a light at (3,), and its distances, both in radii.
 
-    A light further than 10^4 radii is reached in float64, where neither the difference nor its square
-    loses anything; nearer ones in the precision of the positions.
+    For lights farther than 10^4 radii the difference and its square are computed in float64, where they lose
+    nothing; for nearer lights in the precision of the positions.
     """
     far = np.abs(light).max() > 1e4
     offset = column_major(light.astype(np.float64 if far else position.dtype) - position)

@@ -1,4 +1,4 @@
-"""Incident light at shading points, occlusion left out: which points a light can reach, and what arrives."""
+"""Incident light at shading points, without occlusion: which points a light can reach, and its irradiance."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from illumcli.render_space import RenderSpace
 
 
 class LitPoints(Record):
-    """The points that a light reaches if nothing stands between, and what arrives there."""
+    """The points that a light reaches if nothing occludes it, with the incident light there."""
 
-    index: Ids  # (K,) which of the points, ascending: those with n.l > 0 and some light
+    index: Ids  # (K,) indices of the points, ascending: those with n.l > 0 and some light
     count: int  # of all points
     l: Vectors  # (K, 3) unit, to the light
     distance: Floats  # (K,) to the light, in radii
@@ -40,21 +40,21 @@ class Oriented(Placed, Protocol):
 
 
 def incident(light: Light, render_space: RenderSpace, points: Oriented) -> LitPoints:
-    """The points in the light's range that face it; neither shadow rays nor models see the others."""
+    """The points in the light's range that face it; at others no model is evaluated."""
     sample = light.sample_at(points.position, render_space)
     reached = (sample.irradiance_scale > 0) & (dot(points.n, sample.l) > 0)
     return _lit(sample, np.flatnonzero(reached))
 
 
 def shadow_candidates(light: Light, render_space: RenderSpace, interaction: Placed) -> LitPoints:
-    """The samples in the light's range, whichever way they face: a vertex that a sample interpolates may
-    face the light where the sample itself does not."""
+    """The samples in the light's range, facing it or not: a vertex that a sample is interpolated from may
+    face the light where the sample does not."""
     sample = light.sample_at(column_major(interaction.position, F), render_space)
     return _lit(sample, np.flatnonzero(sample.irradiance_scale > 0))
 
 
 def unshadowed(light: Light, render_space: RenderSpace, points: Oriented, shadow: Floats) -> LitPoints:
-    """The points that the light reaches and that are not in shadow, where points are samples.
+    """The lit points that are not in shadow; points must be samples.
 
     `shadow` alone decides: it is 0 where the light does not reach.
     """

@@ -13,7 +13,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.scene.spec import MeshFile, Scene, default_material
 from illumcli.schema.messages import suggestion
 from illumcli.shading.rates import RATES, Rate
-from illumcli.shading.terms import words
+from illumcli.shading.terms import given_terms
 from illumcli.shading.textures import paths
 
 
@@ -75,8 +75,8 @@ def reached_words(scene: Scene) -> frozenset[str]:
     models = candidates(scene)
     if models is None:  # libraries of meshes describe models that know of no tangent
         models = [*scene.materials.values(), *filter(None, map(scene.material_of, scene.objects))]
-        return frozenset(("n", "l", "v")).union(*(words(model.lobes()) for model in models))
-    return frozenset().union(*(words(model.lobes()) for model in models))
+        return frozenset(("n", "l", "v")).union(*(given_terms(model.lobes()) for model in models))
+    return frozenset().union(*(given_terms(model.lobes()) for model in models))
 
 
 def rates(scene: Scene) -> list[Rate]:

@@ -1,4 +1,4 @@
-"""Light that needs no lamp: emission, and the ambient light weighed by obscurance."""
+"""Light that no lamp of the scene sends: emission, and ambient light times obscurance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def emission(materials: PointMaterials, points: ShadingPoints) -> Vectors:
 def ambient(
     color: tuple[float, float, float], ambient_color: Vectors, obscurance: Floats | None = None
 ) -> Vectors:
-    """(M, 3) k_a I_a w; w is 1 where no obscurance is given."""
+    """(M, 3) k_a I_a w; w is 1 if no obscurance is given."""
     out = ambient_color * np.asarray(color, F)
     return out if obscurance is None else out * obscurance[:, None]
 
@@ -34,10 +34,10 @@ def coupled(
     irradiance: Vectors,
     obscurance: Floats | None = None,
 ) -> Vectors:
-    """(M, 3) (k_a I_a + direct) w + I_d, as one text prints it (Theoharis et al. 2008, eq. 12.75).
+    """(M, 3) (k_a I_a + direct) w + I_d, as printed by Theoharis et al. (2008), eq. 12.75.
 
-    `direct` is the material's response to all lights, `irradiance` (I_d) the light that arrives, its cosine
-    included; direct light counts twice, once with and once without the material.
+    `direct` is the material's response to all lights, `irradiance` (I_d) that of all lights on the surface.
+    Direct light therefore counts twice, once with and once without the material.
     """
     out = ambient_color * np.asarray(color, F) + direct
     return (out if obscurance is None else out * obscurance[:, None]) + irradiance

@@ -1,4 +1,4 @@
-"""One light: groups the lit points by material and asks each model for its response."""
+"""Direct light: the response of every material's model to each light, and the sums over lobes and lights."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from illumcli.arrays import F, Floats, Ids, Vectors, dot, take_or_all, take_rows
 from illumcli.lights._incident import LitPoints
 from illumcli.rays.interaction import Hits
 from illumcli.shading.rates import ShadingPoints
-from illumcli.shading.terms import evaluate, words
+from illumcli.shading.terms import evaluate, given_terms
 from illumcli.shading.textures import PointMaterials
 
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
-    """Which lanes have which number of 0..count-1: (number, lanes), only numbers that occur."""
+    """Indices by their number in 0..count-1: pairs (number, indices), only for numbers that occur."""
     if count == 1:
         return [(0, slice(None))] if len(number) else []
     if len(number) and (only := number.min()) == number.max():
         return [(int(only), slice(None))]
-    have = np.flatnonzero(np.bincount(number, minlength=count))
-    return [(int(k), np.flatnonzero(number == k).astype(np.int32)) for k in have]
+    present = np.flatnonzero(np.bincount(number, minlength=count))
+    return [(int(k), np.flatnonzero(number == k).astype(np.int32)) for k in present]
 
 
-def pick(values: NDArray[Any], lanes: Ids | slice) -> NDArray[Any]:
-    """Values of these lanes, without a copy where it is all of them."""
-    return values if isinstance(lanes, slice) else take_rows(values, lanes)
+def take_group(values: NDArray[Any], index: Ids | slice) -> NDArray[Any]:
+    """Values of a group of `groups`, not copied if the group is everything."""
+    return values if isinstance(index, slice) else take_rows(values, index)
 
 
 def direct(
@@ -39,14 +39,14 @@ def direct(
     v: Vectors | None = None,
     t: Vectors | None = None,
 ) -> dict[str, Vectors]:
-    """One light's response per lobe at the M samples, its shadow not applied.
+    """The response to one light at the M samples, lobe by lobe, without shadows.
 
     Parameters
     ----------
     color : (3,)
         Intensity or irradiance of the light.
     v, t : (E, 3) float32, optional
-        Unit vectors to the eye and tangents, where some model asks for them.
+        Unit vectors to the eye and tangents, if a model needs them.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def direct(
         `diffuse` and `specular`, (M, 3) float32, only lobes that some material has.
     """
     known = {"n": points.n, "v": v, "t": t}
-    given = {word: values for word, values in known.items() if values is not None}
+    given = {term: values for term, values in known.items() if values is not None}
     at_points = response(materials, incident, color, given)
     return {name: points.to_samples(value) for name, value in at_points.items()}
 
@@ -65,14 +65,14 @@ def response(
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
 ) -> dict[str, Vectors]:
-    """Light leaving towards the eye at every point, per lobe, shadows not yet applied.
+    """Radiance towards the eye at every point, lobe by lobe, without shadows.
 
-    A material without lobes is not evaluated.
+    Models are evaluated at lit points only, and materials without lobes nowhere.
 
     Parameters
     ----------
     given : mapping
-        (E, 3) words of the models at all points: `n`, and `v`, `t` where some model wants them.
+        (E, 3) vectors at all points: `n`, and `v` and `t` if a model needs them.
 
     Returns
     -------
@@ -83,41 +83,50 @@ def response(
     material, parameters = materials.number, materials.parameters
     names = sorted({name for each in lobes for name in each})
     count = len(incident.index)
-    made = {name: np.zeros((3, count + 1), F) for name in names}  # by material; the last is of unlit points
-    place = np.full(incident.count, count, np.intp)  # where each point's light is among them
-    power = np.asarray(color, F)
+
+    # Results in order of material, and one column of zeros, which points without light take theirs from.
+    by_material = {name: np.zeros((3, count + 1), F) for name in names}
+    column = np.full(incident.count, count, np.intp)  # of each point
+    light = np.asarray(color, F)
     first = 0
-    for number, lanes in groups(take_or_all(material, incident.index), len(models)):
+    for number, group in groups(take_or_all(material, incident.index), len(models)):
         if not lobes[number]:
             continue
-        at = pick(incident.index, lanes)
-        own = dict(lobes[number])
+
+        # The material's lobes, with its parameters at these points if they vary.
+        points = take_group(incident.index, group)
+        own_lobes = dict(lobes[number])
         if parameters is not None and parameters.of_material[number]:
-            own = parameters.model(models[number], number, at).lobes()
-        wanted = words(own)
-        here = {word: take_or_all(given[word], at) for word in wanted if word in given}
-        here["l"] = pick(incident.l, lanes)
-        if "light" in wanted:
-            here["light"] = power / max(power.max(), np.finfo(F).tiny)
-        arriving = power[:, None] * pick(incident.irradiance_scale, lanes)
-        last = first + len(at)
-        for name, value in evaluate(own, here).items():
-            np.multiply(value.T, arriving, out=made[name][:, first:last])
-        if len(at) == incident.count:
-            return {name: columns[:, :count].T for name, columns in made.items()}
-        place[at] = np.arange(first, last)
+            own_lobes = parameters.model(models[number], number, points).lobes()
+
+        # The given terms that they need.
+        needed = given_terms(own_lobes)
+        here = {term: take_or_all(given[term], points) for term in needed if term in given}
+        here["l"] = take_group(incident.l, group)
+        if "light" in needed:
+            here["light"] = light / max(light.max(), np.finfo(F).tiny)
+
+        # Response times irradiance.
+        irradiance = light[:, None] * take_group(incident.irradiance_scale, group)
+        last = first + len(points)
+        for name, value in evaluate(own_lobes, here).items():
+            np.multiply(value.T, irradiance, out=by_material[name][:, first:last])
+        if len(points) == incident.count:
+            return {name: columns[:, :count].T for name, columns in by_material.items()}
+        column[points] = np.arange(first, last)
         first = last
-    # gathered: to scatter them takes four times as long
-    return {name: take_rows(columns.T, place) for name, columns in made.items()}
+
+    # Back to the order of the points by a gather, which is four times as fast as scattering each group.
+    return {name: take_rows(columns.T, column) for name, columns in by_material.items()}
 
 
 def sum_lobes(hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
-    """(M, 3) one light: all its lobes, with its shadow."""
+    """(M, 3) all lobes of one light, shadowed."""
     return _shadowed(add(hits, **direct), shadow)
 
 
 def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
-    """(M, 3) one lobe of one light, with its shadow."""
+    """(M, 3) one lobe of one light, shadowed."""
     return _shadowed(direct[name] if name in direct else black(hits), shadow)
 
 
@@ -127,7 +136,7 @@ def irradiance(
     incident: LitPoints,
     shadow: Floats | None = None,
 ) -> Vectors:
-    """(M, 3) I_d of one light: what arrives on the surface, its cosine included."""
+    """(M, 3) I_d, the irradiance of one light on the surface, cosine included, shadowed."""
     out = np.zeros((incident.count, 3), F, order="F")
     cosine = dot(take_rows(points.n, incident.index), incident.l)
     out[incident.index] = (incident.irradiance_scale * cosine)[:, None] * np.asarray(color, F)
@@ -148,7 +157,7 @@ def add(hits: Hits, **parts: Vectors) -> Vectors:
 
 
 def black(hits: Hits) -> Vectors:
-    """(M, 3) no light."""
+    """(M, 3) zeros."""
     return np.zeros((len(hits.sample), 3), F, order="F")
 
 

@@ -1,4 +1,4 @@
-"""The grain of surfaces: tangents that brushed and grooved materials are turned by."""
+"""The grain of surfaces: tangents that orient anisotropic materials, such as brushed metal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Rings(Protocol):
 
 
 Grain: TypeAlias = tuple[float, float, float] | Rings
-"""A direction, or rings about an axis, in the object's own coordinates."""
+"""A direction, or circles about an axis, in object space."""
 
 
 def tangents(
@@ -34,22 +34,22 @@ def tangents(
     point_weights: CornerWeights | None = None,
     uv_tangents: CornerVectors | None = None,
 ) -> Vectors:
-    """(E, 3) float32 unit tangents: the grain of each object, or the direction in which u grows.
+    """(E, 3) float32 unit tangents: the grain of each object, or the direction of increasing u.
 
     Parameters
     ----------
     grains : sequence
-        Of each object; None where u directs it.
+        One for each object; None for the direction of increasing u.
     point_weights, uv_tangents : optional
-        Wanted where some object's grain is None.
+        Needed if some object's grain is None.
     """
-    # The direction of growing u, or zero.
+    # The direction of increasing u, or zero.
     if uv_tangents is None or point_weights is None:
         direction = np.zeros_like(points.n)
     else:
         direction = point_weights.interpolate(geometry, uv_tangents)
 
-    # In its place the grain of the objects that have one.
+    # Replace it on the objects that have a grain of their own.
     number = geometry.objects.take(points.triangle)
     for i, (grain, placed) in enumerate(zip(grains, geometry.placed, strict=True)):
         if grain is None or not (index := np.flatnonzero(number == i)).size:

@@ -1,4 +1,4 @@
-"""The materials of a scene's triangles, as numbers, and their parameters at points."""
+"""The materials of a scene: which triangle has which, by number, and the model of each."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from illumcli.rays.corner_weights import OnTriangles
 from illumcli.records import Record, Value
 
 Token: TypeAlias = tuple[str, ...]
-"""Which material it is, whatever its parameters are: `("material", name)` of the scene, `("object", name)` of
-one object, `("fallback", name)` of what its mesh has no material for, `("mesh", mesh, name)` of a mesh's own
-library, or `("default",)`; behind `"colors"` with vertex colours, behind `"meant"` as exporters mean it."""
+"""Identity of a material, independent of its parameters: `("material", name)` of the scene, `("object",
+name)` of one object, `("fallback", name)` for polygons of an object without a material, `("mesh", mesh,
+name)` from a mesh file's library, or `("default",)`. A leading `"colors"` adds vertex colours, a leading
+`"intended"` applies `as_intended`."""
 
 DEFAULT: Token = ("default",)
 
 
 class Numbering(Record):
-    """The material numbers of every object or, where meshes select several, triangle."""
+    """The material number of every object or, if a mesh has several materials, of every triangle."""
 
     tokens: tuple[Token, ...]  # by number
     of_object: NDArray[np.int32]  # (O,) material number
-    of_triangle: NDArray[np.int32] | None = None  # (T,) where it differs within objects
+    of_triangle: NDArray[np.int32] | None = None  # (T,) material number; None if no object has several
 
     def number(self, geometry: SceneGeometry, triangle: Ids) -> Ids:
         """(N,) material number of each triangle."""
@@ -52,14 +53,14 @@ def material_id(geometry: SceneGeometry, numbering: Numbering, hits: OnTriangles
 
 
 class Choice(Value):
-    """What decides about the materials of an object."""
+    """How the materials of an object are chosen."""
 
     own: Token | None
-    """The object's material; None where its mesh selects materials by name."""
+    """The object's material; None if its mesh selects materials by name."""
     library: str | None = None
-    """Name of the mesh where its file's own materials and vertex colours are imported."""
+    """Name of the mesh, if the materials and vertex colours of its file are imported."""
     fallback: Token | None = None
-    """For polygons without a material; where it is given, no material of the scene is selected by name."""
+    """For polygons without a material. If it is given, the mesh selects none of the scene's materials."""
 
     def token(self, mesh: Mesh, name: str | None, named: Collection[str]) -> Token:
         """The material of polygons for which the mesh selects `name`, or nothing."""
@@ -69,7 +70,7 @@ class Choice(Value):
             return "material", str(name)
         if self.library is not None and name in mesh.materials:
             token: Token = ("mesh", self.library, str(name))
-            token = token if self.fallback is None else ("meant", *token)
+            token = token if self.fallback is None else ("intended", *token)
         else:
             token = self.fallback or DEFAULT
         colors = mesh.attributes.get("color") if self.library is not None else None
@@ -79,15 +80,16 @@ class Choice(Value):
 
 
 def numbering(choices: Sequence[Choice], named: Collection[str], geometry: SceneGeometry) -> Numbering:
-    """Numbers the materials of all objects.
+    """Number the materials of all objects.
 
     Parameters
     ----------
     choices : sequence
-        Per object.
+        One for each object.
     named : collection of str
-        The scene's materials, which a mesh file selects by name.
+        Names of the scene's materials, which a mesh file may select.
     """
+    # Number the materials of each object; where a mesh selects several, those of its triangles.
     tokens: dict[Token, int] = {}
     of_object = np.zeros(len(choices), np.int32)
     of_triangle = np.zeros(len(geometry.triangles), np.int32)
@@ -95,17 +97,19 @@ def numbering(choices: Sequence[Choice], named: Collection[str], geometry: Scene
     for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
         mesh = placed.mesh
         names = (None, *mesh.material_names) if choice.own is None else (None,)
-        found = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
+        numbers = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
         if len(names) == 1:
-            of_object[i] = found[0]
+            of_object[i] = numbers[0]
             continue
         several = True
         selected = (
             mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
         )
-        mine = geometry.objects == i
-        polygon = geometry.polygons[mine] - placed.first_polygon
-        of_triangle[mine] = np.asarray(found, np.int32).take(selected.take(polygon) + 1)
+        of_this_object = geometry.objects == i
+        polygon = geometry.polygons[of_this_object] - placed.first_polygon
+        of_triangle[of_this_object] = np.asarray(numbers, np.int32).take(selected.take(polygon) + 1)
+
+    # If any object has several, fill in the triangles of the others.
     if several:
         for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
             if choice.own is not None or not placed.mesh.material_names:
@@ -114,19 +118,20 @@ def numbering(choices: Sequence[Choice], named: Collection[str], geometry: Scene
 
 
 class Materials(Record):
-    """Models by number."""
+    """The scene's materials by number."""
 
     models: tuple[IlluminationModel, ...]
     names: tuple[str, ...]
     numbering: Numbering
     lobes: tuple[Mapping[str, Any], ...]
     repairs: Repairs = field(default_factory=dict)
-    """What of the meshes' own libraries is not as their files say."""
+    """Deviations from the material libraries of mesh files."""
     substitutes: tuple[Mapping[str, Substitute] | None, ...] = ()
-    """By number, of materials of a mesh's own library: what stands in for textures that cannot be used."""
+    """By number, for materials of a mesh file's library: values that replace unusable textures."""
 
     def substitute(self, number: int, path: str) -> Substitute | None:
-        """What stands in for the texture of a parameter; None where it must be usable, as a scene's must."""
+        """The value that replaces a parameter's texture if that is unusable; None for materials of the scene,
+        whose textures must be usable."""
         own = self.substitutes[number] if self.substitutes else None
         return None if own is None else own.get(path, Substitute((1.0, 1.0, 1.0)))
 
@@ -138,16 +143,15 @@ class Materials(Record):
 def materials(
     numbering: Numbering, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Mesh]
 ) -> Materials:
-    """The materials that are numbered.
+    """The model of every numbered material.
 
     Parameters
     ----------
     known : mapping
-        Those of the scene, its objects and the default.
+        The materials of the scene and its objects, and the default.
     libraries : mapping
-        Mesh by name, those whose own library is used.
+        The meshes by name whose file's library is used.
     """
-
     models = tuple(_model_of(token, known, libraries) for token in numbering.tokens)
     imported = [own if own[0] == "mesh" else None for own in map(origin, numbering.tokens)]
     substitutes = [None if own is None else _substitutes(libraries[own[1]], own) for own in imported]
@@ -161,35 +165,34 @@ def materials(
 def _model_of(
     token: Token, known: Mapping[Token, IlluminationModel], libraries: Mapping[str, Mesh]
 ) -> IlluminationModel:
-    """The material of a token."""
+    """The model of a material."""
     match token:
         case "colors", *own:
             return with_vertex_colors(_model_of(tuple(own), known, libraries), origin(token)[0] == "mesh")
-        case "meant", *own:
-            return as_meant(_model_of(tuple(own), known, libraries))
+        case "intended", *own:
+            return as_intended(_model_of(tuple(own), known, libraries))
         case "mesh", library, name:
             return imported_model(libraries[library].materials[name], Path(library).parent)
     return known[token]
 
 
 def _substitutes(mesh: Mesh, token: Token) -> dict[str, Substitute]:
-    """What stands in for textures of a material of the mesh's library, with places by the mesh's path."""
+    """Values that replace unusable textures of a material of the mesh's library, with the mesh's path."""
     own = mesh.substitutes.get(token[2], {})
     return {key: Substitute(each.value, path_of(each.first, token[1])) for key, each in own.items()}
 
 
 def origin(token: Token) -> Token:
-    """The token without what stands before it."""
-    return origin(token[1:]) if token[0] in ("colors", "meant") else token
+    """The token without leading `"colors"` and `"intended"`."""
+    return origin(token[1:]) if token[0] in ("colors", "intended") else token
 
 
-def as_meant(model: IlluminationModel) -> IlluminationModel:
-    """A material of a mesh's own library, without what exporters write that know nothing of it.
+def as_intended(model: IlluminationModel) -> IlluminationModel:
+    """A material of a mesh file's library, with the placeholder values that exporters write replaced.
 
-    Their ambient colour is most often all white or all black: light from everywhere leaves by the diffuse
-    colour instead, where there is one. An exponent of 0 stands for no highlight, not for one all over. The
-    intensities of MTL are taken for shares of the light, as all other formats have them: over pi, and so the
-    middle of a highlight.
+    Exporters mostly write an ambient colour of white or black: the diffuse colour replaces it, if there is
+    one. An exponent of 0 means no highlight, not a highlight everywhere. The intensities of MTL are taken as
+    reflectances, as in all other formats: divided by pi, and the peak of a highlight likewise.
     """
     changes: dict[str, Any] = {}
     if model.ambient is not None and model.diffuse_color() != (0.0, 0.0, 0.0):
@@ -197,14 +200,14 @@ def as_meant(model: IlluminationModel) -> IlluminationModel:
     own = dict(model)
     if own["model"] == "blinn_phong" and not own["normalised"]:
         e, specular = own["exponent"], own["specular"]
-        middle = (e + 2) * (e + 4) / (8 * (e + 2.0 ** (-e / 2)))  # pi times models.blinn_phong's C
-        share = 1 / middle if e > 0 else 0.0
-        changes |= {"normalised": True, "specular": tuple(share * each for each in specular)}
+        peak = (e + 2) * (e + 4) / (8 * (e + 2.0 ** (-e / 2)))  # pi times models.blinn_phong's C
+        factor = 1 / peak if e > 0 else 0.0
+        changes |= {"normalised": True, "specular": tuple(factor * each for each in specular)}
     return model.model_copy(update=changes) if changes else model
 
 
 def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> IlluminationModel:
-    """The model with vertex colours in place of a diffuse colour that does not vary, or times that colour."""
+    """The model with vertex colours instead of its constant diffuse colour, or times it if `is_factor`."""
     if "diffuse" not in type(model).model_fields or "diffuse" in model.varying():
         return model
     own = dict(model)["diffuse"] if is_factor else (1.0, 1.0, 1.0)
@@ -214,7 +217,7 @@ def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> Illuminatio
 
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:
-    """A model from the keys that a mesh file's own library gives; `folder` is that of the mesh."""
+    """A model from the keys of a mesh file's library; `folder` is that of the mesh."""
     from illumcli.schema.families import member
 
     keys = textures_at(description, lambda path: str(folder / path))
@@ -222,7 +225,7 @@ def imported_model(description: Mapping[str, Any], folder: Path) -> Illumination
 
 
 def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> dict[str, Any]:
-    """The keys of a material, or of a part of one, the path of each texture in them as `place` has it."""
+    """The keys of a material, or of a part of one, with ``place(path)`` for the path of each texture."""
     return {
         key: place(value)
         if key == "texture"
@@ -234,6 +237,6 @@ def textures_at(description: Mapping[str, Any], place: Callable[[str], str]) -> 
 
 
 def colors_at(table: Sequence[Any], material: Ids) -> Vectors:
-    """(N, 3) float32 the colour of each lane's material; black where it is something that varies."""
+    """(N, 3) float32 colour of each point's material; black where the colour varies over the surface."""
     known = [color if isinstance(color, tuple) else (0.0, 0.0, 0.0) for color in table]
     return take_rows(np.asfortranarray(np.asarray(known, F).reshape(-1, 3)), material)

@@ -1,7 +1,7 @@
-"""Shading rates: where a model is evaluated, and how its values come back to the samples.
+"""Shading rates: where models are evaluated, and how the samples get their values from there.
 
-constant   once per polygon seen, with the polygon's own normal
-gouraud    once per vertex seen, intensities interpolated (Gouraud 1971)
+constant   once per visible polygon, with the polygon's normal
+gouraud    once per vertex of a visible polygon, intensities interpolated (Gouraud 1971)
 phong      once per sample, normals interpolated linearly (Phong 1975)
 quadratic  once per sample, normals interpolated quadratically (van Overveld and Wyvill 1997)
 
@@ -49,11 +49,11 @@ class Gather(Record):
 
 
 class Barycentric(Record):
-    """Each sample takes the mean of the points at its polygon's corners, by their weights."""
+    """Each sample takes the weighted mean of the points at its polygon's corners."""
 
     weights: CornerWeights
-    first: Mapping[Corners, NDArray[np.int64]]  # group -> (m,) the point of each hit's corner 0
-    step: Mapping[Corners, int]  # group -> how many points further that of the next corner is
+    first: Mapping[Corners, NDArray[np.int64]]  # group -> (m,) index of the point at each hit's corner 0
+    step: Mapping[Corners, int]  # group -> difference of the indices of consecutive corners
 
     def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
         return self.weights.weighted_mean(
@@ -62,10 +62,10 @@ class Barycentric(Record):
 
 
 class Mixed(Record):
-    """Groups of samples whose points follow each other, each with its own way back."""
+    """Groups of samples, each with its own rule; the points of the groups are consecutive."""
 
-    groups: tuple[NDArray[np.intp], ...]  # samples
-    sizes: tuple[int, ...]  # points
+    groups: tuple[NDArray[np.intp], ...]  # sample indices of each group
+    sizes: tuple[int, ...]  # number of points of each group
     parts: tuple[ToSamples, ...]
 
     def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
@@ -79,27 +79,27 @@ class Mixed(Record):
 
 
 ToSamples: TypeAlias = Identity | Gather | Barycentric | Mixed
-"""(E, k) values at points to (M, k) values at samples."""
+"""A function from (E, k) values at shading points to (M, k) values at samples."""
 
 
 class ShadingPoints(Record):
-    """Where models are evaluated: E points on triangles, and how values return to the M samples seen."""
+    """Where models are evaluated: E points on triangles, and how the M samples get their values."""
 
     triangle: Ids  # (E,)
     u: Floats  # (E,)
     v: Floats  # (E,)
     position: Vectors  # (E, 3) float32, in radii
-    n: Vectors  # (E, 3) float32 unit shading normal on the side the eye sees
+    n: Vectors  # (E, 3) float32 unit shading normal, on the eye's side
     to_samples: ToSamples
     weights: CornerWeights | None = None
-    """Of the corners around each point; None where the points are the samples."""
+    """Weights of the corners around each point; None if the points are the samples."""
 
     def __len__(self) -> int:
         return len(self.triangle)
 
     @property
     def are_samples(self) -> bool:
-        """Is point i sample i?"""
+        """True if point i is sample i."""
         return isinstance(self.to_samples, Identity)
 
 
@@ -109,14 +109,14 @@ def points(
     centres: PolygonCentres | None = None,
     polygon_normals: NDArray[np.float32] | None = None,
 ) -> ShadingPoints:
-    """Evaluation points of the samples seen, where object i is shaded at ``rates[i]``.
+    """The shading points of M samples, where object i is shaded at ``rates[i]``.
 
-    Where every object is shaded at the samples, point i is sample i, whatever the mixture of rates.
+    If all rates evaluate at the samples, point i is sample i, even if the rates differ.
 
     Parameters
     ----------
     centres, polygon_normals : PolygonCentres, (P, 3) float32, optional
-        Given where some object is shaded once per polygon.
+        Needed if some object is shaded once per polygon.
     """
     # One rate for all objects, or several that all evaluate at the samples: no groups.
     context = shading_context
@@ -126,7 +126,7 @@ def points(
     if all(RATES[name].at_samples for name in rates):
         return _samples(context, _sample_normals(context, of_sample))
 
-    # Split the samples: one group per rate with points of its own, and one for all that are shaded in place.
+    # Split the samples: one group per rate that has its own points, and one for all that are shaded in place.
     groups, parts = [], []
     for number, rate in enumerate(RATES.values()):
         group = np.flatnonzero(of_sample == number)
@@ -141,7 +141,7 @@ def points(
     if not parts:
         return _samples(context, context.interaction.ng)
 
-    # Join the groups' points; a value returns to its samples through its own group.
+    # Concatenate the groups' points; each group's samples take values from its own points.
     to_samples = Mixed(tuple(groups), tuple(map(len, parts)), tuple(part.to_samples for part in parts))
     joined = {
         name: column_major(np.concatenate([getattr(part, name) for part in parts]))
@@ -160,20 +160,20 @@ def point_weights(points: ShadingPoints, corner_weights: CornerWeights) -> Corne
 
 
 def normal(points: ShadingPoints) -> Vectors:
-    """(M, 3) unit shading normal of every sample, on the side the eye sees."""
+    """(M, 3) unit shading normal of every sample, on the eye's side."""
     return unit(points.to_samples(points.n))
 
 
 def obscurance_normals(rates: Sequence[Rate], shading_context: ShadingContext) -> Vectors:
-    """(M, 3) the interpolated shading normal of every sample, what the hemisphere of obscurance stands about.
+    """(M, 3) interpolated shading normal of every sample, the axis of its hemisphere of obscurance rays.
 
-    Where object i is shaded at ``rates[i]``: of `gouraud` the linear one, of `constant` the triangle's own.
+    Object i is shaded at ``rates[i]``; `gouraud` has the linear normal here, `constant` the triangle's.
     """
     return _sample_normals(shading_context, _rate_of_samples(rates, shading_context))
 
 
 def _rate_of_samples(rates: Sequence[Rate], context: ShadingContext) -> NDArray[np.int8]:
-    """(M,) row number of the rate that each sample's object is shaded at."""
+    """(M,) row in `RATES` of the rate of each sample's object."""
     number = np.array([list(RATES).index(name) for name in rates], np.int8)
     return number.take(context.geometry.objects.take(context.weights.hits.triangle))
 
@@ -194,7 +194,7 @@ def _sample_normals(context: ShadingContext, of_sample: NDArray[np.int8]) -> Vec
 
 
 def _samples(context: ShadingContext, n: Vectors) -> ShadingPoints:
-    """The samples themselves."""
+    """The samples as shading points, with normals `n`."""
     hits = context.weights.hits
     position = column_major(context.interaction.position, F)
     return ShadingPoints(hits.triangle, hits.u, hits.v, position, n, Identity())
@@ -203,16 +203,16 @@ def _samples(context: ShadingContext, n: Vectors) -> ShadingPoints:
 def _constant(
     context: ShadingContext, centres: PolygonCentres | None, polygon_normals: NDArray[np.float32] | None
 ) -> ShadingPoints:
-    """One point per polygon and side seen: its centre, its normal, and the mean of what its corners have."""
+    """One point per visible polygon and side: its centre, its normal, and the mean of its corners' values."""
     assert centres is not None
     assert polygon_normals is not None
     geometry, back_facing = context.geometry, context.interaction.back_facing
-    seen = geometry.polygons.take(context.weights.hits.triangle)
-    key, first, point = np.unique(seen * 2 + back_facing, return_index=True, return_inverse=True)
+    visible = geometry.polygons.take(context.weights.hits.triangle)
+    key, first, point = np.unique(visible * 2 + back_facing, return_index=True, return_inverse=True)
     polygon = key // 2
     n = facing(take_rows(polygon_normals, polygon), back_facing.take(first))
 
-    # A point stands on its polygon's first triangle, and has the mean of all the polygon's corners.
+    # A point belongs to its polygon's first triangle, but interpolates over all corners of the polygon.
     third = np.full(len(key), 1 / 3, F)
     triangle = np.searchsorted(geometry.polygons, polygon).astype(np.int32)
     first_triangle = TriangleCorners(None, triangle, third, third)
@@ -223,7 +223,7 @@ def _constant(
 def _gouraud(
     context: ShadingContext, centres: PolygonCentres | None, polygon_normals: NDArray[np.float32] | None
 ) -> ShadingPoints:
-    """One point per polygon corner and side seen: corners of a vertex may differ in normal and uv."""
+    """One point per corner of a visible polygon and side; a vertex's corners may differ in normal and uv."""
     geometry, weights, normals = context.geometry, context.weights, context.normals
     assert normals is not None
     corners: list[tuple[NDArray[Any], ...]] = []  # triangle, u, v, position, n
@@ -231,14 +231,14 @@ def _gouraud(
     step: dict[Corners, int] = {}
     count = 0
     for group in weights.groups:
-        # The polygons of the group that are seen, each side once.
+        # The group's visible polygons, each side once.
         back_facing = context.interaction.back_facing
         back_facing = back_facing if group.index is None else back_facing.take(group.index)
         side = group.shape * np.int64(2) + back_facing
         _, first, number = np.unique(side, return_index=True, return_inverse=True)
         first_point[group], step[group] = number.ravel() + count, len(first)
 
-        # A point at each of their corners: corner 0 of all of them, then corner 1, and so on.
+        # A point at each of their corners: corner 0 of all polygons, then corner 1, and so on.
         for k in range(group.count):
             corner, vertex = (
                 take_rows(number(geometry, k), first) for number in (group.corner, group.vertex)
@@ -250,13 +250,13 @@ def _gouraud(
     triangle, u, v, position, n = (
         column_major(np.concatenate([each[part] for each in corners])) for part in range(5)
     )
-    there = TriangleCorners(None, triangle, u, v)
+    at_corners = TriangleCorners(None, triangle, u, v)
     to_samples = Barycentric(weights, first_point, step)
-    return ShadingPoints(triangle, u, v, position, n, to_samples, CornerWeights(there, (there,)))
+    return ShadingPoints(triangle, u, v, position, n, to_samples, CornerWeights(at_corners, (at_corners,)))
 
 
 def _flat(context: ShadingContext) -> Vectors:
-    """(M, 3) the triangles' own normals."""
+    """(M, 3) the triangles' geometric normals."""
     return context.interaction.ng
 
 
@@ -270,17 +270,17 @@ class ShadingRate(Value):
     """How often a model is evaluated, and with which normals."""
 
     normals: Normals
-    """(M, 3) at the samples; the hemispheres of obscurance stand about them, too."""
+    """(M, 3) normals at the samples; also the axes of the hemispheres of obscurance rays."""
     points: OwnPoints | None = None
-    """Points of its own; None where the model is evaluated at every sample."""
+    """Its own shading points; None if models are evaluated at every sample."""
     is_smooth: bool = True
-    """Does it read the shading normals at corners?"""
+    """True if it reads the shading normals at corners."""
     normals_alone: bool = False
-    """Is nothing but the normals interpolated over polygons, and linearly?"""
+    """True if only normals are interpolated over polygons, and linearly."""
 
     @property
     def at_samples(self) -> bool:
-        """Is the model evaluated at every sample?"""
+        """True if models are evaluated at every sample."""
         return self.points is None
 
 

@@ -1,12 +1,12 @@
-"""Terms that an illumination model may ask for: cosines, gaps and frame components, each computed stably.
+"""Terms that illumination models ask for: cosines, gaps and frame components, in numerically stable forms.
 
-A term is a function whose parameter names are the terms it needs; `evaluate` runs only those a lobe
-reaches. The given words are the unit vectors `n` (shading normal), `l` (to the light), `v` (to the eye), `t`
-(tangent, at right angles to `n`), and `light` (the light's colour, largest component 1).
-With s = l + v: |s|^2 = 2 (1 + l.v) and h = s / |s|. `b` is n x t.
+A term is a function whose parameter names are the terms that it needs; `evaluate` computes only those that a
+lobe needs, directly or not. Given are the unit vectors `n` (shading normal), `l` (to the light), `v` (to the
+eye), `t` (tangent, perpendicular to `n`), and `light` (the light's colour, largest component 1).
+With s = l + v: |s|^2 = 2 (1 + l.v) and h = s / |s|. `b` is n x t. A gap is 1 minus a cosine.
 
-Cosines that stand in denominators (`n_v`, `n_h`) are kept at or above the rounding level of one: below it
-their digits are noise, and no quotient overflows.
+Cosines in denominators (`n_v`, `n_h`) are at least the machine epsilon: smaller values are only rounding
+noise, and no quotient overflows.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ GIVEN = ("n", "l", "v", "t", "light")
 
 
 def n_l(n: Vectors, l: Vectors) -> Floats:
-    """Cosine of the angle of incidence, above 0 on every lane that a model sees."""
+    """Cosine of the angle of incidence; positive wherever a model is evaluated."""
     return dot(n, l)
 
 
 def n_v(n: Vectors, v: Vectors) -> Floats:
-    """Cosine at the eye, kept above 0: an interpolated normal may turn away where its facet does not."""
+    """Cosine at the eye, kept positive: an interpolated normal may face away where its polygon does not."""
     cosine = np.abs(dot(n, v))
     return np.maximum(cosine, np.finfo(cosine.dtype).eps)
 
@@ -40,7 +40,7 @@ def l_v(l: Vectors, v: Vectors) -> Floats:
 
 
 def s(l: Vectors, v: Vectors) -> Vectors:
-    """l + v, the half vector before it is made unit."""
+    """l + v, the half vector before it is normalized."""
     return l + v
 
 
@@ -50,7 +50,7 @@ def s_s(s: Vectors) -> Floats:
 
 
 def h(s: Vectors) -> Vectors:
-    """Half vector; zero where the eye looks exactly from behind the light's direction."""
+    """Half vector; zero where `l` and `v` are exactly opposite."""
     return unit(s)
 
 
@@ -92,7 +92,7 @@ def nxs(n: Vectors, s: Vectors) -> Vectors:
 
 
 def sin2_h(nxs: Vectors, n_s: Floats, s_s: Floats) -> Floats:
-    """sin^2 of the angle between n and h = |n x s|^2 / |s|^2; keeps its digits where 1 - (n.h)^2 has none.
+    """sin^2 of the angle between n and h = |n x s|^2 / |s|^2, accurate where 1 - (n.h)^2 cancels.
 
     1 (a right angle) where h is undefined or below the surface.
     """
@@ -124,7 +124,7 @@ def sin_v(nxv: Vectors) -> Floats:
 
 
 def cos_phi(nxl: Vectors, nxv: Vectors, sin_l: Floats, sin_v: Floats) -> Floats:
-    """Cosine of the azimuth between l and v; 0 where either stands on the normal and has none."""
+    """Cosine of the azimuth between l and v; 0 where one of them is along the normal and has no azimuth."""
     sines = sin_l * sin_v
     return np.clip(dot(nxl, nxv) / np.maximum(sines, np.finfo(sines.dtype).tiny), -1, 1)
 
@@ -194,38 +194,38 @@ TERMS: dict[str, Node] = {function.__name__: Node.of(function) for function in F
 
 
 @cache
-def steps(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Node, ...]:
-    """The terms that `needs` reach, each after those it is formed from."""
+def ordered_terms(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tuple[Node, ...]:
+    """The terms that `needs` depend on, each after the terms it is computed from."""
     return tuple(topological_order(TERMS, needs, given))
 
 
 def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dict[str, Any]:
-    """Each lobe's value on the lanes of `given`; terms that lobes share are formed once.
+    """The value of each lobe at N points; terms that lobes share are computed once.
 
     Parameters
     ----------
     lobes : dict
-        Name -> function of terms, as a model's `lobes()` has them.
+        Name -> function of terms, as from a model's `lobes()`.
     given : dict
-        The words the lobes reach: (N, 3) vectors of one precision, column by column in memory. Terms that
-        are known already may be given too.
+        The given terms that the lobes need (`given_terms`): (N, 3) vectors of one precision, in column-major
+        order. Other terms may be given, too, if they are already known.
 
     Returns
     -------
     dict
-        Name -> (N, 3), in the precision of the lanes.
+        Name -> (N, 3), in the precision of the given terms.
     """
     buffers = dict(given)
-    for recipe in steps(_needs(lobes), tuple(given)):
-        buffers[recipe.output] = recipe.run(buffers)
+    for node in ordered_terms(_needs(lobes), tuple(given)):
+        buffers[node.output] = node.run(buffers)
     return {name: lobe(**{need: buffers[need] for need in required(lobe)}) for name, lobe in lobes.items()}
 
 
-def words(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
-    """The given words (`n`, `l`, `v`, `t`, `light`) that these lobes reach."""
+def given_terms(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
+    """The given terms (`n`, `l`, `v`, `t`, `light`) that these lobes need, directly or not."""
     needs = _needs(lobes)
-    reached = {need for step in steps(needs) for need in step.inputs.values()}
-    return frozenset(reached.union(needs).intersection(GIVEN))
+    inputs = {need for node in ordered_terms(needs) for need in node.inputs.values()}
+    return frozenset(inputs.union(needs).intersection(GIVEN))
 
 
 def _needs(lobes: dict[str, Callable[..., Any]]) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
-"""Parameters that vary over the surface: images looked up by uv, values at vertices interpolated.
+"""Parameters that vary over the surface: textures looked up by uv, and interpolated vertex values.
 
-(0, 0) in uv is the lower left corner of an image and (1, 1) its upper right one; the centres of its texels
-lie half a texel inside. Images have no MIP levels: the samples of a pixel average what it covers, so fine
-textures need more of them (`film.samples`).
+(0, 0) in uv is the lower left corner of an image and (1, 1) its upper right corner; the centres of the border
+texels lie half a texel inside. There are no MIP levels: the samples of a pixel average over its area, so fine
+textures need more samples (`film.samples`).
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ Floats: TypeAlias = NDArray[np.float32]
 
 
 def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
-    """(N, C) values between the centres of the four texels around each uv.
+    """(N, C) bilinear interpolation between the centres of the four texels around each uv.
 
     Parameters
     ----------
     image : (H, W, C) float32, from the top
     uv : (N, 2) float32, v upwards
     wrap : {'repeat', 'clamp', 'mirror'}
-        What lies outside: the image again, its border, or the image mirrored every second time.
+        Outside of the image: it is repeated, its border is extended, or it is repeated mirrored in turn.
     """
     x, y = _texels(image, uv, wrap)
     left, low = np.floor(x - F(0.5)), np.floor(y - F(0.5))
@@ -51,7 +51,7 @@ def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
 
 
 def nearest(image: Floats, uv: Floats, wrap: str) -> Floats:
-    """(N, C) the texel that each uv lies in; parameters as those of `bilinear`."""
+    """(N, C) the texel that each uv lies in; parameters as of `bilinear`."""
     x, y = _texels(image, uv, wrap)
     return _at(image, _inside(np.floor(y), image.shape[0], wrap), _inside(np.floor(x), image.shape[1], wrap))
 
@@ -72,9 +72,9 @@ def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
 
 
 def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
-    """Column or row numbers within the image, of numbers at most one beyond it."""
+    """Column or row numbers wrapped into the image, from numbers at most one outside of it."""
     whole = number.astype(np.int64)
-    if wrap != "repeat":  # beyond the border of a mirrored image its own texels come again
+    if wrap != "repeat":  # outside the border of a mirrored image its border texels repeat
         return np.clip(whole, 0, count - 1)
     return whole + count * (whole < 0) - count * (whole >= count)
 
@@ -86,15 +86,15 @@ def _at(image: Floats, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
 
 
 def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:
-    """From `a` at 0 to `b` at 1; exactly `a` where both are equal."""
+    """Linear interpolation from `a` at 0 to `b` at 1; exactly `a` where both are equal."""
     return a + share * (b - a)
 
 
-# --- what varies, read once ------------------------------------------------------------------------------
+# --- textures and vertex values, read once per scene -----------------------------------------------------
 
 
 class Range(Value):
-    """What a parameter may be."""
+    """Size and range of a parameter."""
 
     width: int  # 3 for a colour, 1 for a number
     low: float
@@ -113,41 +113,41 @@ def parameter_range(model: IlluminationModel, path: str) -> Range:
 
 
 class Attribute(Record):
-    """Values at the World's vertices that a parameter is interpolated from, within its range."""
+    """Values at the scene's vertices that a parameter is interpolated from, clipped to its range."""
 
     values: Floats  # (V, C)
     within: Range
-    factor: Floats | None = None  # (C,) what each is multiplied by, where it is not 1
+    factor: Floats | None = None  # (C,) multiplies the values; None for 1
 
 
 class Map(Record):
-    """An image that a parameter is looked up in, within the parameter's range."""
+    """An image that a parameter is looked up in, clipped to the parameter's range."""
 
     image: Floats  # (H, W, C)
     filter: str
     wrap: str
     within: Range
     factor: Floats | None = None  # (C,)
-    vertex: Floats | None = None  # (V, C) values at the World's vertices that multiply the texels as well
-    uv: Floats | None = None  # (V, 2) where to look, in place of the meshes' own uv
+    vertex: Floats | None = None  # (V, C) values at the scene's vertices that multiply the texels, too
+    uv: Floats | None = None  # (V, 2) texture coordinates that replace those of the meshes
 
 
 class Varying(Record):
-    """What the materials' parameters vary by."""
+    """The textures and vertex values of all materials."""
 
     of_material: tuple[Mapping[str, Map | Attribute], ...] = ()  # by material number, by path
     repairs: Repairs = field(default_factory=dict)
 
 
 def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexValues]:
-    """The varying parameters that serve `purpose`: `lobes`, `ambient` or `emission`."""
-    found = model.varying()
-    own = {name: found.pop(name) for name in ("emission", "ambient") if name in found}
+    """The varying parameters that are needed for a purpose: `lobes`, `ambient` or `emission`."""
+    of_lobes = model.varying()
+    others = {name: of_lobes.pop(name) for name in ("emission", "ambient") if name in of_lobes}
     if purpose == "lobes":
-        return found if model.lobes() else {}
+        return of_lobes if model.lobes() else {}
     if purpose == "ambient" and model.ambient is None:
-        return found if model.diffuse_color() != (0.0, 0.0, 0.0) else {}
-    return {purpose: own[purpose]} if purpose in own else {}
+        return of_lobes if model.diffuse_color() != (0.0, 0.0, 0.0) else {}
+    return {purpose: others[purpose]} if purpose in others else {}
 
 
 def textures(
@@ -157,28 +157,30 @@ def textures(
     geometry: SceneGeometry,
     materials: Materials,
 ) -> Varying:
-    """Everything the materials on some surface vary by, read, checked against the meshes, and within range.
+    """The textures and vertex values of all materials in use, checked against the meshes and clipped.
 
     Parameters
     ----------
     read : callable
-        Path and space of a texture -> (H, W, C) linear image; without a space its pixels' type says.
+        Path and colour space of a texture -> (H, W, C) linear image. Without a colour space the type of the
+        pixels decides.
 
     Raises
     ------
     InputError
-        Images that cannot be read, attributes or uv that a mesh does not have; all at once.
+        Unreadable images, and attributes or uv that a mesh does not have; all of them in one error.
     """
     used_by = _objects_of(geometry, materials)
     problems: list[str] = []
     repairs: dict[str, Repair] = {}
 
     def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute:
+        """The data of one parameter."""
         within = parameter_range(materials.models[number], path)
         where = f"material {materials.names[number]}: {path}"
-        found = [_lacks(geometry, value, i, object_names[i], where, within.width) for i in used_by[number]]
-        if any(found):
-            raise InputError(filter(None, found))
+        lacking = [_lacks(geometry, value, i, object_names[i], where, within.width) for i in used_by[number]]
+        if any(lacking):
+            raise InputError(filter(None, lacking))
         factor = None if value.factor == (1.0, 1.0, 1.0) else np.array(value.factor, F)[: within.width]
         table, uv = (
             None if name is None else _table(geometry, name, used_by[number], width)
@@ -193,54 +195,58 @@ def textures(
         image = _clipped(image, within, f"texels beyond {where}", repairs)
         return Map(image, value.filter, value.wrap, within, factor, table, uv)
 
+    # Read those of each material in turn; faults of the scene's own materials are reported together.
     of_material: list[dict[str, Map | Attribute]] = []
     for number, model in enumerate(materials.models):
-        mine: dict[str, Map | Attribute] = {}
+        sources: dict[str, Map | Attribute] = {}
         for path, value in (paths(model, purpose) if used_by[number] else {}).items():
             try:
-                mine[path] = source(number, path, value)
+                sources[path] = source(number, path, value)
             except InputError as error:
                 substitute = materials.substitute(number, path)
                 if substitute is None:
                     problems.extend(error.problems)
-                else:  # the trouble of a mesh's own material refuses nothing
+                else:  # a material of a mesh file: use its substitute and note it as a repair
                     note(
                         repairs,
                         f"textures that cannot be used left out ({error.problems[0]})",
                         substitute.first,
                     )
-                    mine[path] = _uniform(substitute.value, parameter_range(model, path))
-        of_material.append(mine)
+                    sources[path] = _uniform(substitute.value, parameter_range(model, path))
+        of_material.append(sources)
     if problems:
         raise InputError(dict.fromkeys(problems))
     return Varying(tuple(of_material), repairs)
 
 
 def _uniform(value: Sequence[float], within: Range) -> Map:
-    """An image of one colour."""
+    """A texture of one texel."""
     texel = np.clip(np.asarray(value[: within.width], F), F(within.low), F(within.high))
     return Map(texel.reshape(1, 1, -1), "nearest", "repeat", within)
 
 
 def _objects_of(geometry: SceneGeometry, materials: Materials) -> list[list[int]]:
-    """By material number, the objects that have it."""
+    """By material number, the numbers of the objects that have it."""
     material = materials.number(geometry, np.arange(len(geometry.triangles), dtype=np.int32))
     pairs = np.unique(material.astype(np.int64) * len(geometry.placed) + geometry.objects)
-    found: list[list[int]] = [[] for _ in materials.models]
-    for number, thing in zip(*divmod(pairs, max(len(geometry.placed), 1)), strict=True):
-        found[number].append(int(thing))
-    return found
+    objects: list[list[int]] = [[] for _ in materials.models]
+    for number, i in zip(*divmod(pairs, max(len(geometry.placed), 1)), strict=True):
+        objects[number].append(int(i))
+    return objects
 
 
 def _lacks(
-    geometry: SceneGeometry, value: Texture | VertexValues, thing: int, name: str, where: str, width: int
+    geometry: SceneGeometry, value: Texture | VertexValues, i: int, name: str, where: str, width: int
 ) -> str | None:
-    """What object number `thing` lacks for a parameter to vary by `value`."""
-    mesh = geometry.placed[thing].mesh
+    """The error message if object number `i` lacks the uv or vertex attribute that `value` needs."""
+    # A texture needs uv.
+    mesh = geometry.placed[i].mesh
     if isinstance(value, Texture) and value.uv is None and (mesh.uvs is None or mesh.corner_uvs is None):
         return (
             f"object {name}: {where} is a texture and the mesh has no uv; export it with uv, or give a value"
         )
+
+    # Vertex attributes need the right number of components.
     kind = "is a colour" if width == 3 else "is a number"
     for attribute, wants, numbers in (
         (value.vertex, kind, {1, width}),
@@ -260,18 +266,18 @@ def _lacks(
     return None
 
 
-def _table(geometry: SceneGeometry, attribute: str, things: Sequence[int], width: int) -> Floats:
-    """(V, C) an attribute at the World's vertices, 0 where another object is."""
+def _table(geometry: SceneGeometry, attribute: str, objects: Sequence[int], width: int) -> Floats:
+    """(V, C) an attribute of these objects at the scene's vertices; 0 at the vertices of others."""
     out = np.zeros((len(geometry.vertices), width), F)
-    for thing in things:
-        placed = geometry.placed[thing]
+    for i in objects:
+        placed = geometry.placed[i]
         values = placed.mesh.attributes[attribute].reshape(len(placed.mesh.vertices), -1)
         out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :width]
     return out
 
 
 def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats:
-    """The channels of an image that a colour, or a number, is read from; grey stands for three equal ones."""
+    """The channels of an image that a colour or number is read from; grey is three equal channels."""
     count = image.shape[2]
     if width == 3:
         return image[..., :3] if count >= 3 else np.repeat(image[..., :1], 3, axis=2)
@@ -286,7 +292,7 @@ def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats
 
 
 def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, Repair]) -> Floats:
-    """`values` within the range, contiguous; how many were not is noted in `repairs`."""
+    """`values` clipped to the range, contiguous; `repairs` notes how many were outside."""
     beyond = int(np.count_nonzero((values < F(within.low)) | (values > F(within.high))))
     if beyond:
         note(repairs, f"{what} clipped to {within.low:g}..{within.high:g}", count=beyond)
@@ -298,23 +304,23 @@ def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, Repair
 
 
 class Parameters(Record):
-    """Values of the varying parameters at E points, each where its material is."""
+    """Values of the varying parameters at E points; each is 0 at points of other materials."""
 
-    of_material: tuple[tuple[tuple[str, int], ...], ...]  # by number: path and width of what varies
+    of_material: tuple[tuple[tuple[str, int], ...], ...]  # by number: path and width of each that varies
     values: Mapping[tuple[str, int], Floats]  # (E,) numbers or (E, 3) colours
 
-    def model(self, model: IlluminationModel, number: int, lanes: Ids | slice) -> IlluminationModel:
-        """The material of this number with its values at these points."""
+    def model(self, model: IlluminationModel, number: int, index: Ids | slice) -> IlluminationModel:
+        """The model of material `number` with its parameters at these points."""
         names = self.of_material[number]
         if not names:
             return model
-        picked = {
-            path: self.values[path, width][lanes]
-            if isinstance(lanes, slice)
-            else take_rows(self.values[path, width], lanes)
+        at_points = {
+            path: self.values[path, width][index]
+            if isinstance(index, slice)
+            else take_rows(self.values[path, width], index)
             for path, width in names
         }
-        return model.at(picked)
+        return model.at(at_points)
 
 
 def parameters(
@@ -331,37 +337,41 @@ def parameters(
     material : (E,) int32
         Material number of each point.
     point_weights : CornerWeights
-        Of the corners around each of the E points.
+        The weights of the corners around each of the E points.
     """
     names: list[tuple[tuple[str, int], ...]] = []
     values: dict[tuple[str, int], Floats] = {}
-    for number, mine in enumerate(textures.of_material):
-        names.append(tuple((path, each.within.width) for path, each in mine.items()))
-        lanes = np.flatnonzero(material == number).astype(np.int32) if mine else np.zeros(0, np.int32)
-        if not lanes.size:
+    for number, sources in enumerate(textures.of_material):
+        # The points of this material.
+        names.append(tuple((path, source.within.width) for path, source in sources.items()))
+        index = np.flatnonzero(material == number).astype(np.int32) if sources else np.zeros(0, np.int32)
+        if not index.size:
             continue
-        at = point_weights.take(lanes)
-        uv = None
-        for path, each in mine.items():
-            if isinstance(each, Attribute):
-                found = at.interpolate_vertices(geometry, each.values)
+        weights = point_weights.take(index)
+        mesh_uv = None
+        for path, source in sources.items():
+            # Interpolate vertex values, or look the texture up.
+            if isinstance(source, Attribute):
+                value = weights.interpolate_vertices(geometry, source.values)
             else:
-                if each.uv is not None:
-                    place = at.interpolate_vertices(geometry, each.uv)
+                if source.uv is not None:
+                    uv = weights.interpolate_vertices(geometry, source.uv)
                 else:
                     assert uvs is not None
-                    place = uv = uv_at(geometry, uvs, at) if uv is None else uv
-                found = FILTERS[each.filter](each.image, place, each.wrap)
-                if each.vertex is not None:
-                    found = found * at.interpolate_vertices(geometry, each.vertex)
-            if each.factor is not None:
-                found = found * each.factor
-            key = path, each.within.width
-            whole = values.setdefault(key, np.zeros((len(material), each.within.width), F, order="F"))
-            whole[lanes] = np.clip(found, F(each.within.low), F(each.within.high))  # sums round beyond
+                    uv = mesh_uv = uv_at(geometry, uvs, weights) if mesh_uv is None else mesh_uv
+                value = FILTERS[source.filter](source.image, uv, source.wrap)
+                if source.vertex is not None:
+                    value = value * weights.interpolate_vertices(geometry, source.vertex)
+
+            # Scale, clip what rounding took out of range, and store at the material's points.
+            if source.factor is not None:
+                value = value * source.factor
+            key = path, source.within.width
+            at_all = values.setdefault(key, np.zeros((len(material), source.within.width), F, order="F"))
+            at_all[index] = np.clip(value, F(source.within.low), F(source.within.high))
     return Parameters(
         tuple(names),
-        {key: whole[:, 0] if key[1] == 1 else column_major(whole) for key, whole in values.items()},
+        {key: at_all[:, 0] if key[1] == 1 else column_major(at_all) for key, at_all in values.items()},
     )
 
 
@@ -371,10 +381,10 @@ class PointMaterials(Record):
     materials: Materials
     number: Ids  # (E,)
     parameters: Parameters | None = None
-    """Those that vary over the surface."""
+    """The parameters that vary over the surface; None if none does."""
 
     def colors(self, color: Callable[[IlluminationModel], Any]) -> Vectors:
-        """(E, 3) float32 a colour of each point's material, from its values there where it varies."""
+        """(E, 3) float32 a colour of each point's material, computed from its varying parameters there."""
         models, parameters = self.materials.models, self.parameters
         out = colors_at([color(model) for model in models], self.number)
         for number, model in enumerate(models if parameters is not None else ()):

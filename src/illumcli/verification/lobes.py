@@ -55,8 +55,8 @@ def facing(inputs: Inputs) -> bool:
 def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
     """Terms of the renderer by name, computed from the case's n, l and v and from `more`."""
     buffers: dict[str, Any] = {key: inputs.unit(key) for key in ("n", "l", "v")} | more
-    for recipe in terms.steps(names, tuple(buffers)):
-        buffers[recipe.output] = recipe.run(buffers)
+    for node in terms.ordered_terms(names, tuple(buffers)):
+        buffers[node.output] = node.run(buffers)
     return [buffers[name] for name in names]
 
 

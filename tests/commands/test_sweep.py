@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+from collections import Counter
 
 import pytest
 
@@ -13,6 +14,7 @@ from illumcli.commands.options import RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import InputError, OutputError
+from illumcli.graph import Node, short_name
 from illumcli.images.reader import read_image
 from illumcli.scene.variants import variants_of
 
@@ -24,7 +26,7 @@ obscurance: {samples: 4}
 materials:
   clay: {model: blinn_phong, diffuse: [0.6, 0.4, 0.3], specular: 0.3}
 objects:
-  - {mesh: {shape: sphere}, material: clay}
+  - {name: ball, mesh: {shape: sphere}, material: clay}
   - {mesh: {shape: plane, size: [8, 8]}, transform: {translate: [0, -1, 0]}}
 lights:
   - {light: point, name: key, position: [3, 4, 5], intensity: 30}
@@ -66,6 +68,38 @@ def test_equal_values_that_go_with_others_are_variants(scene, tmp_path):
     variants = variants_of(["film.exposure=0,0", "seed=1,2"], together=True)
     done = sweep_scene(scene, variants, RenderOptions(pattern=str(tmp_path / "{seed}.png")))
     assert len(done.outcomes) == 2
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """How often each node computed its buffer; nodes that load one from a cache do not count."""
+    counts = Counter()
+
+    def run(node, buffers, original=Node.run):
+        if not short_name(node.function).startswith("_"):
+            counts[node.output.partition(":")[0]] += 1
+        return original(node, buffers)
+
+    monkeypatch.setattr(Node, "run", run)
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("change", "camera", "once"),
+    [
+        ("objects.0.transform.translate=[0,0,0],[0.1,0,0],[0.2,0,0]", "", ["mesh", "meshes"]),
+        ("objects.0.transform.translate=[0,0,0],[0.1,0,0],[0.2,0,0]", "camera: {fit: ball}", ["mesh", "meshes"]),
+        ("camera.position=[0,1,6],[0,2,6],[0,3,6]", "", ["mesh", "meshes", "geometry", "tracer"]),
+        ("film.samples=1,2,4", "", ["mesh", "meshes", "geometry", "tracer"]),
+    ],
+    ids=["object", "object that fills the picture", "camera", "samples"],
+)
+def test_what_no_variant_changes_is_computed_once(scene, tmp_path, runs, change, camera, once):
+    scene.write_text(f"{SCENE}\n{camera}")
+    options = RenderOptions(pattern=str(tmp_path / f"{{{change.partition('=')[0]}}}.png"), cache=False)
+    sweep_scene(scene, variants_of([change]), options)
+    assert {name: runs[name] for name in once} == {name: 2 if name == "mesh" else 1 for name in once}
+    assert runs["samples"] >= 3 or runs["hits"] >= 3
 
 
 def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):

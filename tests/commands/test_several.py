@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 SCENE = (
@@ -60,6 +62,24 @@ def test_files_of_one_name_are_told_before_anything_is_rendered(illum, folder):
     other = illum("render", "a.yaml", "b.yaml", "-o", "other.png")
     assert (other.returncode, made(folder, "png")) == (2, ["a"])
     assert "other.png: the name of 2 images" in other.stderr
+
+
+def test_a_report_tells_a_failure_of_this_time(illum, folder):
+    (folder / "b.obj").write_text(MESH + "v 9 9 9\n")
+    (folder / "b.yaml").write_text(SCENE.replace("{shape: sphere}", "b.obj"))
+    words = ("render", "a.yaml", "b.yaml", "-o", "{scene}.png", "--report", "r.json", "-q")
+    assert illum(*words).returncode == 0
+    assert illum(*words).returncode == 0
+    assert not any(entry["error"] for entry in json.loads((folder / "r.json").read_text()))
+
+    # the same contents as planned, but one of them cannot be made
+    (folder / "b.png").unlink()
+    assert illum(*words, "--strict").returncode == 2
+    first, second = json.loads((folder / "r.json").read_text())
+    assert (first["kept"], first["error"]) == (["a.png"], {})
+    assert (second["content"], "unused vertices" in second["error"]) == ("incomplete", True)
+    assert illum(*words).returncode == 0
+    assert not json.loads((folder / "r.json").read_text())[1]["error"]
 
 
 def test_meshes(illum, folder):

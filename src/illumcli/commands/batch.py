@@ -82,11 +82,14 @@ class BatchReport:
         self._entries[number] = entry
 
     def finish(self, batch: Batch) -> bool:
-        """Write the report, or refresh the date of the one that is kept, and end the batch; is it kept?"""
+        """Write the report, or refresh the date of the one that is kept, and end the batch; is it kept?
+
+        A report of the same contents is not kept where a piece failed this time.
+        """
         for number, failure in batch.failures.items():
             self._contents[number] = INCOMPLETE
             self._entries[number] |= {"content": INCOMPLETE, "error": str(failure)}
-        if self._path is not None and self._is_kept:
+        if self._path is not None and self._is_kept and not batch.failures:
             refresh(self._path)
         elif self._path is not None:
             pairs = zip(self._entries, self._contents, strict=True)

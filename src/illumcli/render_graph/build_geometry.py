@@ -41,11 +41,10 @@ def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     """One node per source of meshes, and the mesh of every object."""
-    of_object = [needs.mesh_name(scene, thing.mesh) for thing in scene.objects]
-    sources = {name: source for name, (_, source) in zip(of_object, _sources(scene), strict=True)}
-    number = {name: k for k, name in enumerate(sources)}
-    which = tuple(number[name] for name in of_object)
-    parts = {f"mesh{k}": f"mesh:{name}" for name, k in number.items()}
+    sources = {needs.mesh_name(scene, thing.mesh): source for thing, source in _sources(scene)}
+    names = list(sources)
+    which = tuple(names.index(needs.mesh_name(scene, thing.mesh)) for thing in scene.objects)
+    parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
     meshes = [
         Node.of(partial(stages.mesh, _content(loaded, source)), f"mesh:{name}")
         for name, source in sources.items()

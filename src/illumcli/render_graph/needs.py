@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 from illumcli.errors import InputError
@@ -53,17 +52,16 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
 
 def candidates(scene: Scene) -> list[IlluminationModel] | None:
     """The models that some surface may have; None where a mesh file's own library decides."""
-    found: dict[int, IlluminationModel] = {}  # each once, however many objects have it
-    by_name = False
+    found: list[IlluminationModel] = []
     for thing in scene.objects:
         model = scene.material_of(thing)
         if model is not None:
-            found[id(model)] = model
-        elif imports(scene, thing):
+            found.append(model)
+            continue
+        if imports(scene, thing):
             return None
-        else:
-            by_name = True
-    return [*found.values(), *([default_material(), *scene.materials.values()] if by_name else [])]
+        found += [default_material(), *scene.materials.values()]
+    return found
 
 
 def imports(scene: Scene, thing: Any) -> bool:
@@ -138,14 +136,8 @@ def all_baked(scene: Scene) -> bool:
 def source_of(scene: Scene, mesh: Any) -> Any:
     """The description of an object's mesh."""
     if isinstance(mesh, str):
-        return scene.meshes[mesh] if mesh in scene.meshes else _mesh_file(mesh)
+        return scene.meshes[mesh] if mesh in scene.meshes else MeshFile(file=mesh)
     return mesh
-
-
-@lru_cache(maxsize=1 << 16)
-def _mesh_file(path: str) -> MeshFile:
-    """The description of a mesh that is given by its path alone."""
-    return MeshFile(file=path)
 
 
 def mesh_name(scene: Scene, mesh: Any) -> str:

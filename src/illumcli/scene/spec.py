@@ -5,7 +5,6 @@ The JSON schema in ``schemas/scene.schema.json`` is made from this module.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import (
@@ -451,7 +450,6 @@ class Scene(Description):
         return tuple(o.name or f"object{i + 1}" for i, o in enumerate(self.objects))
 
 
-@cache
 def default_material() -> AnyModel:
     """Light grey Lambert, for what has no material."""
     from illumcli.models.lambert import Lambert

@@ -92,7 +92,7 @@ from embreex import mesh_construction, rtcore_scene
 from illumcli.cli import main
 from illumcli.errors import known
 from illumcli.rays.embree import Tracer
-from illumcli.rays.embree_upload import _library
+from illumcli.rays.embree_library import embree_library as _library
 
 words, least, first, stride = json.loads(sys.argv[1]), *map(int, sys.argv[2:])
 shim = ctypes.CDLL(None)

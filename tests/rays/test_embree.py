@@ -10,17 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from illumcli.errors import IllumError
+from illumcli.rays import embree_library as library
 from illumcli.rays import embree_upload as upload
 from illumcli.rays.embree import Interrupted, Tracer
+from illumcli.rays.packet_loop import missing
+from illumcli.rays.ray_loop import SWITCH
+from illumcli.rays.single_ray_loop import SingleRayLoop
 
 F = np.float32
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], F)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
-@pytest.fixture(scope="module")
-def square():
-    return Tracer(SQUARE, FACES)
+LOOPS = ["0"] if missing() else ["0", "1"]
+
+
+@pytest.fixture(scope="module", params=LOOPS, ids=["single rays", "packets"][: len(LOOPS)])
+def square(request):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(SWITCH, request.param)
+        return Tracer(SQUARE, FACES)
 
 
 ULP = np.finfo(F).eps
@@ -164,9 +173,9 @@ def test_upload_answers_as_embreex_own_mesh_does(ball, monkeypatch):
     rng = np.random.default_rng(8)
     o = rng.uniform(-2, 2, (5000, 3)).astype(F)
     d = (rng.uniform(-1, 1, (5000, 3)) - o).astype(F)
-    shared = Tracer(vertices.astype(F), faces).closest(o, d)
-    monkeypatch.setattr(upload, "_library", lambda: None)
-    own = Tracer(vertices.astype(F), faces).closest(o, d)
+    shared = SingleRayLoop(vertices.astype(F), faces).closest(o, d)
+    monkeypatch.setattr(upload, "embree_library", lambda: None)
+    own = SingleRayLoop(vertices.astype(F), faces).closest(o, d)
     for name in ("triangle", "u", "v", "distance"):
         assert getattr(shared, name).tobytes() == getattr(own, name).tobytes()
 
@@ -187,11 +196,13 @@ def test_upload_builds_the_tree(ball):
     assert scene.is_committed
 
 
-@pytest.mark.parametrize(("code", "error"), [(1, IllumError), (upload.OUT_OF_MEMORY, MemoryError)])
-def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch, code, error):
+@pytest.mark.parametrize(("code", "error"), [(1, IllumError), (library.OUT_OF_MEMORY, MemoryError)])
+@pytest.mark.parametrize("switch", LOOPS)
+def test_a_tree_that_cannot_be_built_is_told(ball, monkeypatch, code, error, switch):
     vertices, faces = ball
-    library = upload._library()
-    monkeypatch.setattr(library, "rtcGetDeviceError", lambda device: code)
+    monkeypatch.setenv(SWITCH, switch)
+    missing()  # asks a device of its own
+    monkeypatch.setattr(library.embree_library(), "rtcGetDeviceError", lambda device: code)
     with pytest.raises(error) as caught:
         Tracer(vertices.astype(F), faces)
     assert ("its tree: error 1" in str(caught.value)) == (code == 1)

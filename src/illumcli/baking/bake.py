@@ -28,6 +28,7 @@ from illumcli.baking.values import baked_values
 from illumcli.files.journal import Journal, tidy
 from illumcli.files.outputs import refresh
 from illumcli.progress import Progress, no_progress
+from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.visibility.obscurance import Method
 
 DARK, MOSTLY = 0.01, 0.9
@@ -163,6 +164,7 @@ def bake_report(
         rmse=statistics.rmse,
         target_error=work.settings.target_error,
         rays=statistics.rays,
+        ray_loop=ray_loop_name() if any(statistics.rays.values()) else None,
         resumed=statistics.resumed,
         samples=statistics.samples,
         repairs=work.repairs,

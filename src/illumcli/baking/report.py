@@ -29,6 +29,7 @@ class BakeReport(Record):
     rmse: float  # root mean square error over all vertices
     target_error: float | None
     rays: Mapping[str, int]  # purpose -> rays
+    ray_loop: str | None  # how rays were traced, if any were
     resumed: int  # of these, rays that an earlier run cast
     samples: Mapping[int, int]  # rays per point -> points
     repairs: Repairs

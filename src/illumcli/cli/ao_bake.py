@@ -188,6 +188,8 @@ def ao_bake(
         if not quiet:
             _say_report(source, done, verbose)
         if verbose:
+            if done.ray_loop:
+                say(f"rays: {done.ray_loop}")
             for name, seconds in done.seconds.items():
                 say(f"{seconds:8.3f} s  {name}")
 

@@ -97,7 +97,7 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool) -> None:
     if not verbose:
         return
 
-    # what was clamped, reused and skipped, and where time went
+    # what was clamped, reused and skipped, how rays were traced, and where time went
     if report.clamped:
         fact = f"{report.clamped} values beyond 65504, the largest of half precision, are written as that"
         say(f"{done.scene}: {fact}; outputs.colour: float keeps them")
@@ -106,5 +106,7 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool) -> None:
             say(f"reused {name} of {camera}: from the {where}")
     for name, why in report.skipped.items():
         say(f"skipped {name}: {why}")
+    if report.ray_loop:
+        say(f"rays: {report.ray_loop}")
     for name, seconds in sorted(report.seconds.items(), key=lambda item: -item[1]):
         say(f"{seconds:8.3f} s {report.rays.get(name, 0):12d} rays  {name}")

@@ -64,6 +64,7 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
         _row("tile", [name for name in part["tile"] if name not in reused]),
         _row("reused", list(reused)),
         _row("rays", [f"{name} {count:,}" for name, count in part["expected_rays"].items()]),
+        _row("", [f"traced as {part['ray_loop']}"] if part["ray_loop"] else []),
         _row("memory", [f"{name} {size / 2**20:,.1f} MiB" for name, size in part["expected_bytes"].items()]),
     ]
     reasons = defaultdict(list)

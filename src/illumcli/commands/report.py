@@ -10,6 +10,7 @@ from illumcli import __version__
 from illumcli.files.reports import sealed_json
 from illumcli.geometry.repairs import Repairs
 from illumcli.memory import peak_memory
+from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.repairs import repairs_data
 from illumcli.versions import versions
@@ -29,6 +30,8 @@ class Report:
     repairs: Repairs = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
+    ray_loop: str | None = None
+    """How rays were traced, if any were."""
     spared: dict[str, int] = field(default_factory=dict)
     """Points that a light does not reach (`incident`) or not freely (`unshadowed`): no ray, no response.
     Polygons of culled objects. Samples of pixels that adaptive antialiasing leaves at the first few."""
@@ -48,6 +51,7 @@ class Report:
         """Take over what was counted."""
         self.seconds, self.rays, self.spared = dict(stats.seconds), dict(stats.rays), dict(stats.spared)
         self.refined = stats.refined
+        self.ray_loop = ray_loop_name() if any(self.rays.values()) else None
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it, with versions and the peak of memory."""

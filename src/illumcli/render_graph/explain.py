@@ -11,6 +11,7 @@ import numpy as np
 from illumcli.cache.codec import codec_of
 from illumcli.film.view import View
 from illumcli.layers import Layer
+from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import why_all
 from illumcli.render_graph.replicates import AGAIN, doubled_count
@@ -96,6 +97,7 @@ def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
     view, graph = plan.view, plan.graph
     size = {"camera": view.name, "width": view.width, "height": view.height, "samples": view.samples}
     whole = graph.without_loaders()
+    rays = expected_rays(graph.scene, (view,), plan.computed)
     return {
         "views": [size | ({"first_samples": view.adaptive.first} if view.is_adaptive else {})],
         "layers": [layer.name for layer in plan.outputs],
@@ -103,7 +105,8 @@ def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
         "once": [node.output for node in plan.once],
         "tile": [node.output for node in plan.tile],
         "skipped": why_not(whole, plan.outputs, plan),
-        "expected_rays": expected_rays(graph.scene, (view,), plan.computed),
+        "expected_rays": rays,
+        "ray_loop": ray_loop_name() if rays else None,
         "reused": dict(plan.lookup.reused),
         "expected_bytes": {**expected, **expected_bytes(plan)},
     }

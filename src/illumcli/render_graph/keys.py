@@ -73,12 +73,12 @@ def _installed(library: str) -> list[str]:
 
 
 def source_files(root: str) -> list[str]:
-    """The paths of all Python files that `SOURCES` names below a package's folder."""
+    """The paths of all source files that `SOURCES` names below a package's folder."""
     paths = []
     for name in SOURCES:
         place = os.path.join(root, name)
         files = [os.path.join(folder, each) for folder, _, names in os.walk(place) for each in names]
-        paths += [path for path in sorted(files or [place]) if path.endswith(".py")]
+        paths += [path for path in sorted(files or [place]) if path.endswith((".py", ".c"))]
     return paths
 
 

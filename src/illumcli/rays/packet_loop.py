@@ -1,0 +1,168 @@
+"""Ray queries in packets of rays: a C loop (`packets.c`) that calls the Embree library of embreex.
+
+The loop is a shared library beside this file. An installation compiles it if there is a C compiler
+(`hatch_build.py`). Its results have the same bits as those of embreex's loop, which is used without it.
+
+Closest hits use Embree's incoherent mode, which traverses each ray of a packet alone: hits at equal distances
+would depend on the other rays otherwise.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import weakref
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats, Vectors
+from illumcli.rays.embree_library import NATIVE_PACKETS, ROBUST, Handle, build_tree, check, embree_library
+from illumcli.rays.ray_loop import NO_LIMIT, Closest, batches
+
+INTERFACE = 1
+"""Version of the interface of `packets.c`; a library with another one is not used."""
+LIBRARY = Path(__file__).with_name("_packets.dll" if os.name == "nt" else "_packets.so")
+
+_NO_LIMIT = np.asarray(NO_LIMIT)
+
+
+class _Vectors(ctypes.Structure):
+    _fields_ = (("data", ctypes.c_void_p), ("stride", ctypes.c_int64), ("component", ctypes.c_int64))
+
+
+class _Rays(ctypes.Structure):
+    _fields_ = (
+        ("query", ctypes.c_void_p),
+        ("scene", ctypes.c_void_p),
+        ("arguments", ctypes.c_void_p),
+        ("width", ctypes.c_int64),
+        ("first", ctypes.c_int64),
+        ("end", ctypes.c_int64),
+        ("rays_per_origin", ctypes.c_int64),
+        ("origins", _Vectors),
+        ("directions", _Vectors),
+        ("limits", ctypes.c_void_p),
+        ("limit_stride", ctypes.c_int64),
+    )
+
+
+class _Hits(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("triangle", "u", "v", "distance"))
+
+
+@cache
+def packet_library() -> Any:
+    """The compiled loop, a ctypes.CDLL; None if it is missing or has another interface."""
+    try:
+        library = ctypes.CDLL(str(LIBRARY))
+        if library.illum_interface() != INTERFACE:
+            return None
+        library.illum_occluded.argtypes = [ctypes.POINTER(_Rays), ctypes.c_void_p]
+        library.illum_closest.argtypes = [ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)]
+    except (OSError, AttributeError):
+        return None
+    library.illum_occluded.restype = library.illum_closest.restype = None
+    return library
+
+
+@cache
+def native_widths() -> tuple[int, ...]:
+    """Rays per packet that Embree has kernels for on this processor, the widest first."""
+    library = embree_library()
+    device = library.rtcNewDevice(None)
+    if not device:
+        raise MemoryError
+    try:
+        return tuple(w for w, known in NATIVE_PACKETS if library.rtcGetDeviceProperty(device, known))
+    finally:
+        library.rtcReleaseDevice(device)
+
+
+def missing() -> str | None:
+    """What packets lack here; None if nothing."""
+    if packet_library() is None:
+        return "no compiled loop"
+    if embree_library() is None:
+        return "no Embree library found in embreex"
+    return None if native_widths() else "the processor has no native packets"
+
+
+class PacketLoop:
+    """Packets of `width` rays, by default the widest that is native; 1 is a loop over single rays."""
+
+    def __init__(
+        self, vertices: NDArray[np.float32], triangles: NDArray[np.int32], width: int | None = None
+    ) -> None:
+        library = embree_library()
+        self.width = native_widths()[0] if width is None else width
+        device = library.rtcNewDevice(None)
+        if not device:
+            check(library.rtcGetDeviceError(None))
+            raise MemoryError
+        scene = library.rtcNewScene(device)
+        weakref.finalize(self, _release, device, scene)
+        if not scene:
+            raise MemoryError
+        library.rtcSetSceneFlags(scene, ROBUST)
+        build_tree(device, scene, vertices, triangles)
+        self._scene: Handle = scene
+
+    def occluded(self, origins: Vectors, directions: Vectors, limits: Floats) -> NDArray[np.bool_]:
+        out = np.empty(len(directions), np.bool_)
+        rays = self._rays("rtcOccluded", origins, directions, limits)
+        for part in batches(len(directions)):
+            rays.first, rays.end = part.start, part.stop
+            packet_library().illum_occluded(rays, out.ctypes.data)
+        return out
+
+    def closest(self, origins: Vectors, directions: Vectors) -> Closest:
+        hits = Closest.empty(len(directions))
+        places = {name: array.ctypes.data for name, array in vars(hits).items()}
+        self._intersect(origins, directions, _Hits(**places))
+        return hits
+
+    def distance(self, origins: Vectors, directions: Vectors) -> Floats:
+        out = np.empty(len(directions), F)
+        self._intersect(origins, directions, _Hits(distance=out.ctypes.data))
+        return out
+
+    def _intersect(self, origins: Vectors, directions: Vectors, hits: _Hits) -> None:
+        rays = self._rays("rtcIntersect", origins, directions, _NO_LIMIT)
+        for part in batches(len(directions)):
+            rays.first, rays.end = part.start, part.stop
+            packet_library().illum_closest(rays, hits)
+
+    def _rays(self, query: str, origins: Vectors, directions: Vectors, limits: Floats) -> _Rays:
+        """The rays as the C loop takes them; the arrays must outlive it."""
+        count = len(directions)
+        return _Rays(
+            query=_address(f"{query}{self.width}"),
+            scene=self._scene,
+            width=self.width,
+            rays_per_origin=count // max(len(origins), 1) or 1,
+            origins=_vectors(origins),
+            directions=_vectors(directions),
+            limits=limits.ctypes.data,
+            limit_stride=1 if limits.ndim else 0,
+        )
+
+
+def _vectors(array: Vectors) -> _Vectors:
+    return _Vectors(array.ctypes.data, *array.strides)
+
+
+@cache
+def _address(name: str) -> int | None:
+    """Where a function of Embree is in memory."""
+    return ctypes.cast(getattr(embree_library(), name), ctypes.c_void_p).value
+
+
+def _release(device: Handle, scene: Handle | None) -> None:
+    library = embree_library()
+    if scene:
+        library.rtcReleaseScene(scene)
+    library.rtcReleaseDevice(device)

@@ -15,11 +15,18 @@ FEWEST, MOST = 1 << 12, 1 << 16
 thread four times as often as those over 2^16, which costs more."""
 TILES = 24
 """For threads to share a picture has about so many, where that makes them no smaller than `FEWEST`."""
+MANY_STEPS, FEWEST_OF_MANY = 128, 1 << 14
+"""Steps of many lights are short, and threads wait for the interpreter after each: larger tiles have fewer."""
 
 
-def tile_side(samples: int, pixels: int) -> int:
-    """Pixels along a square tile's side, a multiple of 8."""
-    shared = max(math.isqrt(FEWEST // samples), math.isqrt(pixels // TILES))
+def fewest_samples(steps: int) -> int:
+    """Samples of the smallest tiles that a picture is divided into, where so many steps run for each."""
+    return FEWEST_OF_MANY if steps >= MANY_STEPS else FEWEST
+
+
+def tile_side(samples: int, pixels: int, fewest: int = FEWEST) -> int:
+    """Pixels along a square tile's side, a multiple of 8; no tile is to hold fewer samples than `fewest`."""
+    shared = max(math.isqrt(fewest // samples), math.isqrt(pixels // TILES))
     return max(8, min(shared, math.isqrt(MOST // samples)) // 8 * 8)
 
 

@@ -214,9 +214,10 @@ def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:
         reasons |= dict.fromkeys(("obscurance", *traced), "the scene has no obscurance: w = 1")
     if any(needs.is_baked(scene)):
         reasons |= dict.fromkeys(traced, "the obscurance is baked")
+    lights = scene.named_lights()
     for name in names:
         kind, _, light_name = name.partition(":")
-        light = scene.named_lights().get(light_name) if light_name else None
+        light = lights.get(light_name) if light_name else None
         if kind in ("camera", "mesh") or light is None:
             continue
         if not needs.sends(light):

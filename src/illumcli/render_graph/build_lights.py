@@ -16,6 +16,11 @@ from illumcli.shading.direct import add, black, direct, irradiance, one_lobe, su
 from illumcli.shading.rates import RATES
 from illumcli.visibility.shadows import shadow, smooth_surface
 
+BLOCK = 16
+"""Terms of a sum that are added at once, where it has many."""
+DEEPEST = 64
+"""Blocks of a sum, each of which reads the one before it; of more terms blocks are larger."""
+
 
 def light_nodes(scene: Scene) -> list[Node]:
     """What all lights take, each by its name; a light that sends nothing has neither rays nor response."""
@@ -83,10 +88,10 @@ def sum_nodes(scene: Scene) -> list[Node]:
     weighed = {"obscurance": "obscurance"} if needs.weighs_ambient(scene) else {}
     nodes = [
         Node.of(partial(ambient, scene.ambient.color), "ambient", **weighed),
-        _sum("direct", [f"light:{name}" for name in lights]),
-        _sum("irradiance", [f"irradiance:{name}" for name in lights]),
-        _sum("diffuse", [f"diffuse:{name}" for name in lights]),
-        _sum("specular", [f"specular:{name}" for name in lights]),
+        *_sum("direct", [f"light:{name}" for name in lights]),
+        *_sum("irradiance", [f"irradiance:{name}" for name in lights]),
+        *_sum("diffuse", [f"diffuse:{name}" for name in lights]),
+        *_sum("specular", [f"specular:{name}" for name in lights]),
     ]
 
     # The beauty: what is emitted, ambient light and all lights, in this order; then the depth cue.
@@ -98,9 +103,19 @@ def sum_nodes(scene: Scene) -> list[Node]:
         parts += ["ambient"] if needs.is_ambient(scene) else []
         parts += [f"light:{name}" for name in lights]
     if scene.depth_cue is None:
-        return [*nodes, _sum("beauty", parts)]
-    return [*nodes, _sum("uncued", parts), Node.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
+        return [*nodes, *_sum("beauty", parts)]
+    return [*nodes, *_sum("uncued", parts), Node.of(partial(stages.depth_cued, scene.depth_cue), "beauty")]
 
 
-def _sum(output: str, parts: list[str]) -> Node:
-    return Node(output, add, {"hits": "hits", **{part: part for part in parts}})
+def _sum(output: str, parts: list[str]) -> list[Node]:
+    """The sum of some buffers in their order. Of many lights only a block is held at a time: its sum is added
+    to before the next block is computed."""
+    size = max(BLOCK, -(-len(parts) // DEEPEST))
+    nodes: list[Node] = []
+    for first in range(0, max(len(parts), 1), size):
+        before = [node.output for node in nodes[-1:]]
+        end = first + size
+        name = output if end >= len(parts) else f"{output} of {end}"
+        own = {part: part for part in [*before, *parts[first:end]]}
+        nodes.append(Node(name, add, {"hits": "hits", **own}))
+    return nodes

@@ -44,7 +44,8 @@ def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) ->
     names = graph.scene.object_names()
     reasons |= {f"object:{names[number]}": CULLED for number in graph.culled}
     if plan is not None:
-        skipped = (name for name in order if name not in plan.buffers and name not in graph.known)
+        taken = plan.buffers | graph.known.keys()
+        skipped = (name for name in order if name not in taken)
         reasons |= dict.fromkeys(skipped, CACHED)
     return reasons
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from illumcli.errors import InputError
-from illumcli.film.tiles import tile_side
+from illumcli.film.tiles import fewest_samples, tile_side
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import Layer
@@ -58,7 +58,8 @@ class Plan(Value):
 
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default, in whole blocks where these have one error."""
-        side = side or tile_side(view.samples, view.width * view.height)
+        fewest = fewest_samples(len(self.tile))
+        side = side or tile_side(view.samples, view.width * view.height, fewest)
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side
 
     def needed_for(self, name: str) -> frozenset[str]:

@@ -23,8 +23,8 @@ materials: {dust: {model: lunar_lambert, diffuse: 0.5}}
 lights: [{light: beam, position: [0, 0, 0], direction: [0, -1, 0], radius: 0.8, irradiance: 3}]
 objects:
   - {mesh: {shape: star, radius: 3}, material: dust}
-  - {mesh: pyramid.off, material: dust}
-outputs: {layers: [beauty, lights, obscurance, slope], files: [out.exr], colour: float}
+  - {mesh: pyramid.off, material: dust, shading: faceted}
+outputs: {layers: [beauty, lights, obscurance, slope, incident_angles], files: [out.exr], colour: float}
 """
 OFF = "OFF\n5 5 0\n-1 0 -1\n1 0 -1\n1 0 1\n-1 0 1\n0 1 0\n4 0 1 2 3\n3 0 4 1\n3 1 4 2\n3 2 4 3\n3 3 4 0\n"
 CHECK = """
@@ -39,6 +39,12 @@ on_star = (slope == 0) & (w > 0)
 assert (lit & (slope == 45)).any()
 assert (on_star & ~lit).any()
 assert w[on_star].min() < 1
+
+angle = np.round(channels["angle.beam1.Y"], 3)
+assert np.array_equal(angle, slope)  # the light comes along y
+
+shown = read_image("slope.png").channels["Y"]
+assert np.allclose(shown * 180, slope, atol=0.4)
 """
 
 
@@ -60,12 +66,13 @@ def copy(tmp_path_factory) -> Path:
     """A copy of the package and the shared tests, with all examples in it."""
     folder = tmp_path_factory.mktemp("contributing")
     for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/visibility/test_samplers.py",
-                 "tests/test_layers.py", "scenes", "pyproject.toml"):  # fmt: skip
+                 "tests/test_layers.py", "tests/render_graph/test_polygons.py", "tests/planned.py", "scenes",
+                 "pyproject.toml"):  # fmt: skip
         place = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         place(ROOT / name, folder / name)
     examples = EXAMPLE.findall((ROOT / "CONTRIBUTING.md").read_text())
-    assert len(examples) == 10
+    assert len(examples) == 14
     for name, kind, block in examples:
         path = folder / name
         if kind == "diff":
@@ -97,6 +104,7 @@ def test_examples_are_clean(copy):
     [
         ("tests/models", "LunarLambert or test_lunar_lambert"),
         ("tests/visibility/test_samplers.py", "r2"),
+        ("tests/render_graph/test_polygons.py", "faceted"),
         ("tests/test_layers.py", "layer"),
     ],
 )
@@ -108,7 +116,10 @@ def test_a_scene_is_rendered_with_all_examples(copy):
     (copy / "scene.yaml").write_text(SCENE)
     (copy / "pyramid.off").write_text(OFF)
     run(copy, "illumcli", "render", "scene.yaml")
+    run(copy, "illumcli", "render", "scene.yaml", "--only", "slope", "-o", "slope.png")
     (copy / "check.py").write_text(CHECK)
     run(copy, "check")
     assert "once, as in dark dust" in run(copy, "illumcli", "models", "lunar_lambert")
-    assert '"slope"' in run(copy, "illumcli", "schema")
+    schema = run(copy, "illumcli", "schema")
+    for name in ("slope", "incident_angles", "faceted", "r2"):
+        assert f"`{name}`: " in schema

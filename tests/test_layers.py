@@ -11,9 +11,7 @@ from illumcli.layers import (
     NAMES,
     PER_LIGHT,
     layer_of_channel,
-    of_light,
     owner_of,
-    shadow_of,
 )
 
 
@@ -29,7 +27,7 @@ def test_a_light_may_not_have_the_name_of_a_layer_or_of_its_channels(name):
 @pytest.mark.parametrize("name", ["key", "n", "r", "a", "Z1", "beauty2", "Shadow", "point1", "_"])
 def test_other_names_share_neither_layer_nor_channels(name):
     assert owner_of(name) is None
-    own = [of_light(name), shadow_of(name)]
+    own = [row.of(name) for row in PER_LIGHT.values()]
     assert not {layer.name.casefold() for layer in own} & {layer.casefold() for layer in FIXED}
     assert not groups(own) & groups(FIXED.values())
     assert not {layer.buffer for layer in own} & {layer.buffer for layer in FIXED.values()}
@@ -45,7 +43,10 @@ def test_a_name_is_a_layer_or_stands_for_one_of_each_light():
     assert len(set(NAMES)) == len(NAMES)
 
 
-@pytest.mark.parametrize("layer", [*FIXED.values(), of_light("key"), shadow_of("key.fill_id")])
+@pytest.mark.parametrize(
+    "layer",
+    [*FIXED.values(), *(row.of(name) for row in PER_LIGHT.values() for name in ("key", "key.fill_id"))],
+)
 def test_a_channel_leads_to_its_layer(layer):
     for channel in layer.channels:
         assert layer_of_channel(channel) == layer
@@ -59,5 +60,8 @@ def test_every_layer_can_be_shown_and_has_a_buffer_in_some_scene(root):
     buffers = set()
     for path in sorted((root / "scenes").glob("*.yaml")):
         loaded = load(path)
-        buffers |= set(build(loaded.scene, loaded).nodes)
+        nodes = build(loaded.scene, loaded).nodes
+        buffers |= set(nodes)
+        for light in loaded.scene.named_lights():
+            assert {row.of(light).buffer for row in PER_LIGHT.values()} <= set(nodes), path
     assert {layer.buffer for layer in FIXED.values()} <= buffers

@@ -1,8 +1,8 @@
-"""Every output layer once: a new layer is a row of `LAYERS` and a node that makes its buffer."""
+"""Every output layer once: a new layer is a row of `LAYERS` and a node that computes its buffer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal, TypeAlias
 
 from illumcli.records import Value
@@ -23,7 +23,9 @@ class Layer(Value):
     kind: Kind = "light"
     preview: Preview = "value"
     signed: bool = False  # may be negative
+    white: float = 1.0  # the number that the preview `value` shows white
     per_pixel: bool = False  # made pixel by pixel from whole blocks of pixels
+    text: str = ""  # what it holds, for the schema
 
     @property
     def data(self) -> bool:
@@ -35,62 +37,79 @@ class PerLight(Value):
     """A name that stands for one layer per light."""
 
     name: str
-    layer: Callable[[str], Layer]  # of the light of a name
+    layer: Layer  # of the light `{light}`
+    text: str  # what these layers hold
+
+    def of(self, light: str) -> Layer:
+        """The layer of the light of a name."""
+        names = (self.layer.name, self.layer.buffer, *self.layer.channels)
+        name, buffer, *channels = (text.replace(LIGHT, light) for text in names)
+        return replace(self.layer, name=name, buffer=buffer, channels=tuple(channels))
+
+    @property
+    def prefix(self) -> str:
+        """What stands before the light's name in those of its layer and channels."""
+        return self.layer.name.partition(LIGHT)[0]
 
 
 def _channels(group: str, names: str) -> tuple[str, ...]:
     return tuple(f"{group}.{name}" for name in names)
 
 
-def of_light(light: str) -> Layer:
-    """The light that one light alone makes."""
-    return Layer(light, f"light:{light}", _channels(light, "RGB"))
-
-
-def shadow_of(light: str) -> Layer:
-    """Where one light arrives."""
-    return Layer(f"shadow.{light}", f"shadow:{light}", _channels(f"shadow.{light}", "Y"), "share")
-
-
+LIGHT = "{light}"
+"""Stands for the name of a light."""
+# fmt: off
 LAYERS: tuple[Layer | PerLight, ...] = (
-    Layer("beauty", "beauty", ("R", "G", "B")),
-    Layer("ambient", "ambient", _channels("ambient", "RGB")),
-    Layer("diffuse", "diffuse", _channels("diffuse", "RGB")),
-    Layer("specular", "specular", _channels("specular", "RGB")),
-    Layer("emission", "emission", _channels("emission", "RGB")),
-    PerLight("lights", of_light),
-    PerLight("shadows", shadow_of),
-    Layer("obscurance", "obscurance", _channels("obscurance", "Y"), "share"),
-    Layer("alpha", "alpha", ("A",), "share"),
-    Layer("depth", "depth", ("Z",), "data", "depth"),
-    Layer("position", "world_position", _channels("P", "XYZ"), "data", "position", signed=True),
-    Layer("normal", "normal", _channels("N", "XYZ"), "data", "direction", signed=True),
-    Layer("geometric_normal", "geometric_normal", _channels("Ng", "XYZ"), "data", "direction", signed=True),
-    Layer("uv", "uv", _channels("uv", "UV"), "data", "fraction", signed=True),
-    Layer("object_id", "object_id", _channels("objectId", "Y"), "id", "number"),
-    Layer("material_id", "material_id", _channels("materialId", "Y"), "id", "number"),
-    Layer("triangle_id", "triangle_id", _channels("triangleId", "Y"), "id", "number"),
-    Layer("error", "error", _channels("error", "Y"), "data", per_pixel=True),
+    Layer("beauty", "beauty", ("R", "G", "B"), text="the picture."),
+    Layer("ambient", "ambient", _channels("ambient", "RGB"), text="its ambient light alone."),
+    Layer("diffuse", "diffuse", _channels("diffuse", "RGB"), text="the diffuse lobes under all lights."),
+    Layer("specular", "specular", _channels("specular", "RGB"), text="the highlights under all lights."),
+    Layer("emission", "emission", _channels("emission", "RGB"), text="what surfaces emit."),
+    PerLight("lights", Layer("{light}", "light:{light}", _channels("{light}", "RGB")),
+             text="the light of every lamp by itself, a layer each."),
+    PerLight("shadows", Layer("shadow.{light}", "shadow:{light}", _channels("shadow.{light}", "Y"), "share"),
+             text="1 where a lamp reaches, 0 in its shadow, a layer each."),
+    Layer("obscurance", "obscurance", _channels("obscurance", "Y"), "share", text="w, 1 where open."),
+    Layer("alpha", "alpha", ("A",), "share", text="the share of the pixel that is covered."),
+    Layer("depth", "depth", ("Z",), "data", "depth", text="distance from the eye's plane [scene units]."),
+    Layer("position", "world_position", _channels("P", "XYZ"), "data", "position", signed=True,
+          text="of the surface [scene units]."),
+    Layer("normal", "normal", _channels("N", "XYZ"), "data", "direction", signed=True,
+          text="the one that is shaded with."),
+    Layer("geometric_normal", "geometric_normal", _channels("Ng", "XYZ"), "data", "direction", signed=True,
+          text="the polygon's own."),
+    Layer("uv", "uv", _channels("uv", "UV"), "data", "fraction", signed=True, text="texture coordinates."),
+    Layer("object_id", "object_id", _channels("objectId", "Y"), "id", "number",
+          text="number of the object, from 1."),
+    Layer("material_id", "material_id", _channels("materialId", "Y"), "id", "number",
+          text="number of the material, from 1."),
+    Layer("triangle_id", "triangle_id", _channels("triangleId", "Y"), "id", "number",
+          text="number of the triangle, from 1."),
+    Layer("error", "error", _channels("error", "Y"), "data", per_pixel=True,
+          text="one standard error of the pixel's luminance."),
 )
+# fmt: on
 """In the order in which they are listed to users."""
 
 NAMES = tuple(row.name for row in LAYERS)
 FIXED = {row.name: row for row in LAYERS if isinstance(row, Layer)}
 """The layers that any scene has."""
-PER_LIGHT = {row.name: row.layer for row in LAYERS if isinstance(row, PerLight)}
+PER_LIGHT = {row.name: row for row in LAYERS if isinstance(row, PerLight)}
 """Those that each light adds."""
 CHANNEL_GROUPS = {
     channel.partition(".")[0]: layer.name for layer in FIXED.values() for channel in layer.channels
-} | {"shadow": "shadows"}
+} | {row.prefix.rstrip("."): row.name for row in PER_LIGHT.values() if row.prefix}
 """What stands before the dot of a channel's name, or a channel without one, and its layer."""
 
 
 def layer_of_channel(channel: str) -> Layer:
     """The layer that a channel of an image file is part of."""
-    group, _, name = channel.partition(".")
-    if group == "shadow":
-        return shadow_of(name.rpartition(".")[0])
-    return FIXED[CHANNEL_GROUPS[group]] if group in CHANNEL_GROUPS else of_light(group)
+    name = CHANNEL_GROUPS.get(channel.partition(".")[0], "lights")
+    if name in FIXED:
+        return FIXED[name]
+    row = PER_LIGHT[name]
+    light = channel.removeprefix(row.prefix)
+    return row.of(light.rpartition(".")[0] or light)
 
 
 def owner_of(name: str) -> str | None:

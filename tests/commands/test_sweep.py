@@ -88,7 +88,11 @@ def runs(monkeypatch):
     ("change", "camera", "once"),
     [
         ("objects.0.transform.translate=[0,0,0],[0.1,0,0],[0.2,0,0]", "", ["mesh", "meshes"]),
-        ("objects.0.transform.translate=[0,0,0],[0.1,0,0],[0.2,0,0]", "camera: {fit: ball}", ["mesh", "meshes"]),
+        (
+            "objects.0.transform.translate=[0,0,0],[0.1,0,0],[0.2,0,0]",
+            "camera: {fit: ball}",
+            ["mesh", "meshes"],
+        ),
         ("camera.position=[0,1,6],[0,2,6],[0,3,6]", "", ["mesh", "meshes", "geometry", "tracer"]),
         ("film.samples=1,2,4", "", ["mesh", "meshes", "geometry", "tracer"]),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.film.preview import DARKEST, reading, viewable
-from illumcli.layers import FIXED, shadow_of
+from illumcli.layers import FIXED, PER_LIGHT, Layer
 
 SCALE, CENTRE = 4.0, (1.0, -2.0, 0.5)
 
@@ -54,7 +54,13 @@ def test_neighbouring_ids_differ_in_hue_and_0_is_black(name):
     assert np.abs(np.diff(v[1:], axis=0)).max(axis=1).min() > 0.1
 
 
+def test_values_beyond_1_are_shown_against_their_white():
+    layer = Layer("slope", "slope", ("slope.Y",), "data", white=180)
+    assert viewable(layer, np.array([[[90], [180]]], np.float32), SCALE, CENTRE).tolist() == [[[0.5], [1]]]
+    assert reading(layer, SCALE, CENTRE) == {"illum:values": "value = 180 v"}
+
+
 def test_a_shadow_is_its_value_whatever_its_light_is_called():
-    layer = shadow_of("lamp_id")
+    layer = PER_LIGHT["shadows"].of("lamp_id")
     assert viewable(layer, np.array([[[0.25]]], np.float32), SCALE, CENTRE).tolist() == [[[0.25]]]
     assert reading(layer, SCALE, CENTRE) == {"illum:values": "value = v"}

@@ -20,10 +20,11 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from illumcli.shading import rates as shading_rates
 from metamorphic import surfaces
 from metamorphic.surfaces import Surface
 
-RATES = ("constant", "gouraud", "phong", "quadratic")
+RATES = tuple(shading_rates.RATES)
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 

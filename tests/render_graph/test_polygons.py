@@ -7,9 +7,9 @@ import pytest
 
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
+from illumcli.shading.rates import RATES
 from planned import planned
 
-RATES = ("constant", "gouraud", "phong", "quadratic")
 SCENE = """
 version: 1
 camera: {{position: [2, 4, 5], target: [0, 0, 0], fov: 40}}

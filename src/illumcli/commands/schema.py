@@ -8,9 +8,12 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 
+from illumcli.layers import LAYERS
 from illumcli.scene.spec import Scene
 from illumcli.schema.description import Description
 from illumcli.schema.docs import choices, field_docs, summary
+from illumcli.shading.rates import RATES
+from illumcli.visibility.samplers import SAMPLERS
 
 EXTENDS = {
     "description": "Scenes that this one extends, by path from its own folder: mappings merge, anything else "
@@ -89,9 +92,31 @@ def schema_of(cls: type[Description]) -> dict[str, Any]:
     return cls.model_json_schema(schema_generator=_Schema)
 
 
+TABLES: tuple[Mapping[str, str], ...] = (
+    {row.name: row.text for row in LAYERS},
+    {name: rate.text for name, rate in RATES.items()},
+    {name: sampler.text for name, sampler in SAMPLERS.items()},
+)
+"""What the rows of tables mean whose names are choices."""
+
+
+def _with_rows(part: dict[str, Any], text: str) -> str:
+    """A field's text, with what each choice means where the choices are the rows of a table."""
+    for inner in _inner(part):
+        for table in TABLES:
+            if inner.get("enum") == list(table):
+                text = " ".join([text, *(f"`{name}`: {meaning}" for name, meaning in table.items())])
+    return text
+
+
+def _inner(part: dict[str, Any]) -> list[dict[str, Any]]:
+    """The parts of a field's schema in which its choices may stand."""
+    return [part, part.get("items", {}), *part.get("anyOf", ())]
+
+
 def _describe_choices(part: dict[str, Any], text: str) -> None:
     """Put what a field's text says of each choice beside the choices, as editors show it."""
-    for inner in [part, part.get("items", {}), *part.get("anyOf", ())]:
+    for inner in _inner(part):
         if "enum" in inner and (sentences := choices(text, inner["enum"])):
             inner["enumDescriptions"] = sentences
 
@@ -110,7 +135,7 @@ class _Schema(GenerateJsonSchema):
         properties, required = generated["properties"], set(generated.get("required", ()))
         for name, part in properties.items():
             if text := docs.get(name) or ("const" in part and summary(cls)):
-                part["description"] = text
+                part["description"] = text = _with_rows(part, text)
                 _describe_choices(part, text)
             if part.get("default") == {}:  # a description with all its defaults
                 del part["default"]

@@ -33,12 +33,16 @@ def viewable(layer: Layer, values: NDArray[Any], scale: float, centre: Centre) -
         Of the scene, in the middle of the range of positions.
     """
     show, _ = PREVIEWS[layer.preview]
+    if layer.white != 1:
+        values = values / F(layer.white)
     return np.clip(show(values, scale, centre), 0, 1).astype(F)
 
 
 def reading(layer: Layer, scale: float, centre: Centre) -> dict[str, Any]:
     """How to get a layer's values back from the numbers v = byte / 255 of its picture, as metadata."""
     _, text = PREVIEWS[layer.preview]
+    if layer.white != 1:
+        text = text.replace("= v", f"= {layer.white:g} v")
     metadata: dict[str, Any] = {"illum:values": text}
     if "illum:scale" in text:
         metadata["illum:scale"] = scale

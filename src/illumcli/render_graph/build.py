@@ -113,8 +113,10 @@ def _surface_nodes(scene: Scene) -> list[Node]:
     """Samples, what they hit, and where models are evaluated."""
     rates = needs.rates(scene)
     smooth = {"normals": "corner_normals"} if needs.is_smooth(scene) else {}
-    once = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if "constant" in rates else {}
-    planar = {"planar_polygons": "planar_polygons"} if smooth or any(needs.is_baked(scene)) else {}
+    of_polygons = any(RATES[rate].of_polygons for rate in rates)
+    once = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if of_polygons else {}
+    interpolates = any(not RATES[rate].of_polygons for rate in rates) or any(needs.is_baked(scene))
+    planar = {"planar_polygons": "planar_polygons"} if interpolates else {}
     # polygons that are flat by their normals need no weights where these alone are interpolated
     weights = "normal_weights" if all(RATES[rate].normals_alone for rate in set(rates)) and rates else None
     grains = tuple(thing.grain for thing in scene.objects)

@@ -21,13 +21,14 @@ from illumcli.render_graph import needs, stages
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import MeshFile, Normals, Object, Scene
+from illumcli.shading.rates import RATES
 
 
 def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     """Meshes, and what is made of them all."""
     transforms = tuple(thing.transform for thing in scene.objects)
     rates = needs.rates(scene)
-    flat = tuple(rate == "constant" or scene.terminator == "none" for rate in rates)
+    flat = tuple(not RATES[rate].is_smooth or scene.terminator == "none" for rate in rates)
     return [
         *_mesh_nodes(scene, loaded),
         Node.of(partial(bounds_of, transforms), "object_bounds"),
@@ -56,8 +57,8 @@ def _normal_nodes(scene: Scene) -> list[Node]:
     """All triangles, and their shading normals."""
     says = [source.normals if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     by_file = tuple(each is None or each.source == "file" for each in says)
-    rates = needs.rates(scene)
-    how = tuple("flat" if rate == "constant" else each for rate, each in zip(rates, says, strict=True))
+    smooth = [RATES[rate].is_smooth for rate in needs.rates(scene)]
+    how = tuple(each if curved else "flat" for curved, each in zip(smooth, says, strict=True))
     methods = tuple("newell" if each is None else each.polygon for each in says)
     return [
         Node.of(partial(scene_geometry, by_file), "geometry"),
@@ -74,7 +75,8 @@ def _repair_nodes(scene: Scene) -> list[Node]:
         for source, name in zip(sources, scene.object_names(), strict=True)
     )
     computes = tuple(
-        rate != "constant" and _computes_normals(source) for rate, source in zip(rates, sources, strict=True)
+        RATES[rate].is_smooth and _computes_normals(source)
+        for rate, source in zip(rates, sources, strict=True)
     )
     wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
     selects = tuple(_selects(scene, thing) for thing in scene.objects)

@@ -26,7 +26,7 @@ def light_nodes(scene: Scene) -> list[Node]:
     """What all lights take, each by its name; a light that sends nothing has neither rays nor response."""
     # The surface that normals imply, from which shadow rays start; none where every object is flat.
     smooth = needs.is_smooth(scene)
-    flat = tuple(rate == "constant" for rate in needs.rates(scene))
+    flat = tuple(not RATES[rate].is_smooth for rate in needs.rates(scene))
     nodes = [
         Node.of(SmoothParts, "smooth_parts", normals="corner_normals"),
         Node.of(partial(smooth_surface, flat), "smooth_surface"),

@@ -41,7 +41,7 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
     InputError
         A name that is no layer of this scene.
     """
-    per_light = {name: [of(light) for light in scene.named_lights()] for name, of in PER_LIGHT.items()}
+    per_light = {name: [row.of(light) for light in scene.named_lights()] for name, row in PER_LIGHT.items()}
     layers_of_lights = [layer for layers in per_light.values() for layer in layers]
     known = {layer.name: [layer] for layer in [*layers_of_lights, *FIXED.values()]} | per_light
     problems = [f"no layer '{name}'; {suggestion(name, tuple(known))}" for name in names if name not in known]

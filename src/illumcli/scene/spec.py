@@ -39,20 +39,22 @@ from illumcli.schema.fields import (
     spread,
 )
 from illumcli.schema.messages import describe
+from illumcli.shading.rates import RATES
 from illumcli.visibility.falloffs import AnyFalloff
 from illumcli.visibility.samplers import SAMPLERS
 
-Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
 Count: TypeAlias = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Strict(False)]
 Matrix: TypeAlias = Annotated[tuple[Row, Row, Row, Row], Strict(False)]
 
-# names of tables
+# names of tables, whose rows say what each means
 if TYPE_CHECKING:
     Layer: TypeAlias = str
+    Rate: TypeAlias = str
     Sampler: TypeAlias = str
 else:
     Layer = Literal[NAMES]
+    Rate = Literal[tuple(RATES)]
     Sampler = Literal[tuple(SAMPLERS)]
 
 
@@ -167,9 +169,7 @@ class Object(Description):
     transform: Transform = DEFAULTS
     """Where it stands, and how large."""
     shading: Rate | None = None
-    """How often its material is evaluated; by default as often as the scene says. `constant`: once per
-    polygon. `gouraud`: once per vertex, intensities interpolated. `phong`: once per sample, normals
-    interpolated linearly. `quadratic`: once per sample, normals interpolated quadratically."""
+    """How often its material is evaluated; by default as often as the scene says."""
     grain: AnyGrain | None = None
     """Tangent of anisotropic materials: a direction the grain follows, or rings about an axis;
     by default the direction of growing u."""
@@ -340,8 +340,7 @@ class Obscurance(Description):
     falloff: AnyFalloff = default_of({"falloff": "step"})
     """By default every occluder counts fully: ambient occlusion."""
     sampler: Sampler = "spiral"
-    """`spiral`: golden-angle spirals, the least error on visibility. `owen`: Owen-scrambled Sobol points,
-    less error where mu is smooth. `random`: independent rays, for scale."""
+    """Which directions the rays of a point have."""
     faces: Literal["count", "ignore", "one_sided"] = "count"
     """What becomes of a ray that meets a face from behind. `count`: the face hides like any other. `ignore`:
     the ray passes through. `one_sided`: it counts as free."""
@@ -354,14 +353,7 @@ class Outputs(Description):
     """What is written."""
 
     layers: Annotated[ListOf[Layer], Field(min_length=1)] = ("beauty",)
-    """What is made of the scene. `beauty`: the picture. `ambient`: its ambient light alone. `diffuse`: the
-    diffuse lobes under all lights. `specular`: the highlights under all lights. `emission`: what surfaces
-    emit. `lights`: the light of every lamp by itself, a layer each. `shadows`: 1 where a lamp reaches, 0 in
-    its shadow, a layer each. `obscurance`: w, 1 where open. `alpha`: the share of the pixel that is covered.
-    `depth`: distance from the eye's plane [scene units]. `position`: of the surface [scene units]. `normal`:
-    the one that is shaded with. `geometric_normal`: the polygon's own. `uv`: texture coordinates.
-    `object_id`: number of the object, from 1. `material_id`: number of the material, from 1. `triangle_id`:
-    number of the triangle, from 1. `error`: one standard error of the pixel's luminance."""
+    """What is made of the scene."""
     files: Annotated[ListOf[str], Field(min_length=1)] = ("{scene}.{camera}.png",)
     """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
     file per layer (`{layer}` in its name when there are several): light as sRGB, all else as plain numbers;
@@ -383,9 +375,7 @@ class Scene(Description):
     film: Film = DEFAULTS
     """Size and sampling of the picture."""
     shading: Rate = "phong"
-    """How often the model is evaluated. `constant`: once per polygon. `gouraud`: once per vertex, intensities
-    interpolated. `phong`: once per sample, normals interpolated linearly. `quadratic`: once per sample,
-    normals interpolated quadratically."""
+    """How often the model is evaluated."""
     terminator: Literal["smooth", "none"] = "smooth"
     """Where shadows of smooth shading begin. `smooth`: on the surface that the normals imply, so that coarse
     polygons cast no shadow on its lit side. `none`: on the polygons themselves."""

@@ -15,6 +15,7 @@ from illumcli.scene.source import Path
 from illumcli.scene.spec import MeshFile, Object, Scene
 from illumcli.schema.annotations import field_annotation, number_range
 from illumcli.schema.description import Description
+from illumcli.shading.rates import RATES
 
 
 def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:
@@ -124,9 +125,10 @@ def _meshes(scene: Scene) -> Iterator[Fault]:
         if all(thing.material is not None for thing in things):
             fact = "is not used, its objects have materials of their own; leave these, or this, out"
             yield (*path, "materials"), fact
-        if all((thing.shading or scene.shading) == "constant" for thing in things):
+        rates = {thing.shading or scene.shading for thing in things}
+        if not any(RATES[rate].is_smooth for rate in rates):
             for key in ("source", "weights", "crease"):
-                fact = "is not used, the rate constant shades by polygons' own normals; leave it out"
+                fact = f"is not used, the rate {min(rates)} shades by polygons' own normals; leave it out"
                 yield (*path, "normals", key), fact
 
 

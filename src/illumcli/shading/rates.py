@@ -1,17 +1,18 @@
 """Shading rates: where models are evaluated, and how the samples get their values from there.
 
-constant   once per visible polygon, with the polygon's normal
-gouraud    once per vertex of a visible polygon, intensities interpolated (Gouraud 1971)
-phong      once per sample, normals interpolated linearly (Phong 1975)
-quadratic  once per sample, normals interpolated quadratically (van Overveld and Wyvill 1997)
-
 `RATES`, at the end, has a row for each.
+
+References
+----------
+Gouraud, H. (1971). Continuous shading of curved surfaces. IEEE Transactions on Computers C-20(6).
+Phong, B. T. (1975). Illumination for computer generated pictures. Communications of the ACM 18(6).
+van Overveld, C. W. A. M., Wyvill, B. (1997). Phong normal interpolation revisited. ACM ToG 16(4).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,8 @@ from illumcli.rays.corner_weights import (
 from illumcli.rays.interaction import ShadingContext, facing, interpolated, quadratic
 from illumcli.records import Record, Value
 
-Rate: TypeAlias = Literal["constant", "gouraud", "phong", "quadratic"]
-"""Names of the shading rates, the keys of `RATES`."""
+Rate: TypeAlias = str
+"""Name of a shading rate, a key of `RATES`."""
 
 
 class Identity(Record):
@@ -269,12 +270,16 @@ OwnPoints: TypeAlias = Callable[
 class ShadingRate(Value):
     """How often a model is evaluated, and with which normals."""
 
+    text: str
+    """What it does, for the schema."""
     normals: Normals
     """(M, 3) normals at the samples; also the axes of the hemispheres of obscurance rays."""
     points: OwnPoints | None = None
     """Its own shading points; None if models are evaluated at every sample."""
     is_smooth: bool = True
     """True if it reads the shading normals at corners."""
+    of_polygons: bool = False
+    """True if its points are polygons' centres, with the polygons' normals."""
     normals_alone: bool = False
     """True if only normals are interpolated over polygons, and linearly."""
 
@@ -285,9 +290,9 @@ class ShadingRate(Value):
 
 
 RATES: Mapping[Rate, ShadingRate] = {
-    "constant": ShadingRate(_flat, _constant, is_smooth=False),
-    "gouraud": ShadingRate(interpolated, _gouraud),
-    "phong": ShadingRate(interpolated, normals_alone=True),
-    "quadratic": ShadingRate(quadratic),
+    "constant": ShadingRate("once per polygon.", _flat, _constant, is_smooth=False, of_polygons=True),
+    "gouraud": ShadingRate("once per vertex, intensities interpolated.", interpolated, _gouraud),
+    "phong": ShadingRate("once per sample, normals interpolated linearly.", interpolated, normals_alone=True),
+    "quadratic": ShadingRate("once per sample, normals interpolated quadratically.", quadratic),
 }
-"""Every shading rate once. A new one is a row here and its name in `Rate`."""
+"""Every shading rate once, by the name in scenes."""

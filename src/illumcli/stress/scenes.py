@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import IllumError
+from illumcli.shading.rates import RATES
 from illumcli.stress.sandbox import CheckResult, Sandbox, faults, is_refusal, refusal
 
 Scene = dict[str, Any]
-RATES = ("phong", "gouraud", "constant", "quadratic")
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 BALL: Scene = {"mesh": {"shape": "sphere", "segments": 24, "rings": 12}}
 BOX: Scene = {"mesh": {"shape": "box"}}
@@ -295,7 +295,7 @@ MUST_REFUSE: dict[str, Callable[[Sandbox], Scene]] = {
 
 def check_scenes(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
     """A result per scene: rendered at every shading rate, or refused."""
-    rates = RATES[:2] if quick else RATES
+    rates = ("phong", "gouraud") if quick else tuple(RATES)
     size = {"width": 24, "height": 18, "samples": 1} if quick else {"width": 120, "height": 90, "samples": 2}
     results = [_rendered(name, make, sandbox, rates, size) for name, make in MUST_RENDER.items()]
     return results + [_refused(name, make, sandbox) for name, make in MUST_REFUSE.items()]

@@ -37,6 +37,8 @@ class Sampler(Value):
     directions: Directions
     """Function of draws, (2, M) in [0, 1), and the number of samples: (M, 3, samples) float32 cosine-weighted
     unit directions about the third axis. The draws phase or scramble each point's pattern."""
+    text: str
+    """What it is, for the schema."""
     turned: bool = False
     """True if the pattern is also turned about the normal, by the first draw."""
     variation: Callable[[NDArray[Any]], NDArray[np.float32]] = variance
@@ -123,9 +125,14 @@ def spiral_max_below(cosine: Floats, samples: int) -> NDArray[np.int64]:
 
 SAMPLERS: Mapping[str, Sampler] = {
     "spiral": Sampler(
-        "o", spiral_directions, turned=True, variation=spiral_variation, max_below=spiral_max_below
+        "o",
+        spiral_directions,
+        "golden-angle spirals, the least error on visibility.",
+        turned=True,
+        variation=spiral_variation,
+        max_below=spiral_max_below,
     ),
-    "owen": Sampler("x", owen_directions),
-    "random": Sampler(".", random_directions),
+    "owen": Sampler("x", owen_directions, "Owen-scrambled Sobol points, less error where mu is smooth."),
+    "random": Sampler(".", random_directions, "independent rays, for scale."),
 }
 """By the name in scenes and on the command line; the first is the default."""

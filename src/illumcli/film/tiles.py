@@ -16,7 +16,7 @@ thread four times as often as those over 2^16, which costs more."""
 TILES = 24
 """For threads to share a picture has about so many, where that makes them no smaller than `FEWEST`."""
 MANY_STEPS, FEWEST_OF_MANY = 128, 1 << 14
-"""Steps of many lights are short, and threads wait for the interpreter after each: larger tiles have fewer."""
+"""Threads wait for the interpreter after each step: where a tile has many, fewer and larger tiles."""
 
 
 def fewest_samples(steps: int) -> int:

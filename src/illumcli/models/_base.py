@@ -7,8 +7,9 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from illumcli.models._parameters import Color, Texture, VertexValues
+from illumcli.models._parameters import Texture, Varying, VertexValues
 from illumcli.schema.description import Description
+from illumcli.schema.fields import Color
 
 Lobe = Callable[..., Any]
 D = TypeVar("D", bound=Description)
@@ -27,9 +28,9 @@ class IlluminationModel(Description):
     left out); the shared tests check every claim.
     """
 
-    emission: Color = (0.0, 0.0, 0.0)
+    emission: Varying[Color] = (0.0, 0.0, 0.0)
     """L_e, light the surface emits by itself [W/(m^2 sr)]."""
-    ambient: Color | None = None
+    ambient: Varying[Color] | None = None
     """k_a, the share of ambient light that leaves towards the eye; by default what the model reflects
     diffusely."""
 

@@ -19,8 +19,9 @@ from pydantic import Discriminator
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._lobes import channels
-from illumcli.models._parameters import Albedo, ExtinctionColor, Index, IndexColor
+from illumcli.models._parameters import ExtinctionColor, Index, IndexColor, Varying
 from illumcli.schema.description import Description
+from illumcli.schema.fields import Albedo
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 
@@ -116,7 +117,7 @@ class Dielectric(Description):
     """A clear boundary: glass, water, plastic, lacquer."""
 
     F: Literal["dielectric"] = "dielectric"
-    ior: Index = 1.5
+    ior: Varying[Index] = 1.5
     """eta, index of refraction behind the surface over the one before it; below 1 it may reflect all."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
@@ -129,9 +130,9 @@ class Conductor(Description):
     """A metal, by its complex index in each channel."""
 
     F: Literal["conductor"] = "conductor"
-    n: IndexColor = (0.2, 0.92, 1.1)
+    n: Varying[IndexColor] = (0.2, 0.92, 1.1)
     """eta, real part of the index per channel."""
-    k: ExtinctionColor = (3.9, 2.45, 2.14)
+    k: Varying[ExtinctionColor] = (3.9, 2.45, 2.14)
     """k, imaginary part of the index per channel."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
@@ -143,7 +144,7 @@ class Schlick(Description):
     """Schlick's curve from the reflectance at normal incidence."""
 
     F: Literal["schlick"] = "schlick"
-    f0: Albedo = (0.04, 0.04, 0.04)
+    f0: Varying[Albedo] = (0.04, 0.04, 0.04)
     """F0, reflectance at normal incidence per channel."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
@@ -172,9 +173,9 @@ class Shifted(Description):
     """Cook and Torrance's shift of colour, from the material's at the normal to the light's at grazing."""
 
     F: Literal["shifted"] = "shifted"
-    color: Albedo = (0.95, 0.64, 0.54)
+    color: Varying[Albedo] = (0.95, 0.64, 0.54)
     """Colour of the reflection at normal incidence under white light; replaces F0."""
-    ior: Index = 10.0
+    ior: Varying[Index] = 10.0
     """eta, the average index that tells how fast the colour shifts."""
     grazing: Literal["white", "light"] = "white"
     """Colour at grazing. `white`: the light keeps its colour. `light`: the text's wording taken literally,
@@ -191,7 +192,7 @@ class Constant(Description):
     """The same reflectance at every angle."""
 
     F: Literal["constant"] = "constant"
-    value: Albedo = (1.0, 1.0, 1.0)
+    value: Varying[Albedo] = (1.0, 1.0, 1.0)
     """F per channel; 1 is a perfect mirror in every facet."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:

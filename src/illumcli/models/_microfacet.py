@@ -25,9 +25,10 @@ from pydantic import Discriminator
 
 from illumcli.arrays import Floats, as_dtype_of
 from illumcli.models._lobes import gauss_legendre, log_cos
-from illumcli.models._parameters import HalfHeight, NonNegative, Positive, Roughness
+from illumcli.models._parameters import HalfHeight, Roughness, Varying
 from illumcli.models._terms import Angle
 from illumcli.schema.description import Description
+from illumcli.schema.fields import NonNegative, Positive
 
 
 def gaussian(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
@@ -114,9 +115,9 @@ class Gaussian(Description):
     """Torrance and Sparrow's Gaussian of the angle, by its width."""
 
     D: Literal["gaussian"] = "gaussian"
-    m: Roughness = 0.3
+    m: Varying[Roughness] = 0.3
     """m, angle in radians at which D has fallen to 1/e."""
-    c: Positive | None = None
+    c: Varying[Positive] | None = None
     """c, height at the normal [1/sr]; left out, the c that normalises D."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -130,7 +131,7 @@ class Beckmann(Description):
     """Beckmann's distribution of a surface with Gaussian slopes."""
 
     D: Literal["beckmann"] = "beckmann"
-    m: Roughness = 0.3
+    m: Varying[Roughness] = 0.3
     """m, RMS slope: 0.05 polished, 1 very rough."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -144,7 +145,7 @@ class Blinn(Description):
     """Blinn's power of the cosine, by its half-height angle."""
 
     D: Literal["blinn"] = "blinn"
-    beta: HalfHeight = 0.3
+    beta: Varying[HalfHeight] = 0.3
     """beta, angle in radians at which D is half its height."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -158,7 +159,7 @@ class PowerCosine(Description):
     """Blinn's power of the cosine, by its exponent; about 2 / m^2 - 2 matches Beckmann."""
 
     D: Literal["power"] = "power"
-    exponent: NonNegative = 20.0
+    exponent: Varying[NonNegative] = 20.0
     """n, the exponent; 0 to 10^6 and beyond."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -171,7 +172,7 @@ class TorranceSparrow(Description):
     """Torrance and Sparrow's Gaussian of the angle, by its half-height angle."""
 
     D: Literal["torrance_sparrow"] = "torrance_sparrow"
-    beta: HalfHeight = 0.3
+    beta: Varying[HalfHeight] = 0.3
     """beta, angle in radians at which D is half its height."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -185,7 +186,7 @@ class TrowbridgeReitz(Description):
     """Trowbridge and Reitz's ellipsoids, by their half-height angle."""
 
     D: Literal["trowbridge_reitz"] = "trowbridge_reitz"
-    beta: HalfHeight = 0.3
+    beta: Varying[HalfHeight] = 0.3
     """beta, angle in radians at which D is half its height."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
@@ -199,7 +200,7 @@ class GGX(Description):
     """Walter's GGX: Trowbridge and Reitz by roughness."""
 
     D: Literal["ggx"] = "ggx"
-    alpha: Roughness = 0.3
+    alpha: Varying[Roughness] = 0.3
     """alpha, slope scale: 0.05 polished, 1 very rough; longer tails than Beckmann."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:

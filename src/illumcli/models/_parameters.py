@@ -1,4 +1,4 @@
-"""What a material parameter may be: a value in its range, or something that varies over the surface."""
+"""Parameters of materials: their ranges, and what may stand for one that varies over the surface."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import Discriminator, Field, Tag
 
-from illumcli.schema import fields as values
 from illumcli.schema.description import Description
-from illumcli.schema.fields import Shorthand, Triple, spread
+from illumcli.schema.fields import Color, Shorthand, Triple, spread
 
 
 class Texture(Description):
@@ -27,7 +26,7 @@ class Texture(Description):
     again, every second time mirrored."""
     channel: Literal["r", "g", "b", "a"] = "r"
     """The channel a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
-    factor: values.Color = (1.0, 1.0, 1.0)
+    factor: Color = (1.0, 1.0, 1.0)
     """What each value is multiplied by; a scalar parameter takes the first number."""
     vertex: str | None = None
     """Name of a per-vertex attribute that each value is multiplied by as well, as vertex colours are."""
@@ -40,7 +39,7 @@ class VertexValues(Description):
 
     vertex: str
     """Name of the attribute: `color` for vertex colours, or a scalar property of the file."""
-    factor: values.Color = (1.0, 1.0, 1.0)
+    factor: Color = (1.0, 1.0, 1.0)
     """What each value is multiplied by; a scalar parameter takes the first number."""
 
 
@@ -53,28 +52,19 @@ def _kind(value: Any) -> str:
 
 
 T = TypeVar("T")
+# a value, or what varies over the surface
 Varying: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
     Discriminator(_kind),
 ]
 
-Color: TypeAlias = Varying[values.Color]
-Albedo: TypeAlias = Varying[values.Albedo]
-Share: TypeAlias = Varying[values.Share]
-Positive: TypeAlias = Varying[values.Positive]
-NonNegative: TypeAlias = Varying[values.NonNegative]
-
 # a slope; below 1e-4 single precision holds no lobe
-Roughness: TypeAlias = Varying[Annotated[float, Field(ge=1e-4, le=10)]]
+Roughness: TypeAlias = Annotated[float, Field(ge=1e-4, le=10)]
 # an angle in radians, less than a quarter turn
-HalfHeight: TypeAlias = Varying[Annotated[float, Field(ge=1e-4, le=1.57)]]
+HalfHeight: TypeAlias = Annotated[float, Field(ge=1e-4, le=1.57)]
 # the spread of facet slopes, an angle in radians up to a quarter turn
-Spread: TypeAlias = Varying[Annotated[float, Field(ge=0, le=1.5708)]]
+Spread: TypeAlias = Annotated[float, Field(ge=0, le=1.5708)]
 # indices of refraction
-Index: TypeAlias = Varying[Annotated[float, Field(ge=0.01, le=1e3)]]
-IndexColor: TypeAlias = Varying[
-    Annotated[Triple[Annotated[float, Field(ge=0.01, le=1e3)]], Shorthand(spread)]
-]
-ExtinctionColor: TypeAlias = Varying[
-    Annotated[Triple[Annotated[float, Field(ge=0, le=1e3)]], Shorthand(spread)]
-]
+Index: TypeAlias = Annotated[float, Field(ge=0.01, le=1e3)]
+IndexColor: TypeAlias = Annotated[Triple[Index], Shorthand(spread)]
+ExtinctionColor: TypeAlias = Annotated[Triple[Annotated[float, Field(ge=0, le=1e3)]], Shorthand(spread)]

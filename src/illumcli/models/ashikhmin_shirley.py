@@ -23,19 +23,20 @@ from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._fresnel import schlick
 from illumcli.models._lobes import channels, log_cos
-from illumcli.models._parameters import Albedo, NonNegative
+from illumcli.models._parameters import Varying
 from illumcli.models._terms import Components
+from illumcli.schema.fields import Albedo, NonNegative
 
 
 class AshikhminShirley(IlluminationModel):
     model: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
-    diffuse: Albedo = (0.6, 0.6, 0.6)
+    diffuse: Varying[Albedo] = (0.6, 0.6, 0.6)
     """Rd, the diffuse albedo."""
-    specular: Albedo = (0.05, 0.05, 0.05)
+    specular: Varying[Albedo] = (0.05, 0.05, 0.05)
     """Rs, the specular reflectance at normal incidence."""
-    exponent_u: NonNegative = 100.0
+    exponent_u: Varying[NonNegative] = 100.0
     """nu, exponent along the grain; 0 to 10^6 and beyond."""
-    exponent_v: NonNegative = 10.0
+    exponent_v: Varying[NonNegative] = 10.0
     """nv, exponent across the grain; equal to nu, the surface is isotropic."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {"diffuse_lobe": ("diffuse",)}

@@ -26,16 +26,17 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
-from illumcli.models._parameters import Color, NonNegative
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Color, NonNegative
 
 
 class BlinnPhong(IlluminationModel):
     model: Literal["blinn_phong"] = "blinn_phong"
-    diffuse: Color = (0.8, 0.8, 0.8)
+    diffuse: Varying[Color] = (0.8, 0.8, 0.8)
     """kd, the diffuse share."""
-    specular: Color = (0.2, 0.2, 0.2)
+    specular: Varying[Color] = (0.2, 0.2, 0.2)
     """ks, the share of the highlight."""
-    exponent: NonNegative = 32.0
+    exponent: Varying[NonNegative] = 32.0
     """e, 0 to 10^6 and beyond: the larger, the smaller the highlight."""
     normalised: bool = False
     """Divide each lobe by its integral at normal incidence and weigh it by the cosine."""

@@ -21,14 +21,15 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
-from illumcli.models._parameters import Albedo, Share
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo, Share
 
 
 class Burley(IlluminationModel):
     model: Literal["burley"] = "burley"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo seen and lit from the normal."""
-    roughness: Share = 0.5
+    roughness: Varying[Share] = 0.5
     """r: 0 smooth, edges dark; 1 rough, edges bright towards the light."""
 
     reciprocal: ClassVar[bool] = True

@@ -29,20 +29,21 @@ from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Fresnel, Shifted
 from illumcli.models._lobes import tint, weighed
 from illumcli.models._microfacet import Distribution, vgroove_over_4ab
-from illumcli.models._parameters import Albedo, Share
+from illumcli.models._parameters import Varying
 from illumcli.models._terms import Angle
 from illumcli.schema.description import Description, default_of
+from illumcli.schema.fields import Albedo, Share
 
 WHITE = (1.0, 1.0, 1.0)
 
 
 class CookTorrance(IlluminationModel):
     model: Literal["cook_torrance"] = "cook_torrance"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo of the diffuse part."""
-    diffuse_weight: Share | None = None
+    diffuse_weight: Varying[Share] | None = None
     """kd, the share of diffuse reflection; left out, 1 - ks."""
-    specular_weight: Share = 0.5
+    specular_weight: Varying[Share] = 0.5
     """ks, the share of specular reflection."""
     distribution: Distribution = default_of({"D": "beckmann"})
     """D, how facets are spread about the normal."""

@@ -23,16 +23,17 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
-from illumcli.models._parameters import Color, NonNegative
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Color, NonNegative
 
 
 class KajiyaKay(IlluminationModel):
     model: Literal["kajiya_kay"] = "kajiya_kay"
-    diffuse: Color = (0.6, 0.6, 0.6)
+    diffuse: Varying[Color] = (0.6, 0.6, 0.6)
     """kd, the diffuse share."""
-    specular: Color = (0.3, 0.3, 0.3)
+    specular: Varying[Color] = (0.3, 0.3, 0.3)
     """ks, the share of the highlight."""
-    exponent: NonNegative = 32.0
+    exponent: Varying[NonNegative] = 32.0
     """e, 0 to 10^6 and beyond: the larger, the narrower the highlight across the strand."""
 
     isotropic: ClassVar[bool] = False

@@ -23,16 +23,17 @@ from pydantic import Field
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import lobe, tint
-from illumcli.models._parameters import Albedo, Color, NonNegative, Varying
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo, Color, NonNegative
 
 Weight = Varying[Annotated[float, Field(ge=-1, le=1)]]
 
 
 class Lafortune(IlluminationModel):
     model: Literal["lafortune"] = "lafortune"
-    diffuse: Albedo = (0.6, 0.6, 0.6)
+    diffuse: Varying[Albedo] = (0.6, 0.6, 0.6)
     """rho_d, the diffuse albedo."""
-    specular: Color = (0.5, 0.5, 0.5)
+    specular: Varying[Color] = (0.5, 0.5, 0.5)
     """rho_s, height of the lobe [1/sr]."""
     cx: Weight = -0.95
     """Cx, weight along the grain; -1 mirrors, 1 retro-reflects."""
@@ -40,7 +41,7 @@ class Lafortune(IlluminationModel):
     """Cy, weight across the grain; equal to Cx, the surface is isotropic."""
     cz: Weight = 0.9
     """Cz, weight along the normal; smaller, the highlight grows towards grazing."""
-    exponent: NonNegative = 20.0
+    exponent: Varying[NonNegative] = 20.0
     """e, exponent of the lobe; 0 to 10^6 and beyond."""
 
     reciprocal: ClassVar[bool] = True

@@ -16,12 +16,13 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
-from illumcli.models._parameters import Albedo
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo
 
 
 class Lambert(IlluminationModel):
     model: Literal["lambert"] = "lambert"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo."""
 
     reciprocal: ClassVar[bool] = True

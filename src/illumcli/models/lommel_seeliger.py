@@ -21,12 +21,13 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint, weighed
-from illumcli.models._parameters import Albedo
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo
 
 
 class LommelSeeliger(IlluminationModel):
     model: Literal["lommel_seeliger"] = "lommel_seeliger"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """w, share of light that a particle scatters rather than absorbs."""
 
     reciprocal: ClassVar[bool] = True

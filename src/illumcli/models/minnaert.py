@@ -20,12 +20,13 @@ from pydantic import Field
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import tint
-from illumcli.models._parameters import Albedo, Varying
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo
 
 
 class Minnaert(IlluminationModel):
     model: Literal["minnaert"] = "minnaert"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo seen from the normal."""
     k: Varying[Annotated[float, Field(ge=0, le=10)]] = 0.7
     """k, limb darkening: 0.5 the flat disc of the full Moon, 1 Lambert, 2 a dark rim."""

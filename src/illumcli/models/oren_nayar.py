@@ -31,7 +31,8 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._lobes import channels, tint
-from illumcli.models._parameters import Albedo, Spread
+from illumcli.models._parameters import Spread, Varying
+from illumcli.schema.fields import Albedo
 
 
 def oren_nayar_terms(
@@ -77,9 +78,9 @@ def oren_nayar_ab(n_l: Floats, n_v: Floats, l_v: Floats, sigma: Floats) -> Float
 
 class OrenNayar(IlluminationModel):
     model: Literal["oren_nayar"] = "oren_nayar"
-    diffuse: Albedo = (0.8, 0.8, 0.8)
+    diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo of the facets."""
-    sigma: Spread = 0.3
+    sigma: Varying[Spread] = 0.3
     """sigma, standard deviation of the facets' slope angle [rad]: 0 is Lambert, 0.5 clay or plaster."""
     form: Literal["full", "qualitative"] = "full"
     """`full`: all terms with the second bounce. `qualitative`: the authors' simple A and B."""

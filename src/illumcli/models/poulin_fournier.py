@@ -27,10 +27,11 @@ from pydantic import Field
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import gauss_legendre, tint
-from illumcli.models._parameters import Albedo, NonNegative, Varying
+from illumcli.models._parameters import Varying
 from illumcli.models._terms import Components
+from illumcli.schema.fields import Albedo, NonNegative
 
-Slope = Varying[Annotated[float, Field(ge=1e-3, le=1.57)]]
+Slope = Annotated[float, Field(ge=1e-3, le=1.57)]
 
 NODES = {np.dtype(np.float32): (14, 12.0), np.dtype(np.float64): (64, 40.0)}
 """Per precision: quadrature nodes, and the fall, as an exponent, at which a highlight is negligible."""
@@ -38,13 +39,13 @@ NODES = {np.dtype(np.float32): (14, 12.0), np.dtype(np.float64): (64, 40.0)}
 
 class PoulinFournier(IlluminationModel):
     model: Literal["poulin_fournier"] = "poulin_fournier"
-    diffuse: Albedo = (0.6, 0.6, 0.6)
+    diffuse: Varying[Albedo] = (0.6, 0.6, 0.6)
     """kd, the diffuse albedo of the facets."""
-    specular: Albedo = (0.2, 0.2, 0.2)
+    specular: Varying[Albedo] = (0.2, 0.2, 0.2)
     """ks, the share of the facets' highlight."""
-    exponent: NonNegative = 32.0
+    exponent: Varying[NonNegative] = 32.0
     """e, exponent of the facets' highlight; 0 to 10^6 and beyond."""
-    slope: Slope = 0.5
+    slope: Varying[Slope] = 0.5
     """theta_s, steepest slope of the grooves [rad]."""
 
     reciprocal: ClassVar[bool] = True

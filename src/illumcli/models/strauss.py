@@ -32,7 +32,8 @@ from pydantic import Field
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._lobes import channels, lobe, tint, weighed
-from illumcli.models._parameters import Albedo, Share
+from illumcli.models._parameters import Varying
+from illumcli.schema.fields import Albedo, Share
 
 Offset = Annotated[float, Field(ge=1.001, le=10)]
 
@@ -65,13 +66,13 @@ class Surface(NamedTuple):
 
 class Strauss(IlluminationModel):
     model: Literal["strauss"] = "strauss"
-    color: Albedo = (0.8, 0.8, 0.8)
+    color: Varying[Albedo] = (0.8, 0.8, 0.8)
     """c, colour of the surface."""
-    smoothness: Share = 0.5
+    smoothness: Varying[Share] = 0.5
     """s: 0 perfectly diffuse, 1 a perfect mirror."""
-    metalness: Share = 0.0
+    metalness: Varying[Share] = 0.0
     """m: 0 highlights of the light's colour, 1 of the surface's."""
-    transparency: Share = 0.0
+    transparency: Varying[Share] = 0.0
     """t: 0 opaque, 1 nothing reflected but the highlight at grazing."""
     kj: Annotated[float, Field(ge=0, le=1)] = 0.1
     """k_j, how much rough surfaces shine off the mirror direction."""

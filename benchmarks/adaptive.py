@@ -58,7 +58,7 @@ def compared(what: str, scene: Path, *overrides: str) -> dict[str, Picture]:
     runs = {name: Picture(scene, *overrides, *own) for name, own in RUNS.items()}
     times = _bench.interleaved(runs, REPEATS)
     print(f"\n{what}: {SIZE[0]}, {SIZE[1]}, reference {REFERENCE} samples")
-    head = ("RMSE", "rays", "cpu [s]", "cpu / 16", "refined", "samples spared")
+    head = ("RMSE", "rays", "cpu [s]", "cpu / 16", "refined", "samples saved")
     print(f"{'':26s}" + "".join(f"{each:>26s}" for each in head))
     pixels = reference.beauty.shape[0] * reference.beauty.shape[1]
     for name, run in runs.items():
@@ -66,7 +66,7 @@ def compared(what: str, scene: Path, *overrides: str) -> dict[str, Picture]:
         cpu = [took.cpu for took in times[name]]
         ratio = [a / b.cpu for a, b in zip(cpu, times["16 samples"], strict=True)]
         cells = [f"{rmse:.5f}", f"{run.rays:,}", _bench.spread(cpu), _bench.spread(ratio)]
-        cells += [f"{run.tally.refined / pixels:.1%}", f"{run.tally.spared['samples']:,}"]
+        cells += [f"{run.tally.refined / pixels:.1%}", f"{run.tally.saved['samples']:,}"]
         print(f"{name:26s}" + "".join(f"{cell:>26s}" for cell in cells))
     return runs
 

@@ -101,7 +101,7 @@ def _directions(_):
     return frozenset("nlvt")
 
 
-DARK = ((needs, "sends", yes),)
+DARK = ((needs, "is_on", yes),)
 AMBIENT = ((needs, "is_ambient", yes),)
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
@@ -115,9 +115,7 @@ SKIPS = (
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),
     Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),
     Skip("emission of 0", (), ((needs, "is_emissive", yes),)),
-    Skip(
-        "directions nobody reads", ("objects.ball.material=grey",), ((needs, "reached_words", _directions),)
-    ),
+    Skip("directions nobody reads", ("objects.ball.material=grey",), ((needs, "needed_terms", _directions),)),
     Skip("layers nobody asks for", (), (), ("depth",), ("depth", "beauty")),
     Skip(
         "objects no view can tell",

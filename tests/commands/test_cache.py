@@ -171,7 +171,7 @@ def test_a_plan_says_what_is_at_hand(illum, own):
     illum("render", "ring.yaml")
     planned = illum("plan", "ring.yaml").stdout
     assert "reused  " in planned
-    assert "all that needs it is at hand" in planned
+    assert "everything that needs it is cached" in planned
     assert "\nrays " not in planned
     memory = planned.partition("\nmemory ")[2]
     assert "shapes " in memory

@@ -102,14 +102,14 @@ def test_edges_and_shadows_get_all_samples(scene):
     assert (own["beauty"][border] == many["beauty"][border]).all()
     assert np.sqrt(np.square(own["beauty"] - many["beauty"]).mean()) < 0.003
     assert 0 < tally.refined < 0.8 * ids.size
-    assert tally.spared["samples"] > 0
+    assert tally.saved["samples"] > 0
 
 
 def test_counts_are_those_of_the_rays(scene, whole):
     _, tally = whole
     loaded = load(scene)
     view = planned(loaded).view
-    assert tally.spared["samples"] == (59 * 43 - tally.refined) * (12 - 3)
+    assert tally.saved["samples"] == (59 * 43 - tally.refined) * (12 - 3)
     assert view.is_adaptive
 
 
@@ -139,7 +139,7 @@ def test_the_job_reports_it_and_keeps_its_bytes_in_a_cache(scene, tmp_path, monk
         pictures.append(path.read_bytes())
         data = json.loads(json.dumps(report.as_data()))
         assert 0 < data["refined"] < 59 * 43
-        assert data["spared"]["samples"] != 0
+        assert data["saved"]["samples"] != 0
     render_scene(RenderJob(scene, RenderOptions(["film.adaptive=null"], pattern="plain.exr")))
     render_scene(RenderJob(scene, RenderOptions(pattern="again.exr")))
     assert (tmp_path / "again.exr").read_bytes() == pictures[0] == pictures[1] == pictures[2]

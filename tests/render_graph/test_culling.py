@@ -168,10 +168,10 @@ def test_of_many_objects_those_out_of_sight_are_left_out(scene):
 def test_the_job_counts_and_names_them(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, report = render_scene(RenderJob(scene, RenderOptions(pattern="few.png", cache=False)))
-    assert report.spared["polygons"] == 24 * 12 + 96 * 48
+    assert report.saved["polygons"] == 24 * 12 + 96 * 48
     assert {name for name in report.skipped if name.startswith("object:")} == {"object:away", "object:behind"}
     _, whole = render_scene(RenderJob(scene, RenderOptions(pattern="all.png", cache=False, strict=True)))
-    assert "polygons" not in whole.spared
+    assert "polygons" not in whole.saved
     assert (tmp_path / "few.png").read_bytes() == (tmp_path / "all.png").read_bytes()
 
 
@@ -210,7 +210,7 @@ def test_the_plan_tells_them_once_their_boxes_are_known(scene, tmp_path, monkeyp
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
     monkeypatch.setattr(policy, "worth", lambda seconds, size: True)
     (cold,) = json.loads(told(scene, as_json=True))
-    assert "known once" in cold["objects"]
+    assert "unless their bounds" in cold["objects"]
     render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "a.png"))))
     (warm,) = json.loads(told(scene, as_json=True))
     assert "object:away" in warm["skipped"]

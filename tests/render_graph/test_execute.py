@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.film.tiles import FEWEST, tiles
+from illumcli.film.tiles import MIN_TILE_SAMPLES, tiles
 from illumcli.graph import Node
 from illumcli.layers import NAMES
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
@@ -109,7 +109,7 @@ def test_tiles_cover_every_pixel_once_and_end_small(width, height, side, samples
     assert (seen == 1).all()
     last = [tile.width for tile in rows[-1]]
     assert last == sorted(last, reverse=True)
-    if width * height * samples > 100 * FEWEST:
+    if width * height * samples > 100 * MIN_TILE_SAMPLES:
         assert rows[-1][-1].width <= side / 4
 
 
@@ -320,7 +320,7 @@ def test_the_plan_says_that_w_is_taken_about_geometric_normals(tmp_path):
     loaded = load(path, ("obscurance.about=geometric",))
     p = planned(loaded, ["obscurance"])
     why = why_not(p.graph, p.outputs)["obscurance_normals"]
-    assert why == "the hemispheres of obscurance stand about the polygons' own normals"
+    assert why == "obscurance rays are cast about the polygons' normals"
 
 
 def test_a_coarse_smooth_ball_alone_is_open_exactly(picture):

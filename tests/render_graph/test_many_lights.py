@@ -8,7 +8,7 @@ import operator
 import numpy as np
 import pytest
 
-from illumcli.film.tiles import FEWEST, FEWEST_OF_MANY
+from illumcli.film.tiles import MIN_SAMPLES_OF_MANY, MIN_TILE_SAMPLES
 from illumcli.render_graph.build import build
 from illumcli.render_graph.build_lights import BLOCK, DEEPEST, sum_nodes
 from illumcli.render_graph.execute import Run, bands, run_once
@@ -69,6 +69,6 @@ def test_tiles_of_many_steps_are_larger(graph, tmp_path):
     (tmp_path / "few.yaml").write_text(scene(1))
     few = load(tmp_path / "few.yaml")
     view = graph.views[0]
-    for each, fewest in ((graph, FEWEST_OF_MANY), (build(few.scene, few), FEWEST)):
+    for each, min_samples in ((graph, MIN_SAMPLES_OF_MANY), (build(few.scene, few), MIN_TILE_SAMPLES)):
         plan = schedule(each, outputs_of(each.scene), view)
-        assert plan.tile_side(view) ** 2 == fewest
+        assert plan.tile_side(view) ** 2 == min_samples

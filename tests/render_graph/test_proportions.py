@@ -43,7 +43,7 @@ def test_a_floor_that_is_far_too_large_is_told_with_its_place(told):
     (line,) = told(sized(1e5))
     assert "s.yaml:6:5: objects.1: reaches 70,000 times as far as ball is large: around ball" in line
     assert line.endswith(
-        "off surfaces, 3.4 % of its radius, and shadows lose touch; make it smaller, or bring it nearer"
+        "off surfaces, 3.4 % of its radius, and shadows lose contact; make it smaller, or bring it nearer"
     )
 
 

@@ -99,29 +99,29 @@ def test_films_that_cut_blocks_and_cells(scene, width, height):
     assert made["error"].any()
 
 
-def test_the_picture_is_the_same_and_a_quarter_of_it_is_doubled(scene):
+def test_the_picture_is_the_same_and_a_quarter_of_it_is_replicated(scene):
     overrides = ("film.width=95", "film.samples=4", LAMP)
     alone, rays = layers(scene, *overrides, only=("beauty",))
     made, more = layers(scene, *overrides)
     for name, values in alone.items():
         assert values.tobytes() == made[name].tobytes()
-    assert {name: count for name, count in more.items() if not name.startswith("again.")} == rays
-    assert more["again.hits"] == pytest.approx(rays["hits"] / 4, rel=0.05)
-    assert more["again.obscurance"] == pytest.approx(rays["obscurance"] / 4, rel=0.05)
+    assert {name: count for name, count in more.items() if not name.startswith("replicate.")} == rays
+    assert more["replicate.hits"] == pytest.approx(rays["hits"] / 4, rel=0.05)
+    assert more["replicate.obscurance"] == pytest.approx(rays["obscurance"] / 4, rel=0.05)
     loaded = load(scene, overrides)
     plan = planned(loaded, ("beauty", "error"))
     expected = expected_rays(loaded.scene, [plan.view], plan.computed)
-    assert expected["again.primary"] == 48 * 32 * 4
-    assert expected["again.obscurance"] == 48 * 32 * 4 * 16
+    assert expected["replicate.primary"] == 48 * 32 * 4
+    assert expected["replicate.obscurance"] == 48 * 32 * 4 * 16
 
 
 def test_nothing_random_is_exact_and_doubles_nothing(scene):
     made, rays = layers(scene, "obscurance=null", LAMP)
     assert not made["error"].any()
-    assert not [name for name in rays if name.startswith("again.")]
+    assert not [name for name in rays if name.startswith("replicate.")]
     loaded = load(scene, ("obscurance=null",))
     part = plan_data(planned(loaded, ("error",)), {})
-    assert "nothing in the picture is random: its error is 0" in table([part])
+    assert "nothing in the image is random: its error is 0" in table([part])
 
 
 def test_the_report_and_the_file_have_it(scene, tmp_path):

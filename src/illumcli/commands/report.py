@@ -32,9 +32,9 @@ class Report:
     rays: dict[str, int] = field(default_factory=dict)
     ray_loop: str | None = None
     """How rays were traced, if any were."""
-    spared: dict[str, int] = field(default_factory=dict)
-    """Points that a light does not reach (`incident`) or not freely (`unshadowed`): no ray, no response.
-    Polygons of culled objects. Samples of pixels that adaptive antialiasing leaves at the first few."""
+    saved: dict[str, int] = field(default_factory=dict)
+    """Work that was avoided: points that a light does not reach (`incident`) or that are in its shadow
+    (`unshadowed`), polygons of culled objects, samples that adaptive sampling left out."""
     refined: int = 0
     """Pixels that adaptive antialiasing gave all samples."""
     reused: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Report:
 
     def count(self, stats: RenderStats) -> None:
         """Take over what was counted."""
-        self.seconds, self.rays, self.spared = dict(stats.seconds), dict(stats.rays), dict(stats.spared)
+        self.seconds, self.rays, self.saved = dict(stats.seconds), dict(stats.rays), dict(stats.saved)
         self.refined = stats.refined
         self.ray_loop = ray_loop_name() if any(self.rays.values()) else None
 

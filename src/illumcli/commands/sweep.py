@@ -58,11 +58,11 @@ def sweep_scene(
     seconds = time.perf_counter() - start
 
     # the files about all of them
-    spared: list[str] = []
+    unchanged: list[str] = []
     has_images = any(outcome.report for outcome in outcomes)
     if has_images:
-        spared = planned.write(outcomes)
-    batch.finish(*warnings, *spared)
+        unchanged = planned.write(outcomes)
+    batch.finish(*warnings, *unchanged)
     return SweepResult(tuple(outcomes), planned.kept if has_images else (), tuple(warnings), seconds)
 
 

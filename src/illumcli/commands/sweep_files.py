@@ -46,21 +46,21 @@ class PlannedFiles(Value):
         """Write all but those that are kept; a line for each that failures leave as it is."""
         from illumcli.files.atomic import write_text
 
-        files, spared = self.files, []
+        files, unchanged = self.files, []
         contents = [self._content(outcome) for outcome in outcomes]
         if files.table is not None and files.table not in self.kept:
             write_text(files.table, sweep_table(outcomes, contents, self.reference))
         if files.sheet is not None and files.sheet not in self.kept:
             content = content_of_all(contents)
             if content == INCOMPLETE and is_complete(files.sheet, image_contents):
-                spared.append(f"{files.sheet}: stays as it is; a new one would lack pictures")
+                unchanged.append(f"{files.sheet}: stays as it is; a new one would lack pictures")
             else:
                 write_sheet(files.sheet, outcomes, content)
         if files.report is not None and files.report not in self.kept:
             write_text(files.report, sealed_json(report_data(outcomes, contents), in_a_list=True))
         for path in self.kept:
             refresh(path)
-        return spared
+        return unchanged
 
     def _content(self, outcome: Outcome) -> str:
         return INCOMPLETE if outcome.report is None else self.contents[outcome.number]

@@ -11,7 +11,7 @@ from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.outputs import is_kept
-from illumcli.film.tiles import MOST
+from illumcli.film.tiles import MAX_TILE_SAMPLES
 from illumcli.film.view import View
 from illumcli.images.contents import image_contents
 from illumcli.images.develop import Development, Target
@@ -26,7 +26,7 @@ from illumcli.scene.load import load
 from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
 from illumcli.scene.spec import Scene
 
-BAND_ROWS = math.isqrt(MOST)
+BAND_ROWS = math.isqrt(MAX_TILE_SAMPLES)
 """No band of tiles is higher [pixels]."""
 BYTES = {"half": 2, "float": 4, "uint": 4, "uint8": 1, "uint16": 2}
 

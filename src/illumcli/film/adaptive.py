@@ -1,8 +1,8 @@
 """Adaptive antialiasing: pixels whose samples, or whose neighbours' samples, differ get all samples.
 
 A pixel that is not refined keeps its first few samples. Features smaller than the sample spacing, and noise
-that happened to agree, are missed. So adaptive pictures are biased, towards smoothness; refined pixels are
-the same as without it.
+that happens to be equal in all of them, are missed. Adaptive images are therefore biased towards smoothness;
+refined pixels are the same as without it.
 
 References
 ----------
@@ -19,61 +19,62 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids
 
-TURN = 0.3
-"""Components of unit normals that lie farther apart differ: directions 17 degrees apart or more."""
+NORMAL_DIFFERENCE = 0.3
+"""Greatest difference between components of unit normals that count as equal: about 17 degrees."""
 DARK = 0.05
-"""Light below this counts as this much when differences are weighed."""
+"""Least radiance that differences are relative to."""
 
 
 def differs_in_shape(
     objects: NDArray[np.uint32],
     normals: NDArray[np.float32],
-    lane: Ids,
+    sample: Ids,
     shape: tuple[int, int],
     samples: int,
 ) -> NDArray[np.bool_]:
-    """(h, w) True where samples around see different objects or faces turned apart.
+    """(h, w) True where the samples in and around a pixel hit different objects, or faces at an angle.
 
-    A leap in depth between faces of one object that lie alike shows in its light or nowhere.
+    A step in depth between parallel faces of one object is left to `differs_in_light`.
 
     Parameters
     ----------
     objects : (M,) uint32
     normals : (M, 3) float32
-        Of the samples that see something; 0 stands for the others.
-    lane : (M,) int32
-        Those samples.
+        At the hits; samples that miss count as 0.
+    sample : (M,) int32
+        Indices of the hits' samples.
     shape : (int, int)
-        Rows and columns of the pixels, `samples` each.
+        Rows and columns of pixels, each with `samples` samples.
     """
-    low, high = extremes(np.column_stack([objects, normals]), lane, shape, samples)
-    other = low[..., 0] != high[..., 0]
-    turned = (high[..., 1:] - low[..., 1:] > TURN).any(axis=2)
-    return np.asarray(other | turned)
+    low, high = extremes(np.column_stack([objects, normals]), sample, shape, samples)
+    other_object = low[..., 0] != high[..., 0]
+    other_normal = (high[..., 1:] - low[..., 1:] > NORMAL_DIFFERENCE).any(axis=2)
+    return np.asarray(other_object | other_normal)
 
 
 def differs_in_light(
-    values: NDArray[np.float32], lane: Ids, shape: tuple[int, int], samples: int, difference: float
+    values: NDArray[np.float32], sample: Ids, shape: tuple[int, int], samples: int, difference: float
 ) -> NDArray[np.bool_]:
-    """(h, w) True where samples around differ in a channel by more than a share of the brightest channel.
+    """(h, w) True where the samples in and around a pixel differ in a channel by more than `difference` times
+    the brightest channel.
 
     Parameters
     ----------
     values : (M,) or (M, k) float32
-        Of the samples that see something; 0 stands for the others.
+        At the hits; samples that miss count as 0.
     """
-    low, high = extremes(values if values.ndim == 2 else values[:, None], lane, shape, samples)
+    low, high = extremes(values if values.ndim == 2 else values[:, None], sample, shape, samples)
     scale = np.maximum(high.max(axis=2), F(DARK))
     return np.asarray((high - low).max(axis=2) > F(difference) * scale)
 
 
 def extremes(
-    values: NDArray[np.float32], lane: Ids, shape: tuple[int, int], samples: int
+    values: NDArray[np.float32], sample: Ids, shape: tuple[int, int], samples: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(h, w, k) least and greatest value of the samples of each pixel and its eight neighbours."""
+    """(h, w, k) least and greatest value among the samples of each pixel and its eight neighbours."""
     height, width = shape
     planes = np.zeros((values.shape[1], height * width * samples), F)
-    planes[:, lane] = values.T
+    planes[:, sample] = values.T
     by_pixel = planes.reshape(len(planes), height, width, samples)
     low, high = by_pixel.min(axis=3), by_pixel.max(axis=3)
     for axis in (1, 2):
@@ -81,10 +82,10 @@ def extremes(
     return low.transpose(1, 2, 0), high.transpose(1, 2, 0)
 
 
-def _of_three(values: NDArray[np.float32], least: np.ufunc, axis: int) -> NDArray[np.float32]:
-    """The least (or greatest) of each value and those beside it along an axis."""
+def _of_three(values: NDArray[np.float32], extreme: np.ufunc, axis: int) -> NDArray[np.float32]:
+    """`extreme`, the minimum or maximum, of each value and its two neighbours along an axis."""
     moved = np.moveaxis(values, axis, 0)
     out = moved.copy()
-    least(out[1:], moved[:-1], out=out[1:])
-    least(out[:-1], moved[1:], out=out[:-1])
+    extreme(out[1:], moved[:-1], out=out[1:])
+    extreme(out[:-1], moved[1:], out=out[:-1])
     return np.moveaxis(out, 0, axis)

@@ -10,24 +10,25 @@ from numpy.typing import NDArray
 from illumcli.arrays import Ids
 from illumcli.records import Record, Value
 
-FEWEST, MOST = 1 << 12, 1 << 16
-"""Samples per tile. Passes over 2^14 stay in a core's own cache, but hand the interpreter from thread to
-thread four times as often as those over 2^16, which costs more."""
+MIN_TILE_SAMPLES, MAX_TILE_SAMPLES = 1 << 12, 1 << 16
+"""Samples per tile. Arrays of 2^14 samples stay in a core's cache, but switch threads at the interpreter lock
+four times as often as arrays of 2^16, which costs more."""
 TILES = 24
-"""For threads to share a picture has about so many, where that makes them no smaller than `FEWEST`."""
-MANY_STEPS, FEWEST_OF_MANY = 128, 1 << 14
-"""Threads wait for the interpreter after each step: where a tile has many, fewer and larger tiles."""
+"""Tiles of an image, approximately, for threads to share; fewer if they would be too small."""
+MANY_NODES, MIN_SAMPLES_OF_MANY = 128, 1 << 14
+"""If at least this many nodes run per tile, the smallest tiles are larger: threads wait for each other after
+each node, at the interpreter lock."""
 
 
-def fewest_samples(steps: int) -> int:
-    """Samples of the smallest tiles that a picture is divided into, where so many steps run for each."""
-    return FEWEST_OF_MANY if steps >= MANY_STEPS else FEWEST
+def min_tile_samples(nodes: int) -> int:
+    """Samples of the smallest tiles that an image is divided into, if `nodes` run for each tile."""
+    return MIN_SAMPLES_OF_MANY if nodes >= MANY_NODES else MIN_TILE_SAMPLES
 
 
-def tile_side(samples: int, pixels: int, fewest: int = FEWEST) -> int:
-    """Pixels along a square tile's side, a multiple of 8; no tile is to hold fewer samples than `fewest`."""
-    shared = max(math.isqrt(fewest // samples), math.isqrt(pixels // TILES))
-    return max(8, min(shared, math.isqrt(MOST // samples)) // 8 * 8)
+def tile_side(samples: int, pixels: int, min_samples: int = MIN_TILE_SAMPLES) -> int:
+    """Pixels along a square tile's side, a multiple of 8; tiles hold at least `min_samples` if they can."""
+    shared = max(math.isqrt(min_samples // samples), math.isqrt(pixels // TILES))
+    return max(8, min(shared, math.isqrt(MAX_TILE_SAMPLES // samples)) // 8 * 8)
 
 
 class Tile(Value):
@@ -51,23 +52,25 @@ class Tile(Value):
 
 
 def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
-    """The tiles of a picture, row by row: squares, and the last of several rows ends in halves of what is
-    left of it, as long as they hold `FEWEST` samples, so that threads end together."""
+    """The tiles of an image, row by row: squares, except at the end of the last row.
+
+    There each tile is half of what remains, down to `MIN_TILE_SAMPLES`, so that all threads end together.
+    """
     out = []
     for y in range(0, height, side):
-        own, last = min(side, height - y), 0 < y >= height - side
+        tile_height, last = min(side, height - y), 0 < y >= height - side
         row, x = [], 0
         while rest := width - x:
             half = min(-(-rest // 16) * 8, rest)
-            ending = last and rest <= 2 * side and half * own * samples >= FEWEST
-            row.append(Tile(x, y, half if ending else min(side, rest), own))
+            ending = last and rest <= 2 * side and half * tile_height * samples >= MIN_TILE_SAMPLES
+            row.append(Tile(x, y, half if ending else min(side, rest), tile_height))
             x += row[-1].width
         out.append(row)
     return out
 
 
 class Scattered(Tile):
-    """Pixels that need not lie together, as a tile of one row."""
+    """Any pixels of a film, as a tile of one row."""
 
     columns: NDArray[np.int64]
     rows: NDArray[np.int64]
@@ -82,17 +85,19 @@ class Scattered(Tile):
 
 
 class Samples(Record):
-    """The samples of a tile, pixel by pixel, row by row from the top: sample s of pixel p is lane
-    p * per_pixel + s."""
+    """The samples of a tile, pixel by pixel, row by row from the top.
 
-    x: NDArray[np.int64]  # (P,) pixel
-    y: NDArray[np.int64]  # (P,)
+    Sample s of pixel p has the index p * per_pixel + s.
+    """
+
+    x: NDArray[np.int64]  # (P,) column of each pixel
+    y: NDArray[np.int64]  # (P,) row of each pixel
     points: NDArray[np.float64]  # (N, 2) in [0, 1)^2
     per_pixel: int
-    first: int | None = None  # number of each pixel's first, where these are part of its samples
+    first: int | None = None  # number of the first of them among a pixel's samples; None if they are all
 
     def nearest(self) -> Ids:
-        """(P,) the lane of the sample nearest to each pixel's centre."""
+        """(P,) index of the sample nearest to each pixel's centre."""
         distance = np.square(self.points[:, 0] - 0.5) + np.square(self.points[:, 1] - 0.5)
         nearest = np.argmin(distance.reshape(-1, self.per_pixel), axis=1)
         return (nearest + np.arange(len(self.x)) * self.per_pixel).astype(np.int32)

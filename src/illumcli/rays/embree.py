@@ -27,8 +27,7 @@ class Interrupted(Exception):
 
 
 class Tracer:
-    """Closest-hit and occlusion queries for arrays of rays on a set of triangles; safe to use from many
-    threads.
+    """Closest-hit and occlusion queries for arrays of rays on a set of triangles; safe in many threads.
 
     There may be fewer origins than directions: each origin is then shared by equally many consecutive rays.
     """

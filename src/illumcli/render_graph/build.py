@@ -1,6 +1,6 @@
-"""Builds the render graph of a scene: every buffer it could make, and from what. Nothing here runs anything.
+"""Builds the render graph of a scene: a node for every buffer that a layer could need. Nothing runs here.
 
-A node binds the function that does the work, and of the scene only what that function depends on: both are
+A node binds the function that does the work, and only those parts of the scene that it depends on: both are
 its identity in the cache (`render_graph.keys`). The functions' parameter names are the buffers they read.
 """
 
@@ -33,7 +33,7 @@ from illumcli.render_graph import needs, stages
 from illumcli.render_graph.build_geometry import baked_files, geometry_nodes
 from illumcli.render_graph.build_lights import light_nodes, sum_nodes
 from illumcli.render_graph.build_materials import material_nodes
-from illumcli.render_graph.replicates import error_recipes
+from illumcli.render_graph.replicates import error_nodes
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.shading.grain import tangents
@@ -47,7 +47,7 @@ from illumcli.visibility.shadows import ray_origins
 GIVEN = ("view", "tile")
 """Buffers that need no node."""
 SHAPE = ("object_id", "geometric_normal")
-"""Buffers whose differences say, before any light, which pixels want more samples."""
+"""Buffers whose differences show edges, where adaptive sampling takes more samples whatever the light."""
 
 
 class Known(Value):
@@ -55,31 +55,31 @@ class Known(Value):
 
     value: Any
     source: str = ""
-    """Where it was loaded from, `memory` or `store`; nothing if it was computed in this run."""
+    """Where it was loaded from, `memory` or `store`; empty if it was computed in this run."""
 
 
 class Graph(Value):
-    """All nodes of a scene, by the buffer that each computes, and the views that they may be asked for."""
+    """All nodes of a scene, by the buffer that each computes, and the scene's views."""
 
     scene: Scene
     views: tuple[View, ...]
     nodes: Mapping[str, Node] = field(repr=False)
     known: Mapping[str, Known] = field(default_factory=dict, repr=False)
-    """Buffers that need no node any more."""
+    """Buffers of the whole scene with known values, which need no node."""
     loaders: Mapping[str, Node] = field(default_factory=dict, repr=False)
     """Nodes that load a buffer of one view instead of computing it."""
     culled: tuple[int, ...] = ()
-    """Numbers of the objects that affect no view."""
+    """Numbers of the culled objects, which cannot affect any view."""
     reasons: Mapping[str, str] = field(default_factory=dict, repr=False)
-    """Buffer -> why the scene has no use for it; it is computed only where an output reaches it."""
+    """Buffer -> why this scene does not need it; it is still computed if an output needs it."""
 
     def topological_order(self, buffers: Iterable[str]) -> list[Node]:
-        """The nodes that some buffers need, each after its inputs; loaders where there are some."""
+        """The nodes that some buffers need, each after its inputs; cached buffers have loaders."""
         return topological_order({**self.nodes, **self.loaders}, buffers, GIVEN)
 
     def why_not(self, name: str) -> str:
-        """Why a buffer is not computed that no output reached."""
-        return self.reasons.get(name, "no layer asked for reaches it")
+        """Why a buffer that no output needs is not computed."""
+        return self.reasons.get(name, "no requested layer needs it")
 
     def without_loaders(self) -> Graph:
         """The graph before cached buffers were substituted."""
@@ -105,19 +105,20 @@ def build(scene: Scene, loaded: SceneFile) -> Graph:
     by_name = {node.output: node for node in nodes}
     views = tuple(needs.views(scene))
     counts = [view.samples for view in views]
-    by_name |= error_recipes(by_name, scene.seed, scene.film.background, counts, GIVEN)
+    by_name |= error_nodes(by_name, scene.seed, scene.film.background, counts, GIVEN)
     return Graph(scene, views, by_name, reasons=_reasons(scene, by_name))
 
 
 def _surface_nodes(scene: Scene) -> list[Node]:
-    """Samples, what they hit, and where models are evaluated."""
+    """Nodes of samples, their hits, and the points where models are evaluated."""
+    # The optional inputs of the nodes below.
     rates = needs.rates(scene)
     smooth = {"normals": "corner_normals"} if needs.is_smooth(scene) else {}
     of_polygons = any(RATES[rate].of_polygons for rate in rates)
-    once = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if of_polygons else {}
+    centres = {"centres": "polygon_centres", "polygon_normals": "polygon_normals"} if of_polygons else {}
     interpolates = any(not RATES[rate].of_polygons for rate in rates) or any(needs.is_baked(scene))
     planar = {"planar_polygons": "planar_polygons"} if interpolates else {}
-    # polygons that are flat by their normals need no weights where these alone are interpolated
+    # If only normals are interpolated, polygons with equal normals at all corners need no weights.
     weights = "normal_weights" if all(RATES[rate].normals_alone for rate in set(rates)) and rates else None
     grains = tuple(thing.grain for thing in scene.objects)
     by_uv = {name: name for name in ("uv_tangents", "point_weights")} if None in grains else {}
@@ -133,7 +134,7 @@ def _surface_nodes(scene: Scene) -> list[Node]:
         Node.of(corner_weights, "normal_weights", planar_polygons="curved_polygons"),
         Node.of(ShadingContext, "shading_context", weights=weights or "corner_weights", **smooth),
         Node.of(polygon_centres),
-        Node.of(partial(points, tuple(rates)), "points", **once),
+        Node.of(partial(points, tuple(rates)), "points", **centres),
         Node.of(point_weights),
         Node.of(material),
         Node.of(scene_uvs, "uvs"),
@@ -144,7 +145,7 @@ def _surface_nodes(scene: Scene) -> list[Node]:
 
 
 def _data_nodes() -> list[Node]:
-    """What layers of data show. To add one, add a line here and a row to `layers.LAYERS`."""
+    """Nodes of data layers. To add a layer, add a line here and a row to `layers.LAYERS`."""
     return [
         Node.of(stages.alpha),
         Node.of(depth),
@@ -159,23 +160,24 @@ def _data_nodes() -> list[Node]:
 
 
 def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
-    """w, by rays or from the files that its objects' meshes name."""
+    """Nodes of obscurance, traced or baked."""
+    # Which inputs w has.
     files = baked_files(scene, loaded)
     some_baked = any(file for _, file in files)
     settings = scene.obscurance or Obscurance()
     by_face = {"triangle_normals": "triangle_normals"} if settings.faces != "count" else {}
-    about = {"obscurance_normals": "obscurance_normals"} if _about_shading(scene) else {}
-    in_part = {"baked_obscurance": "baked_obscurance"} if some_baked else {}
+    axes = {"obscurance_normals": "obscurance_normals"} if _about_shading(scene) else {}
+    partly_baked = {"baked_obscurance": "baked_obscurance"} if some_baked else {}
     if needs.all_baked(scene) or (scene.obscurance is None and some_baked):
         w = Node.of(baked_or_open, "obscurance")
     else:
-        w = Node.of(obscurance, **in_part)
+        w = Node.of(obscurance, **partly_baked)
     return [
         Node.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         Node.of(partial(obscurance_normals, tuple(needs.rates(scene))), "obscurance_normals"),
         Node.of(triangle_normals),
         Node.of(partial(obscurance_method, settings), "obscurance_method", **by_face),
-        Node.of(hemispheres, **about),
+        Node.of(hemispheres, **axes),
         Node.of(open_triangles),
         Node.of(partial(known_open, settings.samples), "known_open"),
         Node.of(partial(stages.baked, files), "baked"),
@@ -185,12 +187,12 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 
 def _about_shading(scene: Scene) -> bool:
-    """Do the hemispheres of obscurance stand about shading normals?"""
+    """True if shading normals are the axes of the hemispheres of obscurance rays."""
     return (scene.obscurance or Obscurance()).about == "shading" and needs.is_smooth(scene)
 
 
 def _camera_nodes(scene: Scene) -> list[Node]:
-    """What places the cameras that an object is to fill the picture of."""
+    """Nodes of the placements of cameras that fit an object."""
     numbers = {name: number for number, name in enumerate(scene.object_names())}
 
     def node(view: View) -> Node:
@@ -202,27 +204,30 @@ def _camera_nodes(scene: Scene) -> list[Node]:
 
 
 def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:
-    """Why buffers are not made that the scene itself gives no use for."""
+    """Why the scene itself makes buffers unnecessary, by buffer."""
+    # Emission, ambient light and obscurance.
     reasons: dict[str, str] = {}
     traced = ("obscurance_draws", "obscurance_method", "hemispheres", "known_open")
     if not needs.is_emissive(scene):
         reasons |= dict.fromkeys(("emission", "emission_materials"), "no material emits")
     if not needs.is_ambient(scene):
         ambient = ("ambient", "ambient_color", "ambient_materials", "obscurance", *traced)
-        reasons |= dict.fromkeys(ambient, "no ambient light leaves any surface")
+        reasons |= dict.fromkeys(ambient, "no surface reflects ambient light")
     if not _about_shading(scene) and scene.obscurance is not None:
-        reasons["obscurance_normals"] = "the hemispheres of obscurance stand about the polygons' own normals"
+        reasons["obscurance_normals"] = "obscurance rays are cast about the polygons' normals"
     if scene.obscurance is None:
         reasons |= dict.fromkeys(("obscurance", *traced), "the scene has no obscurance: w = 1")
     if any(needs.is_baked(scene)):
         reasons |= dict.fromkeys(traced, "the obscurance is baked")
+
+    # Buffers of a light.
     lights = scene.named_lights()
     for name in names:
         kind, _, light_name = name.partition(":")
         light = lights.get(light_name) if light_name else None
         if kind in ("camera", "mesh") or light is None:
             continue
-        if not needs.sends(light):
+        if not needs.is_on(light):
             reasons[name] = "the light's intensity is 0"
         elif kind in ("shadow", "shadow_candidates") and not light.shadows:
             reasons[name] = "the light casts no shadows"

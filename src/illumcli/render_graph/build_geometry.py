@@ -1,4 +1,4 @@
-"""Nodes of meshes, each source once, of the scene's geometry and normals, and of what was put right."""
+"""Nodes of meshes, of the scene's geometry and normals, and of repairs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from illumcli.shading.rates import RATES
 
 
 def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
-    """Meshes, and what is made of them all."""
+    """Nodes of meshes, and of everything computed from all of them."""
     transforms = tuple(thing.transform for thing in scene.objects)
     rates = needs.rates(scene)
     flat = tuple(not RATES[rate].is_smooth or scene.terminator == "none" for rate in rates)
@@ -41,7 +41,7 @@ def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 
 def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
-    """One node per source of meshes, and the mesh of every object."""
+    """One node per mesh file or shape, and the node of every object's mesh."""
     sources = {needs.mesh_name(scene, thing.mesh): source for thing, source in _sources(scene)}
     names = list(sources)
     which = tuple(names.index(needs.mesh_name(scene, thing.mesh)) for thing in scene.objects)
@@ -54,7 +54,7 @@ def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 
 def _normal_nodes(scene: Scene) -> list[Node]:
-    """All triangles, and their shading normals."""
+    """Nodes of all triangles and their normals."""
     says = [source.normals if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     by_file = tuple(each is None or each.source == "file" for each in says)
     smooth = [RATES[rate].is_smooth for rate in needs.rates(scene)]
@@ -68,7 +68,8 @@ def _normal_nodes(scene: Scene) -> list[Node]:
 
 
 def _repair_nodes(scene: Scene) -> list[Node]:
-    """What was put right in meshes, and what materials ask of them that they do not have."""
+    """Nodes of the repairs of meshes, and of data that materials need and meshes lack."""
+    # Which repairs each object may need.
     rates, sources = needs.rates(scene), [source for _, source in _sources(scene)]
     names = tuple(
         source.file if isinstance(source, MeshFile) else f"object {name}"
@@ -78,11 +79,12 @@ def _repair_nodes(scene: Scene) -> list[Node]:
         RATES[rate].is_smooth and _computes_normals(source)
         for rate, source in zip(rates, sources, strict=True)
     )
-    wants = tuple(_wants_direction(scene, thing) for thing in scene.objects)
+    by_uv = tuple(_needs_uv_direction(scene, thing) for thing in scene.objects)
     selects = tuple(_selects(scene, thing) for thing in scene.objects)
+
     nodes = [Node.of(partial(repairs, names, computes), "repairs")]
-    if any(wants):
-        nodes.append(Node.of(partial(undirected, names, wants), "undirected"))
+    if any(by_uv):
+        nodes.append(Node.of(partial(undirected, names, by_uv), "undirected"))
     if any(selects):
         nodes.append(Node.of(partial(unnamed, names, selects), "unnamed"))
     return nodes
@@ -94,29 +96,29 @@ def _sources(scene: Scene) -> list[tuple[Object, MeshFile | Shape]]:
 
 
 def _content(loaded: SceneFile, source: MeshFile | Shape) -> FileFingerprint | Shape:
-    """What a mesh is made from: the content of its file, or the shape."""
+    """The source of a mesh: the fingerprint of its file, or the shape."""
     if not isinstance(source, MeshFile):
         return source
     return FileFingerprint(partial(resolve, loaded, source.file), companions)
 
 
 def _computes_normals(source: MeshFile | Shape) -> bool:
-    """Does the description of a mesh file say how normals are made, but not that all are?"""
+    """True if a mesh file's description sets how normals are computed, but the file's normals are used."""
     if not isinstance(source, MeshFile) or source.normals.source != "file":
         return False
-    normals, usual = source.normals, Normals()
-    return (normals.crease, normals.weights) != (usual.crease, usual.weights)
+    normals, defaults = source.normals, Normals()
+    return (normals.crease, normals.weights) != (defaults.crease, defaults.weights)
 
 
-def _wants_direction(scene: Scene, thing: Object) -> bool:
-    """Has an object's own material a grain that only uv can direct?"""
+def _needs_uv_direction(scene: Scene, thing: Object) -> bool:
+    """True if an object's material is anisotropic and only uv can give it a direction."""
     model = scene.material_of(thing)
     return thing.grain is None and model is not None and model.has_grain()
 
 
 def _selects(scene: Scene, thing: Object) -> tuple[tuple[str, ...], bool] | None:
-    """Among which of the scene's materials an object's mesh selects, and whether it has those of its file;
-    None where the object has one material."""
+    """The scene's materials that an object's mesh may select, and whether it has those of its file; None if
+    the object has one material."""
     if scene.material_of(thing) is not None:
         return None
     named = () if thing.fallback is not None else tuple(sorted(scene.materials))
@@ -124,7 +126,7 @@ def _selects(scene: Scene, thing: Object) -> tuple[tuple[str, ...], bool] | None
 
 
 def baked_files(scene: Scene, loaded: SceneFile) -> tuple[tuple[str, FileFingerprint | None], ...]:
-    """Name of each object and the file of its baked obscurance."""
+    """The name of each object and the file of its baked obscurance, if any."""
     files = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     return tuple(
         (name, None if file is None else FileFingerprint(partial(resolve, loaded, file)))

@@ -1,4 +1,4 @@
-"""Nodes of lights: where each arrives, its shadow, the response to it, and the sums over all."""
+"""Nodes of lights: incident light, shadow and response of each, and the sums over all lights."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from illumcli.shading.rates import RATES
 from illumcli.visibility.shadows import shadow, smooth_surface
 
 BLOCK = 16
-"""Terms of a sum that are added at once, where it has many."""
+"""Terms of a sum that one node adds."""
 DEEPEST = 64
-"""Blocks of a sum, each of which reads the one before it; of more terms blocks are larger."""
+"""Most blocks of a sum, each of which reads the one before it; with more terms blocks are larger."""
 
 
 def light_nodes(scene: Scene) -> list[Node]:
-    """What all lights take, each by its name; a light that sends nothing has neither rays nor response."""
-    # The surface that normals imply, from which shadow rays start; none where every object is flat.
+    """The nodes of each light; a light of intensity 0 has neither rays nor response."""
+    # The smooth surface that normals imply and shadow rays may start from, unless every object is flat.
     smooth = needs.is_smooth(scene)
     flat = tuple(not RATES[rate].is_smooth for rate in needs.rates(scene))
     nodes = [
@@ -33,10 +33,10 @@ def light_nodes(scene: Scene) -> list[Node]:
     ] if smooth else []  # fmt: skip
     implied = {"smooth_surface": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
 
-    eye: dict[str, str] = {word: word for word in ("v", "t") if word in needs.reached_words(scene)}
+    eye: dict[str, str] = {term: term for term in ("v", "t") if term in needs.needed_terms(scene)}
     at_samples = all(RATES[rate].at_samples for rate in needs.rates(scene))
     for name, light in scene.named_lights().items():
-        if not needs.sends(light):
+        if not needs.is_on(light):
             nodes += [Node.of(black, f"light:{name}"), Node.of(stages.no_shadow, f"shadow:{name}")]
             continue
         nodes += _shadow_nodes(name, light, at_samples, implied)
@@ -45,29 +45,29 @@ def light_nodes(scene: Scene) -> list[Node]:
 
 
 def _shadow_nodes(name: str, light: Light, at_samples: bool, implied: Mapping[str, str]) -> list[Node]:
-    """The points a light reaches if nothing stands between, and its shadow.
+    """Nodes of a light's unoccluded incident light and of its shadow.
 
     `implied` names the smooth surface that shadow rays may start from, if there is one.
     """
-    place = light.without_color()
-    nodes = [Node.of(partial(incident.incident, place), f"incident:{name}")]
+    colorless = light.without_color()
+    nodes = [Node.of(partial(incident.incident, colorless), f"incident:{name}")]
     if not light.shadows:
         nodes.append(Node.of(stages.no_shadow, f"shadow:{name}"))
-    if at_samples:  # the points that are evaluated are the samples that want shadow rays
+    if at_samples:  # the samples that need shadow rays are the points where models are evaluated
         candidates = f"incident:{name}"
     else:
         candidates = f"shadow_candidates:{name}"
-        nodes.append(Node.of(partial(incident.shadow_candidates, place), candidates))
+        nodes.append(Node.of(partial(incident.shadow_candidates, colorless), candidates))
     if light.shadows:
         nodes.append(Node.of(shadow, f"shadow:{name}", shadow_candidates=candidates, **implied))
-        if at_samples:  # what lies in shadow is not evaluated at all
-            unshadowed = partial(incident.unshadowed, place)
+        if at_samples:  # models are not evaluated in shadow
+            unshadowed = partial(incident.unshadowed, colorless)
             nodes.append(Node.of(unshadowed, f"unshadowed:{name}", shadow=f"shadow:{name}"))
     return nodes
 
 
 def _response_nodes(name: str, light: Light, at_samples: bool, eye: Mapping[str, str]) -> list[Node]:
-    """What leaves towards the eye because of one light, per lobe and together, with its shadow."""
+    """Nodes of the response to one light: lobe by lobe, their sum, and the irradiance; all shadowed."""
     color = light.color()
     before = light.shadows and at_samples  # shadows are known before models are evaluated
     lit = f"unshadowed:{name}" if before else f"incident:{name}"
@@ -83,21 +83,21 @@ def _response_nodes(name: str, light: Light, at_samples: bool, eye: Mapping[str,
 
 
 def sum_nodes(scene: Scene) -> list[Node]:
-    """The pictures that are sums over lights, and the beauty."""
+    """Nodes of the sums over lights, and of the beauty."""
     lights = list(needs.active_lights(scene))
-    weighed = {"obscurance": "obscurance"} if needs.weighs_ambient(scene) else {}
+    obscured = {"obscurance": "obscurance"} if needs.weighs_ambient(scene) else {}
     nodes = [
-        Node.of(partial(ambient, scene.ambient.color), "ambient", **weighed),
+        Node.of(partial(ambient, scene.ambient.color), "ambient", **obscured),
         *_sum("direct", [f"light:{name}" for name in lights]),
         *_sum("irradiance", [f"irradiance:{name}" for name in lights]),
         *_sum("diffuse", [f"diffuse:{name}" for name in lights]),
         *_sum("specular", [f"specular:{name}" for name in lights]),
     ]
 
-    # The beauty: what is emitted, ambient light and all lights, in this order; then the depth cue.
+    # The beauty: emission, ambient light and all lights, in this order; then the depth cue.
     parts = ["emission"] if needs.is_emissive(scene) else []
     if scene.ambient.form == "coupled":
-        nodes.append(Node.of(partial(coupled, scene.ambient.color), "coupled", **weighed))
+        nodes.append(Node.of(partial(coupled, scene.ambient.color), "coupled", **obscured))
         parts.append("coupled")
     else:
         parts += ["ambient"] if needs.is_ambient(scene) else []
@@ -108,14 +108,16 @@ def sum_nodes(scene: Scene) -> list[Node]:
 
 
 def _sum(output: str, parts: list[str]) -> list[Node]:
-    """The sum of some buffers in their order. Of many lights only a block is held at a time: its sum is added
-    to before the next block is computed."""
+    """Nodes of the sum of some buffers in their order, a block at a time.
+
+    A node adds a block to the sum before it. So with many lights only one block of their buffers is held.
+    """
     size = max(BLOCK, -(-len(parts) // DEEPEST))
     nodes: list[Node] = []
     for first in range(0, max(len(parts), 1), size):
         before = [node.output for node in nodes[-1:]]
         end = first + size
         name = output if end >= len(parts) else f"{output} of {end}"
-        own = {part: part for part in [*before, *parts[first:end]]}
-        nodes.append(Node(name, add, {"hits": "hits", **own}))
+        terms = {part: part for part in [*before, *parts[first:end]]}
+        nodes.append(Node(name, add, {"hits": "hits", **terms}))
     return nodes

@@ -19,12 +19,12 @@ from illumcli.shading.materials import DEFAULT, Choice, Token, numbering
 from illumcli.shading.textures import PointMaterials, parameters, textures
 
 PURPOSES = ("lobes", "ambient", "emission")
-"""What parameters that vary over a surface may serve."""
+"""What parameters that vary over a surface are used for."""
 
 
 def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
-    """Numbers of materials, their models, and what these vary by."""
-    # What each object chooses among, and the models of all choices.
+    """Nodes of the material numbers, the models, and the parameters that vary."""
+    # How each object's materials are chosen, and all models that may be.
     choices: list[Choice] = []
     models: dict[Token, Any] = {DEFAULT: default_material()}
     for thing, name in zip(scene.objects, scene.object_names(), strict=True):
@@ -35,7 +35,7 @@ def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
         models |= {("material", name): model for name, model in scene.materials.items()}
 
-    # Measured materials and textures are known by the content of their files.
+    # Measured materials and textures are identified by the content of their files.
     files = {model.file for model in models.values() if hasattr(model, "file")}
     measured = {file: FileFingerprint(partial(resolve, loaded, file)) for file in sorted(files)}
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
@@ -62,7 +62,7 @@ def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 
 def _choice(scene: Scene, thing: Object, name: str) -> tuple[Choice, dict[Token, IlluminationModel]]:
-    """What decides about the materials of an object, and the models it brings."""
+    """How the materials of an object are chosen, and the models of the object itself."""
     models: dict[Token, IlluminationModel] = {}
     of_scene = isinstance(thing.material, str) and not thing.override
     token: Token | None = ("material", str(thing.material)) if of_scene else ("object", name)
@@ -80,5 +80,5 @@ def _choice(scene: Scene, thing: Object, name: str) -> tuple[Choice, dict[Token,
 
 
 def _varied(models: Iterable[IlluminationModel]) -> list[Any]:
-    """Everything that some parameter varies by."""
+    """The textures and vertex values of all models."""
     return [each for model in models for each in model.varying().values()]

@@ -1,4 +1,4 @@
-"""Cached buffers are loaded instead of computed; what only they needed drops out of the graph."""
+"""Replaces nodes whose buffers are cached by nodes that load them; nodes that only fed them drop out."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ class Lookup(Value):
 def substitute_cached(
     graph: Graph, buffers: Iterable[str], view: View, cache: Cache, look: bool = False
 ) -> tuple[Graph, Lookup]:
-    """The graph with nodes that load what is cached of all that `buffers` need, and what was found.
+    """The graph with nodes that load the cached buffers among all that `buffers` need, and which these are.
 
     Parameters
     ----------
     look : bool
-        Reads nothing: an entry that is there counts as sound, and its node cannot run.
+        Read nothing: an entry that exists counts as valid, and the graph cannot run.
     """
     keys = Keys(graph.nodes, view, code())
     loaders: dict[str, Node] = {}
     reused: dict[str, str] = {}
     keeps: dict[str, str] = {}
 
-    # depth first: the inputs of what is loaded are not visited
+    # Depth first; the inputs of loaded buffers are not visited.
     pending, visited = list(buffers)[::-1], set(GIVEN)
     while pending:
         name = pending.pop()
@@ -68,10 +68,10 @@ def substitute_cached(
 
 
 def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[str, Node | None]:
-    """Where a buffer is loaded from and a node that does it; no node where it must be computed."""
+    """Where a buffer is loaded from, and the node that does so; None if it must be computed."""
     memory, store = cache.memory, cache.store
 
-    # in memory: of the whole scene, or of every tile
+    # In memory: the buffer of the whole scene, or of every tile.
     if memory is not None:
         if key in memory.once:
             return "memory", Node(name, partial(_constant, memory.once[key]), {})
@@ -79,7 +79,7 @@ def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[
         if tiles is not None:
             return "memory", Node(name, partial(_of_tile, tiles), {"tile": "tile"})
 
-    # on disk: an entry that is sound and holds what its key stands for
+    # On disk: a valid entry that holds the type of value that its key promises.
     if store is None or not is_kept(name):
         return "", None
     if look:

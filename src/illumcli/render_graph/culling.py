@@ -1,6 +1,6 @@
-"""Objects that cannot affect any view are neither cut into triangles nor traced.
+"""Culling: objects that cannot affect any view are neither triangulated nor traced.
 
-Their bounding boxes decide, which are known once the meshes are read; render space stays that of all objects.
+Their bounding boxes decide, which are known once the meshes are read. Render space stays that of all objects.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from illumcli.visibility.culling import Boxes, SecondaryRays, culled_objects, fr
 
 
 class Bounds(Record):
-    """The boxes of all objects, and how far the surfaces that their normals imply may leave the polygons."""
+    """The bounding boxes of all objects, and the size of polygons that shadow rays may start above."""
 
     objects: ObjectBounds
     widths: NDArray[np.float64]
-    """(O,) widest polygon of each object with such a surface [scene units], else 0."""
+    """(O,) largest polygon diagonal of each object with terminator correction [scene units], else 0."""
 
 
 def why_all(graph: Graph, outputs: Sequence[Layer]) -> str | None:
-    """Why every object is needed, as far as the scene alone tells; None where boxes may tell more."""
+    """Why every object is needed, if the scene alone shows this; None if bounding boxes must decide."""
     if len(graph.scene.objects) < 2:
         return "there is one object at most"
     if any(layer.buffer == "triangle_id" for layer in outputs):
@@ -49,9 +49,9 @@ def why_all(graph: Graph, outputs: Sequence[Layer]) -> str | None:
 def find_bounds(
     graph: Graph, outputs: Sequence[Layer], run: Run, only_cached: bool = False
 ) -> tuple[Graph, Bounds | None]:
-    """The bounds of all objects, and the graph in which they are known; None where no object can be culled.
+    """The bounds of all objects, and the graph in which they are known; None if no object can be culled.
 
-    With `only_cached` nothing is computed: where the bounds are not cached there are none.
+    With `only_cached` nothing is computed: bounds that are not cached are None.
     """
     if why_all(graph, outputs) is not None or any(view.camera.fit for view in graph.views):
         return graph, None
@@ -61,7 +61,7 @@ def find_bounds(
     objects = graph.known["object_bounds"].value
     bounds = Bounds(objects, np.zeros(len(objects.low)))
 
-    # normals matter only if a box alone would be culled and shadow rays start from the smooth surface
+    # The widths are needed only if some box would be culled and shadow rays start from smooth surfaces.
     scene = graph.scene
     shadowed = any(name.startswith("shadow:") for name in reached(graph, outputs))
     smooth = scene.terminator == "smooth" and is_smooth(scene)
@@ -74,8 +74,8 @@ def find_bounds(
 
 
 def unaffecting(graph: Graph, outputs: Sequence[Layer], bounds: Bounds) -> tuple[int, ...]:
-    """The numbers of the objects that change no view: outside each of them, and their shadows and what they
-    obscure, too."""
+    """The numbers of the objects that are outside every view and cast no shadow or obscurance into one."""
+    # Boxes and frustums in render space.
     space, film = bounds.objects.render_space, graph.scene.film
     low, high = (
         (corner - space.centre) / space.radius for corner in (bounds.objects.low, bounds.objects.high)
@@ -84,6 +84,8 @@ def unaffecting(graph: Graph, outputs: Sequence[Layer], bounds: Bounds) -> tuple
         frustum(view.camera, space, view.width, view.height, film.filter if view.samples > 1 else None)
         for view in graph.views
     ]
+
+    # The secondary rays that the outputs need.
     buffers = reached(graph, outputs)
     lights = [
         light
@@ -98,13 +100,13 @@ def unaffecting(graph: Graph, outputs: Sequence[Layer], bounds: Bounds) -> tuple
 def cull(
     graph: Graph, outputs: Sequence[Layer], bounds: Bounds | None, needed: Collection[int] = frozenset()
 ) -> Graph:
-    """The graph without the polygons of objects that change no view.
+    """The graph without the polygons of objects that cannot affect any view.
 
     Parameters
     ----------
     needed : collection of int
-        Numbers of objects that stay all the same: those that a variant before needed. Were each variant to
-        leave out others, none would find the geometry of another.
+        Numbers of objects that are kept in any case because an earlier variant needed them: if each variant
+        culled other objects, none could reuse the geometry of another.
     """
     if bounds is None:
         return graph
@@ -115,19 +117,23 @@ def cull(
 def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
     """The graph without the polygons of the objects of these numbers.
 
-    Their meshes are read, and bounds and cameras see them; no values are read that were baked for them.
+    Their meshes are still read, for bounds and for cameras that fit an object; their baked obscurance is not.
     """
     if not numbers:
         return graph
+
+    # `meshes` loses the polygons; bounds and cameras read `every_mesh` instead.
     nodes = dict(graph.nodes)
     nodes["every_mesh"] = replace(nodes["meshes"], output="every_mesh", kind="meshes")
     nodes["meshes"] = Node.of(partial(without_culled, numbers), "meshes", meshes="every_mesh")
     for name, node in nodes.items():
         if name in ("object_bounds", "implied_widths") or name.startswith("camera:"):
             nodes[name] = replace(node, inputs={**node.inputs, "meshes": "every_mesh"})
+
+    # No baked values of culled objects.
     bound: Any = nodes["baked"].function
-    gone = frozenset(numbers)
-    kept = tuple((name, None if k in gone else file) for k, (name, file) in enumerate(bound.args[0]))
+    culled = frozenset(numbers)
+    kept = tuple((name, None if k in culled else file) for k, (name, file) in enumerate(bound.args[0]))
     nodes["baked"] = replace(nodes["baked"], function=partial(bound.func, kept))
     known = dict(graph.known)
     if "meshes" in known:
@@ -136,7 +142,7 @@ def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
 
 
 def _obscurance_reach(graph: Graph, buffers: Collection[str], radius: float) -> float:
-    """The distance up to which obscurance rays find anything [scene units]; 0 where none are cast."""
+    """The length of obscurance rays [scene units]; 0 if none are cast."""
     if not {"obscurance", "obscurance_draws"} <= set(buffers):
         return 0.0
     return (graph.scene.obscurance or Obscurance()).falloff.reach(radius)

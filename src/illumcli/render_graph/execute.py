@@ -1,4 +1,4 @@
-"""Runs a plan over tiles on a thread pool, frees buffers after their last use, counts and times each step."""
+"""Runs a plan over tiles on a thread pool, frees buffers after their last use, and measures each node."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from illumcli.arrays import column_major
 from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
 from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
-from illumcli.film.tiles import MOST, Scattered, Tile, tiles
+from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.lights._incident import LitPoints
@@ -27,47 +27,47 @@ from illumcli.records import Record, Value
 from illumcli.render_graph.build import SHAPE
 from illumcli.render_graph.schedule import Plan
 
-Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32 or, ids, uint32
-Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> what the store holds of it
+Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32; ids are uint32
+Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> its values as the cache stores them
 Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
-"""A tile and its layers to what is wanted of it, (rows, columns, channels) by name; any thread."""
+"""From a tile and its layers to arrays (rows, columns, channels) by name; called in any thread."""
 
 
 @dataclass(slots=True)
 class RenderStats:
-    """What was done: seconds, rays and lanes by step. Threads add under a lock."""
+    """Render statistics by node: seconds, rays, and work that was avoided. Threads add under a lock."""
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     rays: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-    spared: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-    """Points that a light does not reach, or does not reach freely: neither rays nor models see them. Samples
-    of pixels that agree."""
+    saved: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    """Points that are unlit or in shadow, where no rays are cast or no models are evaluated; samples that
+    adaptive sampling left out; polygons of culled objects."""
     refined: int = 0
-    """Pixels that wanted all their samples."""
+    """Pixels that adaptive sampling gave all their samples."""
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(
-        self, seconds: Mapping[str, float], rays: Mapping[str, int], spared: Mapping[str, int] | None = None
+        self, seconds: Mapping[str, float], rays: Mapping[str, int], saved: Mapping[str, int] | None = None
     ) -> None:
-        """Add one tile's figures."""
+        """Add the statistics of a node or tile."""
         with self.lock:
             for name, value in seconds.items():
                 self.seconds[name] += value
             for name, count in rays.items():
                 self.rays[name] += count
-            for name, count in (spared or {}).items():
-                self.spared[name] += count
+            for name, count in (saved or {}).items():
+                self.saved[name] += count
 
 
 class Band(Record):
-    """Finished rows of a picture."""
+    """Finished rows of an image."""
 
     y: int
-    layers: Mapping[str, NDArray[Any]]  # layer, or what was made of them -> (rows, width, channels)
+    layers: Mapping[str, NDArray[Any]]  # layers, or the arrays developed from them: (rows, width, channels)
 
 
 class Run(Value):
-    """What running nodes takes beside them: where buffers are kept, how many threads, who counts."""
+    """How nodes are run: the statistics they add to, the cache and the number of threads."""
 
     stats: RenderStats = field(default_factory=RenderStats)
     cache: Cache = NO_CACHE
@@ -75,7 +75,7 @@ class Run(Value):
 
 
 class _Common(Record):
-    """What the tiles of a view have in common."""
+    """What all tiles of a view share."""
 
     plan: Plan
     shared: Mapping[str, Any]
@@ -91,14 +91,14 @@ def _unchanged(tile: Tile, layers: Planes) -> Planes:
 
 
 def run_once(plan: Plan, run: Run) -> dict[str, Any]:
-    """The buffers of the whole scene; those that do not need each other are computed side by side.
+    """The buffers of the whole scene, computed in parallel where they do not need each other.
 
-    Of several errors the one is raised that comes first in the plan.
+    If several nodes fail, the error of the first one in the plan is raised.
     """
     pending: dict[str, Future[Any]] = {}
 
     def compute(node: Node) -> Any:
-        inputs = {name: pending[name].result() for name in node.inputs.values()}  # submitted before it
+        inputs = {name: pending[name].result() for name in node.inputs.values()}  # submitted before this node
         start = time.perf_counter()
         value = node.run(inputs)
         run.stats.add({node.output: time.perf_counter() - start}, {})
@@ -119,7 +119,7 @@ def run_once(plan: Plan, run: Run) -> dict[str, Any]:
 
 
 def _cost(plan: Plan, name: str, stats: RenderStats) -> float:
-    """Seconds of one processor that a buffer took, with all that had to be computed for it."""
+    """Processor seconds that a buffer took, with everything that was computed for it."""
     return sum(stats.seconds.get(need, 0.0) for need in plan.needed_for(name))
 
 
@@ -131,19 +131,20 @@ def bands(
     side: int | None = None,
     develop: Develop = _unchanged,
 ) -> Iterator[Band]:
-    """A view's picture as bands of rows from the top, each as soon as its tiles are done.
+    """The image of a view as bands of rows from the top, each as soon as its tiles are finished.
 
-    Bands hold the layers, or what `develop` makes of them tile by tile. The pixels do not depend on the
-    threads, the `side` of tiles or the cache, where what is worth it is kept. When the consumer stops or is
-    interrupted, tiles in flight end at their next node.
+    Bands hold the layers, or the arrays that `develop` computes from them tile by tile. The pixels do not
+    depend on the number of threads, the `side` of tiles or the cache; buffers that are worth it are cached.
+    If the consumer stops or is interrupted, tiles in progress end at their next node.
 
     Parameters
     ----------
     shared : mapping
-        The buffers of the whole scene, as `run_once` returns them.
+        The buffers of the whole scene, from `run_once`.
     done : callable
-        Gets the number of pixels of each tile that is done.
+        Called with the number of pixels of each finished tile.
     """
+    # An adaptive view first takes few samples of every pixel, so its tiles are larger.
     view = plan.view
     first = view.coarse() if view.is_adaptive else view
     rows = tiles(view.width, view.height, plan.tile_side(first, side), first.samples)
@@ -157,7 +158,7 @@ def bands(
             pending: list[tuple[Tile, Future[tuple[Mapping[str, NDArray[Any]], Kept]]]] = []
             queue = iter([tile for row in rows for tile in row])
 
-            # a row of tiles and some more are in flight, so that no thread waits for the consumer
+            # Keep a row of tiles and a few more in progress, so that no thread waits for the consumer.
             def submit() -> None:
                 for tile in queue:
                     pending.append((tile, pool.submit(compute, common, tile)))
@@ -166,13 +167,13 @@ def bands(
 
             submit()
             for row in rows:
-                # join the tiles of a row in their order
+                # Join the tiles of a row in their order.
                 height = row[0].height
                 band: dict[str, NDArray[Any]] = {}
                 kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
-                    # a short wait, so that an interrupt reaches this thread
+                    # Short waits, so that an interrupt reaches this thread.
                     while not wait([future], timeout=0.2, return_when=FIRST_COMPLETED).done:
                         pass
                     layers, others = future.result()
@@ -196,8 +197,8 @@ def bands(
 def at_pixels(
     plan: Plan, shared: Mapping[str, Any], run: Run, x: NDArray[np.int64], y: NDArray[np.int64]
 ) -> Planes:
-    """Layer -> (K, channels) at K pixels of a view: what `bands` computes there, and nothing else."""
-    count = max(1, MOST // plan.view.samples)
+    """Layer -> (K, channels) at K pixels of a view, equal to what `bands` computes there."""
+    count = max(1, MAX_TILE_SAMPLES // plan.view.samples)
     pieces = [Scattered.at(x[a : a + count], y[a : a + count]) for a in range(0, len(x), count)]
     stop, recorder = threading.Event(), BufferRecorder(NO_CACHE, {}, plan.view)
     common = _Common(plan, shared, run.stats, stop, recorder, _unchanged, plan.last_use())
@@ -212,7 +213,7 @@ def at_pixels(
 
 
 def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
-    """What is wanted of one tile, and what is kept of its buffers."""
+    """One tile's developed layers, and its buffers for the cache."""
     buffers, kept = _buffers(common, common.plan.view, tile)
     start = time.perf_counter()
     out = common.develop(tile, _pixels(common.plan, buffers, common.plan.view, tile))
@@ -221,70 +222,82 @@ def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept
 
 
 def _buffers(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
-    """The buffers of one tile that the film reads, and what is kept of them all; `view` has its samples."""
+    """The buffers of one tile that the film reads, and those for the cache; `view` says how many samples."""
     buffers: dict[str, Any] = {**common.shared, "view": view, "tile": tile}
     tracer = None
     if "tracer" in common.shared:
         tracer = buffers["tracer"] = common.shared["tracer"].counting(common.stop)
-    seconds, rays, lanes, kept = {}, {}, {}, {}
-    for number, step in enumerate(common.plan.tile):
+    seconds, rays, unlit, kept = {}, {}, {}, {}
+    for number, node in enumerate(common.plan.tile):
         if common.stop.is_set():
             raise Interrupted
+
+        # Compute the buffer, and measure it.
         start, before = time.perf_counter(), tracer.rays if tracer else 0
-        made = buffers[step.output] = step.run(buffers)
-        seconds[step.output] = time.perf_counter() - start
+        value = buffers[node.output] = node.run(buffers)
+        seconds[node.output] = time.perf_counter() - start
         if tracer and tracer.rays > before:
-            rays[step.output] = tracer.rays - before
-        if isinstance(made, LitPoints):
-            lanes[step.output] = made.count - len(made.index)
-        if step.output in common.recorder.names:
-            kept[step.output] = common.recorder.take(step.output, buffers, tile)
-        for name in step.inputs.values():
+            rays[node.output] = tracer.rays - before
+        if isinstance(value, LitPoints):
+            unlit[node.output] = value.count - len(value.index)
+
+        # Hand it to the cache, and drop the buffers that no later node needs.
+        if node.output in common.recorder.names:
+            kept[node.output] = common.recorder.take(node.output, buffers, tile)
+        for name in node.inputs.values():
             if common.last_use.get(name) == number:
                 buffers.pop(name, None)
-    common.stats.add(seconds, rays, lanes)
+    common.stats.add(seconds, rays, unlit)
     return buffers, kept
 
 
 def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
-    """What is wanted of one tile: of few samples, and of all of them where it differs among these.
+    """One tile's developed layers: few samples per pixel, and all of them in pixels where these few differ.
 
-    The few are taken of a border of one pixel too, so that a pixel sees the same neighbours in any tile. Each
-    layer decides for itself, by the shapes seen and its own values: no layer depends on what others are asked
-    for.
+    The first samples also cover a border of one pixel, so that a pixel has the same neighbours in any tile.
+    Each layer decides for itself, by the shapes and by its own values: no layer depends on which others are
+    rendered.
     """
+    # The first samples, also of the border.
     plan, view, stats = common.plan, common.plan.view, common.stats
-    few, around = view.coarse(), tile.grown(view.width, view.height)
-    buffers, _ = _buffers(common, few, around)
+    coarse, bordered = view.coarse(), tile.grown(view.width, view.height)
+    buffers, _ = _buffers(common, coarse, bordered)
+
+    # The tile's pixels from these, and which of them need more.
     start = time.perf_counter()
-    own = (
-        slice(tile.y - around.y, tile.y - around.y + tile.height),
-        slice(tile.x - around.x, tile.x - around.x + tile.width),
+    inside = (
+        slice(tile.y - bordered.y, tile.y - bordered.y + tile.height),
+        slice(tile.x - bordered.x, tile.x - bordered.x + tile.width),
     )
-    out = {name: np.array(values[own]) for name, values in _pixels(plan, buffers, few, around).items()}
-    differing = _differing(plan, buffers, few, around, view.adaptive.difference)
-    which = {name: mask[own] for name, mask in differing.items()}
-    wanted = np.logical_or.reduce([*which.values()])
-    down, across = np.nonzero(wanted)
+    coarse_pixels = _pixels(plan, buffers, coarse, bordered)
+    out = {name: np.array(values[inside]) for name, values in coarse_pixels.items()}
+    differing = _differing(plan, buffers, coarse, bordered, view.adaptive.difference)
+    to_refine = {name: mask[inside] for name, mask in differing.items()}
+    down, across = np.nonzero(np.logical_or.reduce([*to_refine.values()]))
     stats.add({"film": time.perf_counter() - start}, {})
+
+    # The remaining samples of those pixels, a batch at a time; each layer takes the pixels it refines.
     rest = view.rest()
-    some = max(1, MOST // rest.samples)
-    for first in range(0, len(down), some):
-        y, x = down[first : first + some], across[first : first + some]
+    at_once = max(1, MAX_TILE_SAMPLES // rest.samples)
+    for first in range(0, len(down), at_once):
+        y, x = down[first : first + at_once], across[first : first + at_once]
         part = Scattered.at(x + tile.x, y + tile.y)
         others, _ = _buffers(common, rest, part)
         start = time.perf_counter()
-        pixel = (part.rows - around.y) * around.width + part.columns - around.x
+        pixel = (part.rows - bordered.y) * bordered.width + part.columns - bordered.x
         joined = _joined(plan, buffers, others, pixel)
         stats.add({"film": time.perf_counter() - start}, {})
         for name, values in _pixels(plan, joined, view, part).items():
-            mine = which[name][y, x]
-            out[name][y[mine], x[mine]] = values[0][mine]
+            refine = to_refine[name][y, x]
+            out[name][y[refine], x[refine]] = values[0][refine]
+
+    # Statistics.
     pixels, refined = tile.width * tile.height, len(down)
-    taken = around.width * around.height * few.samples + refined * rest.samples
+    taken = bordered.width * bordered.height * coarse.samples + refined * rest.samples
     stats.add({}, {}, {"samples": pixels * view.samples - taken})
     with stats.lock:
         stats.refined += refined
+
     start = time.perf_counter()
     developed = common.develop(tile, out)
     stats.add({"film": time.perf_counter() - start}, {})
@@ -292,30 +305,48 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
 
 
 def _joined(
-    plan: Plan, few: Mapping[str, Any], others: Mapping[str, Any], pixel: NDArray[np.int64]
+    plan: Plan, coarse: Mapping[str, Any], others: Mapping[str, Any], pixel: NDArray[np.int64]
 ) -> dict[str, Any]:
-    """What the film reads of the pixels of these numbers: their few samples and after them the others."""
-    first, last = few["samples"], others["samples"]
+    """The buffers that the film reads, for some pixels: their first samples, followed by the others.
+
+    Parameters
+    ----------
+    coarse : mapping
+        The buffers of the first samples of a tile.
+    others : mapping
+        The buffers of the other samples of K pixels.
+    pixel : (K,)
+        Those pixels' numbers in the tile.
+    """
+    # The hits of the first samples in those pixels.
+    first, last = coarse["samples"], others["samples"]
     count = first.per_pixel + last.per_pixel
-    place = np.full(len(first.x), -1)
-    place[pixel] = np.arange(len(pixel))
-    own, sample = np.divmod(few["hits"].sample, first.per_pixel)
-    among = np.flatnonzero(place[own] >= 0)
-    pixel_of, other = np.divmod(others["hits"].sample, last.per_pixel)
-    lane = np.concatenate(
-        [place[own[among]] * count + sample[among], pixel_of * count + first.per_pixel + other]
+    new_pixel = np.full(len(first.x), -1)
+    new_pixel[pixel] = np.arange(len(pixel))
+    coarse_pixel, coarse_sample = np.divmod(coarse["hits"].sample, first.per_pixel)
+    kept = np.flatnonzero(new_pixel[coarse_pixel] >= 0)
+
+    # Number all samples pixel by pixel.
+    other_pixel, other_sample = np.divmod(others["hits"].sample, last.per_pixel)
+    sample = np.concatenate(
+        [
+            new_pixel[coarse_pixel[kept]] * count + coarse_sample[kept],
+            other_pixel * count + first.per_pixel + other_sample,
+        ]
     ).astype(np.int32)
-    order = np.argsort(lane)
+
+    # Join the buffers in that order.
+    order = np.argsort(sample)
     points = np.concatenate(
         [each.points.reshape(-1, each.per_pixel, 2)[which] for each, which in ((first, pixel), (last, ...))],
         axis=1,
     )
     joined = {
-        "hits": replace(others["hits"], sample=lane[order]),
+        "hits": replace(others["hits"], sample=sample[order]),
         "samples": replace(last, points=points.reshape(-1, 2), per_pixel=count, first=None),
     }
     for name in {"alpha", *(layer.buffer for layer in plan.outputs)}:
-        values = np.concatenate([few[name][among], others[name]])
+        values = np.concatenate([coarse[name][kept], others[name]])
         joined[name] = column_major(values[order])
     return joined
 
@@ -323,35 +354,36 @@ def _joined(
 def _differing(
     plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile, difference: float
 ) -> dict[str, NDArray[np.bool_]]:
-    """(rows, columns) by layer: where its pixels want more samples than the view has."""
-    lane, shape = buffers["hits"].sample, (tile.height, tile.width)
+    """(rows, columns) by layer: the pixels that need more samples than the view has."""
+    sample, shape = buffers["hits"].sample, (tile.height, tile.width)
     objects, normals = (buffers[name] for name in SHAPE)
-    forms = differs_in_shape(objects, normals, lane, shape, view.samples)
+    by_shape = differs_in_shape(objects, normals, sample, shape, view.samples)
     out = {}
     for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.outputs] + [
         ("alpha", "alpha", True)
     ]:
-        out[name] = forms
+        out[name] = by_shape
         if not data:
-            light = differs_in_light(buffers[buffer], lane, shape, view.samples, difference)
-            out[name] = forms | light
+            by_light = differs_in_light(buffers[buffer], sample, shape, view.samples, difference)
+            out[name] = by_shape | by_light
     return out
 
 
 def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> Planes:
-    lane = buffers["hits"].sample
+    """The layers of a tile, reconstructed from the buffers of its samples."""
+    sample = buffers["hits"].sample
     pixels = tile.width * tile.height
     out = {}
     for layer in plan.outputs:
         values = buffers[layer.buffer]
         if layer.per_pixel:
-            made = values
+            by_pixel = values
         elif layer.data:
-            made = pixel_nearest(values, lane, buffers["samples"].nearest(), pixels)
+            by_pixel = pixel_nearest(values, sample, buffers["samples"].nearest(), pixels)
         else:
-            made = pixel_means(values, lane, pixels, view.samples)
-        out[layer.name] = made.reshape(tile.height, tile.width, -1)
+            by_pixel = pixel_means(values, sample, pixels, view.samples)
+        out[layer.name] = by_pixel.reshape(tile.height, tile.width, -1)
     if "alpha" in buffers and "alpha" not in out:
-        alpha = pixel_means(buffers["alpha"], lane, pixels, view.samples)
+        alpha = pixel_means(buffers["alpha"], sample, pixels, view.samples)
         out["alpha"] = alpha.reshape(tile.height, tile.width, 1)
     return out

@@ -1,4 +1,4 @@
-"""Why buffers are not computed, how many rays and how much memory a plan takes."""
+"""Explains a plan: why buffers are not computed, and upper bounds of its rays and memory."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from illumcli.layers import Layer
 from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import why_all
-from illumcli.render_graph.replicates import AGAIN, doubled_count
+from illumcli.render_graph.replicates import REPLICATE, replicated_count
 from illumcli.render_graph.schedule import Plan, reached
 from illumcli.scene.spec import Scene
 
-CULLED = "no view sees it, and it shadows and obscures nothing that one sees"
-CACHED = "all that needs it is at hand"
+CULLED = "outside every view; casts no shadow or obscurance onto anything visible"
+CACHED = "everything that needs it is cached"
 
 
 def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) -> dict[str, str]:
-    """A reason for every buffer that is not computed, and every object that is culled.
+    """The reason for every buffer that is not computed and every object that is culled.
 
     Parameters
     ----------
     plan : Plan, optional
-        Of one view, in which cached buffers are loaded.
+        The plan of one view, in which cached buffers are loaded.
     """
+    # Buffers that no output needs; cameras are placed, and bounds computed, before the graph is scheduled.
     order = reached(graph, outputs)
     computed = set(order)
     reasons = {}
     for name in graph.nodes:
-        if name in computed or name.startswith((AGAIN, "camera:")):  # cameras are placed before
+        if name in computed or name.startswith((REPLICATE, "camera:")):
             continue
-        if graph.culled and name in ("implied_widths", "every_mesh"):  # computed before anything was culled
+        if graph.culled and name in ("implied_widths", "every_mesh"):
             continue
         reasons[name] = graph.why_not(name)
-    if "error" in computed and f"{AGAIN}samples" not in computed:
-        reasons[f"{AGAIN}beauty"] = "nothing in the picture is random: its error is 0"
+    if "error" in computed and f"{REPLICATE}samples" not in computed:
+        reasons[f"{REPLICATE}beauty"] = "nothing in the image is random: its error is 0"
+
+    # Culled objects, and buffers that only cached ones need.
     names = graph.scene.object_names()
     reasons |= {f"object:{names[number]}": CULLED for number in graph.culled}
     if plan is not None:
@@ -51,26 +54,28 @@ def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) ->
 
 
 def which_objects(graph: Graph, outputs: Sequence[Layer]) -> str:
-    """Which objects take part, and why."""
+    """Which objects are rendered, and why."""
     why = why_all(graph, outputs)
     if why is not None:
         return f"all: {why}"
     if graph.culled:
-        return f"all but {len(graph.culled)} that no view can tell"
-    return "known once the meshes are read, or all are needed"
+        return f"all but {len(graph.culled)}, which are culled"
+    return "all, unless their bounds allow culling once the meshes are read"
 
 
 def expected_rays(scene: Scene, views: Sequence[View], computed: set[str]) -> dict[str, int]:
-    """Upper bounds of the rays of some views by purpose, where these buffers are computed."""
+    """Upper bounds of the rays of some views, by purpose, if these buffers are computed."""
     samples = sum(view.width * view.height * view.samples for view in views)
-    doubled = sum(doubled_count(view.width, view.height) * view.samples for view in views)
-    again = {name.removeprefix(AGAIN) for name in computed if name.startswith(AGAIN)}
-    more = _rays_of(scene, doubled, again)
-    return _rays_of(scene, samples, computed) | {f"{AGAIN}{name}": count for name, count in more.items()}
+    rays = _rays_of(scene, samples, computed)
+
+    replicated = sum(replicated_count(view.width, view.height) * view.samples for view in views)
+    of_replicates = {name.removeprefix(REPLICATE) for name in computed if name.startswith(REPLICATE)}
+    more = _rays_of(scene, replicated, of_replicates)
+    return rays | {f"{REPLICATE}{name}": count for name, count in more.items()}
 
 
 def _rays_of(scene: Scene, samples: int, computed: set[str]) -> dict[str, int]:
-    """Rays of so many samples by purpose."""
+    """Upper bounds of the rays of this many samples, by purpose."""
     rays = {"primary": samples} if "hits" in computed else {}
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in computed and light.shadows and any(light.color()):
@@ -81,8 +86,8 @@ def _rays_of(scene: Scene, samples: int, computed: set[str]) -> dict[str, int]:
 
 
 def expected_bytes(plan: Plan) -> dict[str, int]:
-    """What a plan takes beyond its meshes: a band of tiles, each cached buffer that is read, and each that
-    may be written, whose pages the system may drop. Upper bounds."""
+    """Upper bounds of the memory of a plan beside its meshes: a band of tiles, and each buffer that is read
+    from or may be written to the cache; the system may drop the pages of the latter."""
     view = plan.view
     samples = min(view.height, plan.tile_side(view)) * view.width * view.samples
     sizes = {"band": samples * 4 * sum(len(layer.channels) for layer in plan.outputs) // view.samples}
@@ -94,7 +99,7 @@ def expected_bytes(plan: Plan) -> dict[str, int]:
 
 
 def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
-    """A plan as JSON has it; `expected` is what shapes, mesh files and textures take [bytes]."""
+    """A plan for JSON output; `expected` is the memory of shapes, mesh files and textures [bytes]."""
     view, graph = plan.view, plan.graph
     size = {"camera": view.name, "width": view.width, "height": view.height, "samples": view.samples}
     whole = graph.without_loaders()

@@ -1,8 +1,8 @@
-"""What a buffer depends on, as one hash: its node, the values bound in it, and the keys of its inputs.
+"""Cache keys: a buffer's key is the hash of its node, the values bound in it, and the keys of its inputs.
 
-Nothing is listed by hand. A node binds only the parts of the scene that its function reads, so the wiring
-itself says that a colour changes no hit, and that a light's position changes only that light's shadow. Nodes
-are known by name, not by the module of their function: a function that moves keeps its keys.
+No dependency is listed by hand. A node binds only the parts of the scene that its function reads, so a change
+of a colour changes the key of no hit, and a change of a light's position only that of the light's own shadow.
+Nodes are identified by name, not by the module of their function: a function that moves keeps its keys.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ SOURCES = (
     "shading",
     "visibility",
 )
-"""Source files and folders that decide about the content of what is kept between runs. A test follows the
-imports of all nodes' functions and fails where one of them leads elsewhere."""
+"""Source files and folders that determine the values of cached buffers. A test follows the imports of all
+nodes' functions and fails if one leads elsewhere."""
 
 
 class Keys:
@@ -50,7 +50,7 @@ class Keys:
         self._known = {"tile": "tile", "view": fingerprint(view)}
 
     def __call__(self, name: str) -> str:
-        """The key of the buffer `name`, of all tiles together."""
+        """The key of the buffer `name`, the same for all tiles."""
         if name not in self._known:
             node = self._graph[name]
             inputs = [(parameter, self(buffer)) for parameter, buffer in node.inputs.items()]
@@ -59,13 +59,13 @@ class Keys:
 
 
 def content_key(nodes: Mapping[str, Node], view: View, buffers: Iterable[str]) -> str:
-    """Hash of all that some buffers of a view depend on, and of this version."""
+    """Hash of everything that some buffers of a view depend on, and of this version."""
     keys = Keys(nodes, view, __version__)
     return digest([keys(name) for name in buffers])
 
 
 def _installed(library: str) -> list[str]:
-    """The version of a library, by the name of its metadata folder. Nothing is imported for it, and
+    """The version of a library, from the name of its metadata folder. Nothing is imported;
     `importlib.metadata` takes longer than all the hashing."""
     spec = find_spec(library)
     places = spec.submodule_search_locations if spec else None
@@ -84,10 +84,10 @@ def source_files(root: str) -> list[str]:
 
 @cache
 def code() -> str:
-    """Hash of the sources that compute what is kept, and of the numpy, ray core and processor they run on.
+    """Hash of the sources that compute cached buffers, and of the numpy, embreex and processor they run on.
 
-    The sources count by their text, not by their places. Processors differ in the instructions they have, and
-    with them the last bits of their results.
+    The sources count by their text, not by their paths. Processors differ in their instruction sets, and thus
+    in the last bits of results.
     """
     features: dict[str, bool] = import_module("numpy._core._multiarray_umath").__cpu_features__
     texts = []

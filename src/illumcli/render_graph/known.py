@@ -11,7 +11,7 @@ from illumcli.render_graph.schedule import Plan
 
 
 def with_known(graph: Graph, name: str, run: Run, only_cached: bool = False) -> Graph:
-    """The graph in which a buffer, and all that was computed for it, is known.
+    """The graph with the values of a buffer of the whole scene, and of all buffers computed for it.
 
     With `only_cached` nothing is computed: a buffer that is not cached stays unknown.
     """

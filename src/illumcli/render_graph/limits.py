@@ -1,4 +1,4 @@
-"""Limits: the memory and disk that a run would take, checked before anything is read or allocated."""
+"""Limits: the memory, disk space and rays of a run, checked before anything is read or allocated."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import MeshFile, Scene
 
 BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
-"""What a mesh takes in memory per byte of its file: a text of 80 bytes a triangle, or 43 binary ones."""
+"""Memory of a mesh per byte of its file; a triangle takes 80 bytes of text, or 43 of binary."""
 BYTES_OF_OTHER_FILES = 6
-"""glTF, whose images take a part of the file."""
+"""The same for glTF, where images are part of the file."""
 TEXEL_BYTES = 8
-"""Of each channel: as a number, and as the channel that a parameter is read from."""
+"""Memory of a texture per texel and channel: the image, and the channel that a parameter reads."""
 WHILE_READ = 4
-"""More bytes of each channel for the texture that is being read."""
+"""Additional bytes per texel and channel while a texture is read."""
 LARGEST_SIDE = 1 << 16
 MOST_RAYS = 10**11
 DENSEST = 20
-"""No picture worth rendering packs better than this."""
+"""Upper bound on the compression ratio of an image."""
 
 
 def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
-    """What a scene's shapes, mesh files and textures take [bytes], from counts, sizes and headers alone.
+    """Memory of a scene's shapes, mesh files and textures [bytes], from counts, file sizes and image headers.
 
-    Nothing is read but the headers of images. Files that are not there, or no images, count for nothing here,
-    nor do those that mesh files name; their readers look at each of them.
+    Missing files, files that are not images and files that mesh files name count as 0; their readers check
+    each of them.
     """
     sizes = {"shapes": 0, "meshes": 0, "textures": 0}
     for thing in scene.objects:
@@ -55,7 +55,7 @@ def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
 
 
 def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
-    """Path and space of each texture that materials of the scene name, once."""
+    """Path and colour space of each texture that the scene's materials name, without repeats."""
     models: list[IlluminationModel] = []
     for thing in scene.objects:
         own = scene.material_of(thing)
@@ -66,7 +66,7 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
 
 
 def _texels(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
-    """Numbers in an image, by its header; 0 where it cannot be read, which its reader will say."""
+    """Texels times channels of an image, from its header; 0 if it is unreadable, which its reader reports."""
     from illumcli.images.reader import texel_count
 
     try:
@@ -76,27 +76,27 @@ def _texels(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
 
 
 def refuse_memory(rows: int, width: int, values: int, expected: Mapping[str, int], place: str) -> None:
-    """Raise LimitError where a band of `rows` and what is `expected` do not fit into the memory that is free.
+    """Raise LimitError if a band of `rows` and the `expected` memory do not fit into the free memory.
 
     Parameters
     ----------
     rows, width : int
-        Of the band that is held at once [pixels].
+        Size of the band that is held at once [pixels].
     values : int
         Numbers per pixel.
     expected : mapping of str to int
-        As `expected_memory` has it [bytes].
+        From `expected_memory` [bytes].
     """
     sizes = {**expected, "film": 2 * 4 * rows * width * values}
     largest = max(sizes, key=lambda name: sizes[name])
-    ways = {"film": "fewer layers or a smaller film", "meshes": "smaller or fewer meshes"}
-    ways |= {"shapes": "shapes with fewer segments, rings or quads, or fewer of them"}
+    advice = {"film": "fewer layers or a smaller film", "meshes": "smaller or fewer meshes"}
+    advice |= {"shapes": "shapes with fewer segments, rings or quads, or fewer of them"}
     what = f"{place}: {largest} of {in_words(sizes[largest])}" if len(sizes) > 1 else place
-    refuse_beyond(sum(sizes.values()), what, f"ask for {ways.get(largest, 'smaller or fewer textures')}")
+    refuse_beyond(sum(sizes.values()), what, f"ask for {advice.get(largest, 'smaller or fewer textures')}")
 
 
 def refuse_rays(graph: Graph, outputs: Sequence[Layer]) -> None:
-    """Raise LimitError where a film is larger, or rays are more, than this program takes on."""
+    """Raise LimitError if a film is larger than `LARGEST_SIDE`, or there are more rays than `MOST_RAYS`."""
     for view in graph.views:
         if max(view.width, view.height) > LARGEST_SIDE:
             raise LimitError(
@@ -112,7 +112,7 @@ def refuse_rays(graph: Graph, outputs: Sequence[Layer]) -> None:
 
 
 def refuse_disk(path: Path, pixel_bytes: int) -> None:
-    """Raise LimitError where an image of so many bytes, well packed, does not fit beside `path`."""
+    """Raise LimitError if an image of `pixel_bytes` does not fit on the disk of `path`, even compressed."""
     folder = path.absolute().parent
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent

@@ -1,4 +1,4 @@
-"""What a scene asks of its render graph: its views and layers, and what can be left out of it."""
+"""What a scene needs from its render graph: views and layers, and properties that let nodes be left out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def views(scene: Scene) -> list[View]:
 
 
 def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
-    """The layers of these names: `lights` and `shadows` stand for one per light, which can be named alone.
+    """The layers of these names; `lights` and `shadows` expand to one per light, which has its own name, too.
 
     Raises
     ------
@@ -51,29 +51,29 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
 
 
 def candidates(scene: Scene) -> list[IlluminationModel] | None:
-    """The models that some surface may have; None where a mesh file's own library decides."""
-    found: list[IlluminationModel] = []
+    """The models that some surface may have; None if a mesh file's library decides."""
+    models: list[IlluminationModel] = []
     for thing in scene.objects:
         model = scene.material_of(thing)
         if model is not None:
-            found.append(model)
+            models.append(model)
             continue
         if imports(scene, thing):
             return None
-        found += [default_material(), *scene.materials.values()]
-    return found
+        models += [default_material(), *scene.materials.values()]
+    return models
 
 
 def imports(scene: Scene, thing: Any) -> bool:
-    """Does an object have the materials that its mesh file describes?"""
-    wants = thing.fallback is not None or getattr(source_of(scene, thing.mesh), "materials", False)
-    return thing.material is None and bool(wants)
+    """True if an object has the materials of its mesh file."""
+    enabled = thing.fallback is not None or getattr(source_of(scene, thing.mesh), "materials", False)
+    return thing.material is None and bool(enabled)
 
 
-def reached_words(scene: Scene) -> frozenset[str]:
-    """The words (`v`, `t`, ...) that some lobe of some candidate asks for."""
+def needed_terms(scene: Scene) -> frozenset[str]:
+    """The given terms (`v`, `t`, ...) that the lobes of some candidate need."""
     models = candidates(scene)
-    if models is None:  # libraries of meshes describe models that know of no tangent
+    if models is None:  # no model of a mesh file's library needs a tangent
         models = [*scene.materials.values(), *filter(None, map(scene.material_of, scene.objects))]
         return frozenset(("n", "l", "v")).union(*(given_terms(model.lobes()) for model in models))
     return frozenset().union(*(given_terms(model.lobes()) for model in models))
@@ -85,7 +85,7 @@ def rates(scene: Scene) -> list[Rate]:
 
 
 def is_ambient(scene: Scene) -> bool:
-    """Does any ambient light leave a surface?"""
+    """True if some surface reflects ambient light."""
     models = candidates(scene)
     if not any(scene.ambient.color):
         return False
@@ -93,12 +93,12 @@ def is_ambient(scene: Scene) -> bool:
 
 
 def weighs_ambient(scene: Scene) -> bool:
-    """Is the ambient light weighed by obscurance, traced or baked?"""
+    """True if ambient light is multiplied by obscurance, traced or baked."""
     return scene.obscurance is not None or any(is_baked(scene))
 
 
 def is_emissive(scene: Scene) -> bool:
-    """Does any surface emit light?"""
+    """True if some surface emits light."""
     models = candidates(scene)
     return models is None or any(_glows(model, model.emission) for model in models)
 
@@ -108,28 +108,28 @@ def _glows(model: IlluminationModel, color: Any) -> bool:
 
 
 def may_vary(scene: Scene, purpose: str) -> bool:
-    """May a parameter that serves `purpose` (`lobes`, `ambient`, `emission`) vary over some surface?"""
+    """True if a parameter for `purpose` (`lobes`, `ambient`, `emission`) may vary over some surface."""
     models = candidates(scene)
     return models is None or any(paths(model, purpose) for model in models)
 
 
-def sends(light: Light) -> bool:
-    """Does a light send anything?"""
+def is_on(light: Light) -> bool:
+    """True if a light's intensity is not 0."""
     return any(light.color())
 
 
 def active_lights(scene: Scene) -> dict[str, Light]:
-    """The lights that send anything, by name."""
-    return {name: light for name, light in scene.named_lights().items() if sends(light)}
+    """The lights whose intensity is not 0, by name."""
+    return {name: light for name, light in scene.named_lights().items() if is_on(light)}
 
 
 def is_baked(scene: Scene) -> list[bool]:
-    """Of each object: does its mesh name baked obscurance?"""
+    """For each object, True if its mesh names a file of baked obscurance."""
     return [getattr(source_of(scene, thing.mesh), "obscurance", None) is not None for thing in scene.objects]
 
 
 def all_baked(scene: Scene) -> bool:
-    """Is there no surface left to cast obscurance rays from?"""
+    """True if no object needs obscurance rays."""
     return bool(scene.objects) and all(is_baked(scene))
 
 
@@ -141,13 +141,13 @@ def source_of(scene: Scene, mesh: Any) -> Any:
 
 
 def mesh_name(scene: Scene, mesh: Any) -> str:
-    """What an object's mesh is called: by its file, else by its name, else by its description."""
+    """Name of an object's mesh: its file, otherwise its name in the scene, otherwise its description."""
     source = source_of(scene, mesh)
     if isinstance(source, MeshFile):
-        return source.file if "." in source.file else f"./{source.file}"  # apart from names
+        return source.file if "." in source.file else f"./{source.file}"  # never equal to a name
     return mesh if isinstance(mesh, str) else repr(source)
 
 
 def is_smooth(scene: Scene) -> bool:
-    """Is some object shaded with the normals at its corners?"""
+    """True if some object is shaded with the normals at its corners."""
     return any(RATES[rate].is_smooth for rate in rates(scene))

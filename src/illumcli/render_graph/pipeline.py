@@ -1,4 +1,4 @@
-"""The whole way from a graph to a plan: `build -> cull -> substitute_cached -> schedule -> execute`."""
+"""From a graph to a plan: the steps `cull -> substitute_cached -> schedule` in their order."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from illumcli.render_graph.schedule import Plan, needed_buffers, schedule
 
 
 def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached: bool = False) -> Graph:
-    """The graph with its cameras in place and without objects that change no view.
+    """The graph with its cameras placed and without objects that cannot affect any view.
 
-    With `only_cached` nothing is computed for it: what is not cached stays unknown, and as it is.
+    With `only_cached` nothing is computed: cameras and objects whose bounds are not cached stay as they are.
     """
     graph = place_cameras(graph, run, only_cached)
     graph, bounds = find_bounds(graph, outputs, run, only_cached)
@@ -35,7 +35,7 @@ def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached
 
 
 def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, look: bool = False) -> Plan:
-    """What runs for one view, where cached buffers are loaded; with `look` nothing is read."""
+    """The plan of one view, in which cached buffers are loaded; with `look` nothing is read."""
     buffers = needed_buffers(graph, outputs, [view])
     graph, lookup = substitute_cached(graph, buffers, view, cache, look)
     return schedule(graph, outputs, view, lookup)

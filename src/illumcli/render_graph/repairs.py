@@ -1,4 +1,4 @@
-"""Repairs of a job's input files: printed, refused with --strict, reported."""
+"""Repairs of a scene's input files: as lines, as an error with --strict, as data of a report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from illumcli.errors import InputError
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, Repairs
 from illumcli.render_graph.build_materials import PURPOSES
 
-_TELLING = (
+_WITH_REPAIRS = (
     "repairs",
     "undirected",
     "unnamed",
@@ -17,11 +17,11 @@ _TELLING = (
     "baked",
     *(f"{purpose}_textures" for purpose in PURPOSES),
 )
-"""Buffers that say what was put right."""
+"""Buffers whose values have `repairs`."""
 
 
 def repair_lines(repairs: Repairs, verbose: bool = True) -> list[str]:
-    """A line per class; those of `HARMLESS` only if `verbose`."""
+    """One line per kind of repair; those in `HARMLESS` only if `verbose`."""
     return [
         f"{what}: {each.count}{f', the first is {each.first}' if each.first else ''}"
         for what, each in repairs.items()
@@ -30,7 +30,7 @@ def repair_lines(repairs: Repairs, verbose: bool = True) -> list[str]:
 
 
 def refuse_repairs(place: str, repairs: Repairs) -> None:
-    """Raise InputError where anything needs a repair: every class, its count and its first place."""
+    """Raise InputError if anything needed a repair: every kind, its count and its first place."""
     wrong = {what: each for what, each in repairs.items() if what not in APPROXIMATED}
     if wrong:
         way = "mend it, or leave --strict out"
@@ -38,7 +38,7 @@ def refuse_repairs(place: str, repairs: Repairs) -> None:
 
 
 def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:
-    """What a report says of repairs: class -> count, class -> first place."""
+    """The entries of a report: kind -> count, kind -> first place."""
     return {
         "repairs": {what: each.count for what, each in repairs.items()},
         "repairs_first": {what: each.first for what, each in repairs.items() if each.first},
@@ -46,7 +46,10 @@ def repairs_data(repairs: Repairs) -> dict[str, dict[str, Any]]:
 
 
 def repairs(shared: Mapping[str, Any]) -> Repairs:
-    """What was put right in meshes, their materials, baked values and textures."""
+    """The repairs of meshes, their materials, baked values and textures."""
     return {
-        what: each for name, made in shared.items() if name in _TELLING for what, each in made.repairs.items()
+        what: each
+        for name, value in shared.items()
+        if name in _WITH_REPAIRS
+        for what, each in value.repairs.items()
     }

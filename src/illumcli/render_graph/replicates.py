@@ -1,8 +1,8 @@
-"""Standard error of a picture: some pixels are rendered a second time, with separate random numbers.
+"""Standard error of an image: some pixels are rendered a second time, with separate random numbers.
 
 Half the squared difference of two independent renders of a pixel is an unbiased estimate of its variance,
 whatever the source: edges within the pixel, obscurance, or both. One pixel of every 2 x 2 cell is replicated,
-and the 16 estimates of a block of 8 x 8 pixels are averaged. The replicates are never part of the picture.
+and the 16 estimates of a block of 8 x 8 pixels are averaged. Replicates are never part of the image.
 """
 
 from __future__ import annotations
@@ -22,64 +22,75 @@ from illumcli.graph import Node, topological_order
 from illumcli.rays import sampling
 from illumcli.rays.interaction import Hits
 
-AGAIN = "again."
-"""Before the name of every buffer of the second pictures."""
+REPLICATE = "replicate."
+"""Prefix of the names of all buffers of the replicates."""
 CELL = 2
-"""One pixel in so many across and down is doubled."""
+"""Side of a cell, of which one pixel is replicated [pixels]."""
 BLOCK = 8
-"""Pixels along a block, which has one error; blocks begin at the film's upper left corner."""
+"""Side of a block, whose pixels have one error [pixels]; blocks begin at the film's upper left corner."""
 
 
-def error_recipes(
-    book: Mapping[str, Node],
+def error_nodes(
+    nodes: Mapping[str, Node],
     seed: int,
     background: tuple[float, float, float] | None,
     samples: Sequence[int],
     given: Sequence[str],
 ) -> dict[str, Node]:
-    """The extra nodes of the layer `error`: a copy of every node from `samples` to the luminance of `beauty`.
+    """The nodes of the layer `error`: a copy of every node from `samples` to the luminance of `beauty`.
 
     Parameters
     ----------
+    nodes : mapping
+        All other nodes of the scene, by output.
     background : 3 floats, optional
-        Colour behind the surfaces; black where they have an alpha instead.
+        Colour behind the surfaces; black if the image has an alpha channel instead.
     samples : ints
-        Per pixel, of every view. A single one stands at its pixel's centre: where no obscurance is traced
-        either, nothing is random, the error is 0 and no pixel is doubled.
+        Per pixel, of every view. A single sample is at its pixel's centre; if no obscurance is traced either,
+        nothing is random, the error is 0 and no pixel is replicated.
     given : names
-        Buffers that need no recipe.
+        Buffers that need no node.
     """
-    picture = Node.of(partial(luminance, background or (0.0, 0.0, 0.0)), "luminance")
-    steps = topological_order({**book, "luminance": picture}, ["luminance"], given)
-    traced = "obscurance_draws" in {step.output for step in steps}
-    if max(samples) == 1 and not traced:
+    # If nothing is random the error is 0.
+    to_luminance = Node.of(partial(luminance, background or (0.0, 0.0, 0.0)), "luminance")
+    originals = topological_order({**nodes, "luminance": to_luminance}, ["luminance"], given)
+    is_traced = "obscurance_draws" in {node.output for node in originals}
+    if max(samples) == 1 and not is_traced:
         return {"error": Node.of(no_error, "error")}
-    copied = {"samples"}
-    made = [picture, Node.of(partial(doubled_samples, seed), f"{AGAIN}samples")]
-    for step in steps:
-        if copied.isdisjoint(step.inputs.values()):
+
+    # Copy all that depends on the samples, which get other random numbers.
+    replicated = {"samples"}
+    copies = [to_luminance, Node.of(partial(replicated_samples, seed), f"{REPLICATE}samples")]
+    for node in originals:
+        if replicated.isdisjoint(node.inputs.values()):
             continue
-        copied.add(step.output)
-        needs = {p: f"{AGAIN}{need}" if need in copied else need for p, need in step.inputs.items()}
-        function = partial(doubled_draws, seed) if step.output == "obscurance_draws" else step.function
-        made.append(Node(f"{AGAIN}{step.output}", function, needs))
-    again = {"doubled": f"{AGAIN}samples", "second": f"{AGAIN}luminance"}
-    made.append(Node.of(standard_error, "error", first="luminance", **again))
-    return {recipe.output: recipe for recipe in made}
+        replicated.add(node.output)
+        inputs = {p: f"{REPLICATE}{name}" if name in replicated else name for p, name in node.inputs.items()}
+        draws_again = node.output == "obscurance_draws"
+        function = partial(replicated_draws, seed) if draws_again else node.function
+        copies.append(Node(f"{REPLICATE}{node.output}", function, inputs))
+
+    # The error compares both luminances.
+    second = {"replicated": f"{REPLICATE}samples", "second": f"{REPLICATE}luminance"}
+    copies.append(Node.of(standard_error, "error", first="luminance", **second))
+    return {node.output: node for node in copies}
 
 
-def doubled_count(width: int, height: int) -> int:
-    """How many pixels of a film are doubled."""
+def replicated_count(width: int, height: int) -> int:
+    """Number of replicated pixels of a film."""
     return -(-width // CELL) * -(-height // CELL)
 
 
-def doubled_samples(seed: int, view: View, tile: Tile) -> Samples:
-    """Where the second samples of the tile's doubled pixels lie: one pixel of each cell, drawn at random."""
+def replicated_samples(seed: int, view: View, tile: Tile) -> Samples:
+    """The replicates' samples: in one pixel of each cell of the tile, which is drawn at random."""
+    # The upper left pixel of each cell.
     cells = [
         np.arange(first, first + size, CELL)
         for first, size in ((tile.x, tile.width), (tile.y, tile.height))
     ]  # fmt: skip
     y, x = (each.ravel() for each in np.meshgrid(cells[1], cells[0], indexing="ij"))
+
+    # Draw a pixel of it, and samples in the pixel.
     wide, high = _cell(view, x, y)
     cell = (y * view.width + x).astype(np.uint32)
     key = sampling.stream(seed, "doubled")
@@ -91,18 +102,18 @@ def doubled_samples(seed: int, view: View, tile: Tile) -> Samples:
 
 
 def _cell(view: View, x: NDArray[np.int64], y: NDArray[np.int64]) -> tuple[Ids, Ids]:
-    """Width and height of the cells of some pixels, which the film's right and lower edges may cut."""
+    """Width and height of the cells of some pixels; the film's right and lower edges may cut a cell."""
     return (
         np.minimum(CELL, view.width - x // CELL * CELL),
         np.minimum(CELL, view.height - y // CELL * CELL),
     )
 
 
-def doubled_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
-    """(2, M) in [0, 1): what the second obscurance rays are turned and phased by.
+def replicated_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
+    """(2, M) in [0, 1): rotation and phase of the replicates' obscurance rays.
 
-    The samples of one pixel stand to each other as in the first picture, but every pixel begins anew: over
-    the film the first picture's draws are one pattern that the seed only shifts.
+    The draws of one pixel's samples have the same differences as in the image, but each pixel has its own
+    offset: over the film, the image's draws are one pattern that the seed only shifts.
     """
     key = sampling.stream(seed, "obscurance again")
     pixel, sample = np.divmod(hits.sample, samples.per_pixel)
@@ -114,41 +125,46 @@ def doubled_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64
 
 
 def no_error(tile: Tile) -> Floats:
-    """(P,) 0 at every pixel: nothing in the picture is random."""
+    """(P,) 0 at every pixel: nothing in the image is random."""
     return np.zeros(tile.width * tile.height, F)
 
 
 def standard_error(
-    view: View, tile: Tile, doubled: Samples, first: NDArray[np.float64], second: NDArray[np.float64]
+    view: View, tile: Tile, replicated: Samples, first: NDArray[np.float64], second: NDArray[np.float64]
 ) -> Floats:
-    """(P,) float32 standard error of the luminance of every pixel, the same all over a block.
+    """(P,) float32 standard error of the luminance of every pixel, the same for all pixels of a block.
 
-    The tile begins at a block's corner and ends at one or at the film's edge. Cells that the edge cuts have
-    fewer pixels to draw from, and weigh less.
+    The tile consists of whole blocks, except at the film's edges. Cells that an edge cuts have fewer pixels
+    to draw from, and weigh less.
 
     Parameters
     ----------
-    doubled
-        The samples of the second picture.
-    first, second : (P,), (D,)
-        Luminance of the tile's pixels, and of the doubled ones as rendered the second time.
+    replicated
+        The samples of the replicates.
+    first : (P,)
+        Luminance of the tile's pixels.
+    second : (D,)
+        Luminance of the replicates.
     """
-    x, y = doubled.x, doubled.y
+    # An estimate of the variance from each replicate.
+    x, y = replicated.x, replicated.y
     half = np.square(first[(y - tile.y) * tile.width + x - tile.x] - second) / 2
     wide, high = _cell(view, x, y)
     weight = wide * high
+
+    # The mean of each block, for all of its pixels.
     across = -(-tile.width // BLOCK)
     block = (y - tile.y) // BLOCK * across + (x - tile.x) // BLOCK
     variance = np.bincount(block, weight * half) / np.bincount(block, weight)
     column, row = tile.pixels()
-    own = (row - tile.y) // BLOCK * across + (column - tile.x) // BLOCK
-    return np.sqrt(variance).astype(F)[own]
+    block_of_pixel = (row - tile.y) // BLOCK * across + (column - tile.x) // BLOCK
+    return np.sqrt(variance).astype(F)[block_of_pixel]
 
 
 def luminance(
     background: tuple[float, float, float], samples: Samples, hits: Hits, beauty: Vectors
 ) -> NDArray[np.float64]:
-    """(P,) luminance of pixels above that of the background."""
+    """(P,) difference between each pixel's luminance and that of the background."""
     weights = np.array(LUMINANCE)
-    seen = (beauty @ weights.astype(F)) - F(weights @ background)
-    return pixel_means(seen, hits.sample, len(samples.x), samples.per_pixel)[:, 0].astype(np.float64)
+    difference = (beauty @ weights.astype(F)) - F(weights @ background)
+    return pixel_means(difference, hits.sample, len(samples.x), samples.per_pixel)[:, 0].astype(np.float64)

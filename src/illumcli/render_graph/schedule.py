@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from illumcli.errors import InputError
-from illumcli.film.tiles import fewest_samples, tile_side
+from illumcli.film.tiles import min_tile_samples, tile_side
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import Layer
@@ -18,14 +18,14 @@ from illumcli.render_graph.replicates import BLOCK
 from illumcli.scene.spec import Scene
 
 REPAIRS = ("repairs", "undirected", "unnamed")
-"""Buffers that say what is wrong with meshes: computed wherever a scene has them."""
+"""Buffers with the repairs of meshes: computed for every scene that has them."""
 COVERAGE = {"hits", "samples", "alpha"}
-"""Buffers of a tile that the film reads beside those of its layers."""
+"""Buffers of a tile that the film reads in addition to those of its layers."""
 NOTHING_CACHED = Lookup()
 
 
 class Plan(Value):
-    """What runs for one view, in order."""
+    """The nodes that run for one view, in order: `once`, then `tile` for every tile."""
 
     graph: Graph
     outputs: tuple[Layer, ...]
@@ -36,16 +36,16 @@ class Plan(Value):
 
     @property
     def buffers(self) -> set[str]:
-        """The names of all that is computed or loaded."""
+        """The names of all buffers that are computed or loaded."""
         return {node.output for node in (*self.once, *self.tile)}
 
     @property
     def computed(self) -> set[str]:
-        """The names of all that is computed."""
+        """The names of all buffers that are computed."""
         return self.buffers - self.lookup.reused.keys()
 
     def last_use(self) -> dict[str, int]:
-        """The number of the last tile node that reads each buffer of a tile; what the film reads stays."""
+        """Number of the last tile node that reads each buffer of a tile; the film's buffers have none."""
         kept = {layer.buffer for layer in self.outputs} | COVERAGE
         kept |= set(SHAPE) if self.view.is_adaptive else set()
         of_tile = {node.output for node in self.tile}
@@ -57,13 +57,13 @@ class Plan(Value):
         return last
 
     def tile_side(self, view: View, side: int | None = None) -> int:
-        """Pixels along a tile's side: `side` or the default, in whole blocks where these have one error."""
-        fewest = fewest_samples(len(self.tile))
-        side = side or tile_side(view.samples, view.width * view.height, fewest)
+        """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
+        min_samples = min_tile_samples(len(self.tile))
+        side = side or tile_side(view.samples, view.width * view.height, min_samples)
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side
 
     def needed_for(self, name: str) -> frozenset[str]:
-        """Every buffer that `name` is computed from, itself included, those that were cached left out."""
+        """Every buffer that is computed for `name`, itself included; cached buffers are not."""
         needed: set[str] = set()
         pending = [name]
         while pending:
@@ -75,12 +75,12 @@ class Plan(Value):
 
 
 def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
-    """The layers that a scene asks for, or `only` those of some names.
+    """The layers that a scene requests, or `only` those of some names.
 
     Raises
     ------
     InputError
-        Layers that do not exist, or not with this film.
+        Layers that do not exist, or that this film cannot have.
     """
     outputs = tuple(layers(scene, only or scene.outputs.layers))
     if any(layer.per_pixel for layer in outputs) and any(view.is_adaptive for view in views(scene)):
@@ -91,7 +91,7 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
 
 
 def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]) -> list[str]:
-    """The buffers that the film reads to make layers of some views."""
+    """The buffers that the film reads to reconstruct layers of some views."""
     buffers = dict.fromkeys(layer.buffer for layer in outputs)
     adaptive = any(view.is_adaptive for view in shown)
     if adaptive:
@@ -111,7 +111,7 @@ def reached(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
 
 
 def schedule(graph: Graph, outputs: Sequence[Layer], view: View, lookup: Lookup = NOTHING_CACHED) -> Plan:
-    """What runs for layers of a view: once what reads neither view nor tile, the rest for each tile."""
+    """The nodes that layers of a view need; those that read neither view nor tile run once, not per tile."""
     of_tile = set(GIVEN)
     once, tile = [], []
     for node in graph.topological_order(needed_buffers(graph, outputs, [view])):
@@ -124,8 +124,11 @@ def schedule(graph: Graph, outputs: Sequence[Layer], view: View, lookup: Lookup 
 
 
 def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> frozenset[str]:
-    """Keys of buffers that two graphs have in common and that the second reads where it differs, and of what
-    both compute once: kept in memory, they let the second skip everything upstream of them."""
+    """Keys of buffers that let `following` skip everything upstream if they are kept in memory.
+
+    These are the buffers that both graphs have and that a node of `following` reads which `graph` lacks, and
+    all buffers of the whole scene.
+    """
     shared: set[str] = set()
     for view in following.views:
         plan = schedule(following, outputs, view)

@@ -1,4 +1,4 @@
-"""Joins of folders that do not know each other: functions from buffers to buffers."""
+"""Node functions that combine folders which do not import each other."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import DepthCue
 from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
 
-# --- once: what files hold -------------------------------------------------------------------------------
+# --- once: contents of files -----------------------------------------------------------------------------
 
 
 def mesh(source: Any) -> Mesh:
-    """The mesh in a file, given by its `FileFingerprint`, or of a shape.
+    """The mesh of a file, given by its `FileFingerprint`, or of a shape.
 
     Raises
     ------
@@ -44,22 +44,23 @@ def mesh(source: Any) -> Mesh:
         return replace(shape, repairs=faults(shape))
     from illumcli.mesh_files import read_mesh
 
-    made = read_mesh(source.path)
+    from_file = read_mesh(source.path)
     if source.has_changed:
         raise InputError(f"{source.path}: changed while it was read; run again once it is whole")
-    # a mesh is kept by its content: what it names is found again where its folder is then
+
+    # A mesh is cached by its content: paths of textures become relative to its folder, wherever that is.
     folder = source.path.parent
     libraries = {
         name: textures_at(keys, lambda path: str(Path(path).relative_to(folder)))
-        for name, keys in made.materials.items()
+        for name, keys in from_file.materials.items()
     }
-    return replace(made, materials=libraries)
+    return replace(from_file, materials=libraries)
 
 
 def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
-    """The mesh of every object, by the number of its source."""
-    own = list(parts.values())
-    return tuple(own[k] for k in which)
+    """The mesh of every object; `which` holds the number of each object's mesh among `parts`."""
+    sources = list(parts.values())
+    return tuple(sources[k] for k in which)
 
 
 def render_space(object_bounds: ObjectBounds) -> RenderSpace:
@@ -68,19 +69,19 @@ def render_space(object_bounds: ObjectBounds) -> RenderSpace:
 
 
 class BakedValues(Record):
-    """Obscurance that was baked at the world's corners."""
+    """Baked obscurance at the scene's corners."""
 
-    values: CornerVectors  # (C, 1) NaN on meshes that have none
+    values: CornerVectors  # (C, 1) NaN on meshes without baked values
     repairs: Repairs
 
 
 def baked(files: tuple[tuple[str, FileFingerprint | None], ...], geometry: SceneGeometry) -> BakedValues:
-    """The values in each object's file: of its corners where it has them, else of its vertices.
+    """The baked values of each object: at corners if its file has them, otherwise at vertices.
 
     Raises
     ------
     InputError
-        A file that holds values for another number of vertices.
+        A file with values for another number of vertices.
     """
     from illumcli.visibility.baked import mesh_hash, read_npz
 
@@ -89,16 +90,16 @@ def baked(files: tuple[tuple[str, FileFingerprint | None], ...], geometry: Scene
     for (name, file), placed in zip(files, geometry.placed, strict=True):
         if file is None:
             continue
-        mesh, found = placed.mesh, read_npz(file.path)
-        own = found.of_corners(name, mesh.corners, len(mesh.vertices))
-        if own is None:
+        mesh, in_file = placed.mesh, read_npz(file.path)
+        at_corners = in_file.of_corners(name, mesh.corners, len(mesh.vertices))
+        if at_corners is None:
             raise InputError(
-                f"{file.path}: holds {len(found.obscurance)} values, the mesh of {name} has "
+                f"{file.path}: holds {len(in_file.obscurance)} values, the mesh of {name} has "
                 f"{len(mesh.vertices)} vertices; bake it again"
             )
-        if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in found.hashes():
+        if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in in_file.hashes():
             note(repairs, "values that were baked for another mesh of as many vertices", str(file.path))
-        values[placed.first_corner : placed.first_corner + len(own), 0] = own
+        values[placed.first_corner : placed.first_corner + len(at_corners), 0] = at_corners
     return BakedValues(CornerVectors(values, np.arange(len(values), dtype=np.int32)), repairs)
 
 
@@ -109,25 +110,28 @@ def materials_of(
     numbering: Numbering,
     meshes: tuple[Mesh, ...] = (),
 ) -> Materials:
-    """The materials by number, their measurements found on disk; `meshes` where these bring some."""
-    found = {
+    """The materials by number, with the paths of measured ones resolved.
+
+    `meshes` are given if materials of mesh files are imported.
+    """
+    resolved = {
         token: model.at({"file": str(measured[model.file].path)}) if hasattr(model, "file") else model
         for token, model in models.items()
     }
     libraries = {name: mesh for name, mesh in zip(imported, meshes, strict=False) if name}
-    return materials(numbering, found, libraries)
+    return materials(numbering, resolved, libraries)
 
 
 class Images(Value):
     """Reads the textures of a scene, each once."""
 
     contents: Mapping[str, FileFingerprint]
-    """By path, those that the scene itself names."""
+    """The textures that the scene itself names, by path."""
     loaded: Any = field(repr=False)
     known: dict[Any, NDArray[np.float32]] = field(default_factory=dict, repr=False)
 
     def __call__(self, path: str, space: Any) -> NDArray[np.float32]:
-        """(H, W, C) linear image of a texture of the scene, or of a mesh's own library."""
+        """(H, W, C) linear image of a texture of the scene, or of a mesh file's library."""
         if (path, space) not in self.known:
             self.known[path, space] = self._read(path, space)
         return self.known[path, space]
@@ -150,7 +154,7 @@ class Images(Value):
 
 
 def alpha(hits: Hits) -> Floats:
-    """(M,) 1 where a surface is seen."""
+    """(M,) 1 at every hit."""
     return np.ones(len(hits.sample), F)
 
 
@@ -160,7 +164,7 @@ def no_shadow(hits: Hits) -> Floats:
 
 
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:
-    """(2, M) in [0, 1): what the obscurance rays of every sample seen are turned and phased by."""
+    """(2, M) in [0, 1): rotation and phase of each hit's obscurance rays."""
     key = sampling.stream(seed, "obscurance")
     pixel = hits.sample // samples.per_pixel
     sample = hits.sample - pixel * samples.per_pixel
@@ -168,7 +172,7 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
 
 
 def baked_obscurance(geometry: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:
-    """(M,) baked values interpolated over polygons; NaN on meshes that have none."""
+    """(M,) baked values interpolated over polygons; NaN on meshes without baked values."""
     w: Floats = corner_weights.interpolate(geometry, baked.values)[:, 0]
     return w
 
@@ -176,7 +180,7 @@ def baked_obscurance(geometry: SceneGeometry, baked: BakedValues, corner_weights
 def depth_cued(
     cue: DepthCue, view: View, render_space: RenderSpace, interaction: SurfaceInteraction, uncued: Vectors
 ) -> Vectors:
-    """(M, 3) light that fades into a colour with the distance from the eye."""
-    share = (distance(view, render_space, interaction) - cue.near) / (cue.far - cue.near)
-    fade = (cue.strength * np.clip(share, 0, 1)).astype(F)[:, None]
+    """(M, 3) radiance blended into the cue's colour with the distance from the eye."""
+    depth = (distance(view, render_space, interaction) - cue.near) / (cue.far - cue.near)
+    fade = (cue.strength * np.clip(depth, 0, 1)).astype(F)[:, None]
     return (1 - fade) * uncued + fade * np.asarray(cue.color, F)

@@ -39,7 +39,7 @@ HOMES = {
         "lights/",
         "geometry/shapes/",
         "visibility/falloffs/",
-        "commands/schema.py",
+        "commands/schema_generator.py",
         "brdf/",
     ),
     "pydantic_core": ("nowhere: it is no dependency of ours",),

@@ -119,6 +119,8 @@ def test_a_scene_is_rendered_with_all_examples(copy):
     run(copy, "illumcli", "render", "scene.yaml", "--only", "slope", "-o", "slope.png")
     (copy / "check.py").write_text(CHECK)
     run(copy, "check")
+    falloff = ("--falloff", "sine", "--max-distance", "1", "--sampler", "r2", "--samples", "16")
+    run(copy, "illumcli", "ao-bake", "pyramid.off", "-o", "w.npz", *falloff)
     assert "once, as in dark dust" in run(copy, "illumcli", "models", "lunar_lambert")
     schema = run(copy, "illumcli", "schema")
     for name in ("slope", "incident_angles", "faceted", "r2"):

@@ -9,7 +9,7 @@ from functools import cache
 
 from illumcli.errors import LimitError
 
-SHARE = 0.8
+FREE_SHARE = 0.8
 """Of the memory that is free: so much may be used."""
 MAP_THRESHOLD, TRIM_THRESHOLD = -3, -1  # M_MMAP_THRESHOLD, M_TRIM_THRESHOLD of glibc's malloc.h
 
@@ -49,10 +49,9 @@ def free_memory() -> int | None:
 def refuse_beyond(need: int, what: str, way: str) -> None:
     """Raise LimitError where `what` takes more bytes than may be used; `way` is the way out."""
     free = free_memory()
-    if free is not None and need > SHARE * free:
-        raise LimitError(
-            f"{what}: takes about {in_words(need)} of memory, {in_words(SHARE * free)} may be used; {way}"
-        )
+    if free is not None and need > FREE_SHARE * free:
+        usable = in_words(FREE_SHARE * free)
+        raise LimitError(f"{what}: takes about {in_words(need)} of memory, {usable} may be used; {way}")
 
 
 def peak_memory() -> int:

@@ -19,6 +19,11 @@ def aligned(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[s
     return ["  ".join(_padded(row, widths, right)).rstrip() for row in rows]
 
 
+def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> str:
+    """The same as one text."""
+    return "\n".join(aligned(rows, right))
+
+
 def _padded(row: Sequence[str], widths: Sequence[int], right: Container[int]) -> list[str]:
     return [
         cell.rjust(width) if column in right else cell.ljust(width)

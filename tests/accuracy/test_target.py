@@ -50,8 +50,8 @@ def test_the_picture_errs_as_asked_and_says_so(scene, error):
 
 
 def test_200_doubled_pixels_tell_the_error_of_a_picture(scene, monkeypatch):
-    monkeypatch.setattr(target, "PIXELS", 200)
-    monkeypatch.setattr(target, "SHARE", 10**9)
+    monkeypatch.setattr(target, "MIN_PIXELS", 200)
+    monkeypatch.setattr(target, "FILM_SHARE", 10**9)
     own = sampled_layer(load(scene), "obscurance")
     every = [paired_error(own, Sampling(1, 8, "spiral", 0), f"try {k}")[0] for k in range(12)]
     truth = own.render(Sampling(1, 2048, "owen", 4))[0].astype(float)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from illumcli.cli.compare import compare
 from illumcli.errors import InputError, ThresholdError
-from illumcli.images.channels import channel_types
+from illumcli.film.channels import channel_types
 from illumcli.images.writer import ImageWriter
 
 

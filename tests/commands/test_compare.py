@@ -10,9 +10,10 @@ import OpenImageIO as oiio
 import pytest
 
 from illumcli.cli.compare import comparison_table
-from illumcli.commands.compare import LIMITS, compare_images, refuse_beyond_limits
+from illumcli.commands.compare import compare_images
+from illumcli.commands.compare_limits import LIMITS, refuse_beyond_limits
 from illumcli.errors import InputError, ThresholdError
-from illumcli.images.channels import channel_types
+from illumcli.film.channels import channel_types
 from illumcli.images.reader import read_image, read_metadata
 from illumcli.images.writer import ImageWriter
 

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from illumcli.errors import IllumError, InputError, OutputError
+from illumcli.film.channels import bits_of, channel_types, group_by_layer
 from illumcli.images import exr, png, reader
-from illumcli.images.channels import bits_of, channel_types, group_by_layer
 from illumcli.images.reader import read_image, read_metadata, read_texture
 from illumcli.images.writer import ImageWriter
 

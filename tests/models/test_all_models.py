@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
 from illumcli.arrays import column_major, cross, dot, unit
-from illumcli.commands.schema import schema_of
+from illumcli.commands.schema_generator import schema_of
 from illumcli.models._base import IlluminationModel
 from illumcli.schema.description import Description
 from illumcli.schema.families import member, members, tags

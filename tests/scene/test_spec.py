@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from illumcli.commands.schema import schema_of
+from illumcli.commands.schema_generator import schema_of
 from illumcli.layers import NAMES
 from illumcli.scene.access import PATHS
 from illumcli.scene.references import reference_faults

@@ -27,8 +27,8 @@ from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.schedule import outputs_of, reached
 from illumcli.scene.load import load
 
-PIXELS, SHARE = 4000, 50
-"""Pixels that a pilot renders twice: one in 50, but at least so many, since few of them hold edges."""
+MIN_PIXELS, FILM_SHARE = 4000, 50
+"""Pixels that a pilot renders twice: one in 50 of the film, but at least so many, since few hold edges."""
 SEEDS = 8
 """Pairs of seeds that share a pilot's pixels."""
 MAX_SAMPLES = 4096
@@ -228,7 +228,7 @@ def paired_error(
     seed by one shift for all pixels, so that two seeds alone may agree everywhere by chance.
     """
     # pixels at random, in groups
-    x, y = layer.random_pixels(max(PIXELS, layer.view.width * layer.view.height // SHARE), purpose)
+    x, y = layer.random_pixels(max(MIN_PIXELS, layer.view.width * layer.view.height // FILM_SHARE), purpose)
     mix = np.random.default_rng(0).permutation(len(x))
 
     # both renderings of each group

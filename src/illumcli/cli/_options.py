@@ -37,7 +37,15 @@ def _samplers() -> Iterable[str]:
     return SAMPLERS
 
 
+def _falloffs() -> Iterable[str]:
+    from illumcli import visibility
+    from illumcli.schema.modules import modules
+
+    return modules(f"{folder}/falloffs" for folder in visibility.__path__)
+
+
 SAMPLER = _Names(_samplers)
+FALLOFF = _Names(_falloffs)
 FILE = click.Path(path_type=Path)
 SCENE = FILE
 """Existence is checked when it is read: a missing scene does not stop the others."""

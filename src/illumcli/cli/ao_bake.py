@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from illumcli.cli._options import (
+    FALLOFF,
     SAMPLER,
     SCENE,
     force_option,
@@ -108,7 +109,7 @@ def _options(options: dict[str, Any]) -> BakeOptions:
 @click.option("--max-distance", type=_Distance(), help="Occluders beyond it do not count: 0.2, or 0.5r.")
 @click.option(
     "--falloff",
-    type=click.Choice(["step", "exponential", "linear", "smooth", "power"]),
+    type=FALLOFF,
     default="step",
     show_default=True,
     help="Weight of an occluder by its distance.",

@@ -64,7 +64,8 @@ def compare(
     """
     import json
 
-    from illumcli.commands.compare import compare_images, refuse_beyond_limits
+    from illumcli.commands.compare import compare_images
+    from illumcli.commands.compare_limits import refuse_beyond_limits
 
     limits = {name: bound for name, bound in bounds.items() if bound is not None}
     if no_flip and "max_flip" in limits:

@@ -1,33 +1,22 @@
-"""Compare two images layer by layer, within limits."""
+"""Compare two images layer by layer."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from illumcli import __version__
 from illumcli.cache.fingerprint import digest, file_digest
-from illumcli.errors import InputError, ThresholdError
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix
+from illumcli.film.channels import ChannelType, Metadata
 from illumcli.film.heat import heat
 from illumcli.film.metrics import absolute_difference
-from illumcli.images.channels import ChannelType, Metadata
 from illumcli.images.comparison import LayerDifference, layer_differences, read_pair, shared_layers, stacked
 from illumcli.images.contents import image_contents
 from illumcli.images.reader import Image
 from illumcli.images.writer import ImageWriter
 from illumcli.records import Value
-
-LIMITS = {
-    "max_rmse": "RMSE",
-    "max_mae": "MAE",
-    "max_relative": "relative MSE",
-    "min_psnr": "PSNR",
-    "max_flip": "FLIP",
-    "max_difference": "largest difference",
-}
-"""Name of a limit -> the measure that it limits."""
 
 
 class Comparison(Value):
@@ -104,49 +93,6 @@ def compare_images(
         heat_scale=None if heat_file is None else differences[0].heat_scale,
         heat_is_kept=kept,
     )
-
-
-def refuse_beyond_limits(comparison: Comparison, limits: Mapping[str, float]) -> None:
-    """Nothing, where every layer keeps every limit; limits by their names in `LIMITS`.
-
-    Raises
-    ------
-    ThresholdError
-        Each measure beyond its limit; NaN is beyond any.
-    InputError
-        A limit on FLIP where no layer has one.
-    """
-    if "max_flip" in limits and not any(layer.has_colors for layer in comparison.layers):
-        raise InputError(
-            f"{comparison.test}: no layer compared has R, G and B; limit something else than FLIP"
-        )
-    beyond = []
-    for layer in comparison.layers:
-        place, measures = f"{comparison.test}: {layer.name}", measures_of(layer)
-        for limit, bound in limits.items():
-            value = measures.get(limit)
-            is_least = limit == "min_psnr"
-            if value is not None and not (value >= bound if is_least else value <= bound):
-                side = "below" if is_least else "above"
-                beyond.append(f"{place}: {LIMITS[limit]} is {value:.6g}, {side} {bound:g}")
-        count = layer.difference.not_finite
-        if limits and count:
-            beyond.append(f"{place}: {count} values are NaN or infinite in one image")
-    if beyond:
-        raise ThresholdError("\n".join(beyond))
-
-
-def measures_of(layer: LayerDifference) -> dict[str, float]:
-    """Name of a limit -> the value that it limits."""
-    difference = layer.difference
-    measures = {
-        "max_rmse": difference.rmse,
-        "max_mae": difference.mae,
-        "max_relative": difference.relative_mse,
-        "min_psnr": difference.psnr,
-        "max_difference": difference.largest,
-    }
-    return measures if layer.flip is None else {**measures, "max_flip": layer.flip}
 
 
 def _write_heat(path: Path, a: Image, b: Image, layer: LayerDifference, content: str) -> None:

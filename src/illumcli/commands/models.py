@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from illumcli.commands.schema import schema_of
+from illumcli.commands.schema_generator import schema_of
 from illumcli.errors import InputError
 from illumcli.schema.families import member, members, tag_of
 

@@ -6,14 +6,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-
-from illumcli.layers import LAYERS
+from illumcli.commands.schema_generator import DIALECT, schema_of
 from illumcli.scene.spec import Scene
-from illumcli.schema.description import Description
-from illumcli.schema.docs import choices, field_docs, summary
-from illumcli.shading.rates import RATES
-from illumcli.visibility.samplers import SAMPLERS
 
 EXTENDS = {
     "description": "Scenes that this one extends, by path from its own folder: mappings merge, anything else "
@@ -23,7 +17,6 @@ EXTENDS = {
 
 NULL = {"type": "null"}
 REFERENCE = "#/$defs/"
-MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
 
 
 def run() -> str:
@@ -41,7 +34,7 @@ def schema() -> dict[str, Any]:
     parts = scene_schema.pop("$defs")
     partial = _Partial(parts)
     return {
-        "$schema": GenerateJsonSchema.schema_dialect,
+        "$schema": DIALECT,
         "title": "illum scene",
         "description": scene_schema["description"],
         "type": "object",
@@ -85,84 +78,3 @@ class _Partial:
             self.made[f"{name}.part"] = {}  # it may refer to itself
             self.made[f"{name}.part"] = self.of(self._parts[name])
         return f"{reference}.part"
-
-
-def schema_of(cls: type[Description]) -> dict[str, Any]:
-    """The schema of one description; those it is made of are under `$defs`."""
-    return cls.model_json_schema(schema_generator=_Schema)
-
-
-TABLES: tuple[Mapping[str, str], ...] = (
-    {row.name: row.text for row in LAYERS},
-    {name: rate.text for name, rate in RATES.items()},
-    {name: sampler.text for name, sampler in SAMPLERS.items()},
-)
-"""What the rows of tables mean whose names are choices."""
-
-
-def _with_rows(part: dict[str, Any], text: str) -> str:
-    """A field's text, with what each choice means where the choices are the rows of a table."""
-    for inner in _inner(part):
-        for table in TABLES:
-            if inner.get("enum") == list(table):
-                text = " ".join([text, *(f"`{name}`: {meaning}" for name, meaning in table.items())])
-    return text
-
-
-def _inner(part: dict[str, Any]) -> list[dict[str, Any]]:
-    """The parts of a field's schema in which its choices may stand."""
-    return [part, part.get("items", {}), *part.get("anyOf", ())]
-
-
-def _describe_choices(part: dict[str, Any], text: str) -> None:
-    """Put what a field's text says of each choice beside the choices, as editors show it."""
-    for inner in _inner(part):
-        if "enum" in inner and (sentences := choices(text, inner["enum"])):
-            inner["enumDescriptions"] = sentences
-
-
-class _Schema(GenerateJsonSchema):
-    """pydantic's schema with our texts, without titles that only repeat a key."""
-
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
-
-    def model_schema(self, schema: Any) -> JsonSchemaValue:
-        """A description with the texts of its class and fields."""
-        cls = schema["cls"]
-        docs = field_docs(cls)
-        generated = super().model_schema(schema)
-        properties, required = generated["properties"], set(generated.get("required", ()))
-        for name, part in properties.items():
-            if text := docs.get(name) or ("const" in part and summary(cls)):
-                part["description"] = text = _with_rows(part, text)
-                _describe_choices(part, text)
-            if part.get("default") == {}:  # a description with all its defaults
-                del part["default"]
-            if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:
-                part.pop("default", None)
-                required.add(name)
-        description: JsonSchemaValue = {
-            "type": "object",
-            "title": cls.__name__,
-            "description": summary(cls),
-            "properties": properties,
-            "additionalProperties": False,
-        }
-        if required:
-            description["required"] = [name for name in properties if name in required]
-        return description
-
-    def tuple_schema(self, schema: Any) -> JsonSchemaValue:
-        """A list of equal parts says so once."""
-        listed = super().tuple_schema(schema)
-        parts = listed.get("prefixItems", [])
-        if parts and all(part == parts[0] for part in parts):
-            del listed["prefixItems"]
-            listed["items"] = parts[0]
-        return listed
-
-    def dict_schema(self, schema: Any) -> JsonSchemaValue:
-        """Keys that are no names are refused."""
-        keyed = super().dict_schema(schema)
-        return {**keyed, "additionalProperties": False} if "patternProperties" in keyed else keyed

@@ -11,10 +11,10 @@ from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
 from illumcli.files.outputs import is_kept
+from illumcli.film.develop import Development, Target
 from illumcli.film.tiles import MAX_TILE_SAMPLES
 from illumcli.film.view import View
 from illumcli.images.contents import image_contents
-from illumcli.images.develop import Development, Target
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.commands.work import Work
+from illumcli.film.develop import ErrorSums, Target, how_to_read
 from illumcli.film.tiles import Tile
-from illumcli.images.develop import ErrorSums, Target, how_to_read
 from illumcli.progress import Progress
 from illumcli.render_graph.execute import Planes, Run, bands
 from illumcli.render_graph.schedule import Plan

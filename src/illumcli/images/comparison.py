@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.film.channels import group_by_layer
 from illumcli.film.metrics import Difference, difference
-from illumcli.images.channels import group_by_layer
 from illumcli.images.flip import flip
 from illumcli.images.reader import Image, read_image
 from illumcli.records import Value

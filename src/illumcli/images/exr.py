@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.files.seal import BLANK, seal
-from illumcli.images.channels import Metadata
+from illumcli.film.channels import Metadata
 from illumcli.images.format import WriteError
 from illumcli.images.openimageio import oiio
 from illumcli.images.reader import ImageSource

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from illumcli.color import from_srgb
 from illumcli.errors import InputError, OutputError
-from illumcli.images.channels import bits_of, numbers_of
+from illumcli.film.channels import bits_of, numbers_of
 from illumcli.images.names import NO_UTF8, no_utf8, printable
 from illumcli.images.openimageio import oiio
 from illumcli.memory import refuse_beyond

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import AtomicFile, refusals
+from illumcli.film.channels import ChannelType, Metadata
 from illumcli.film.finite import refuse_nonfinite
-from illumcli.images.channels import ChannelType, Metadata
 from illumcli.images.format import ImageFile, WriteError
 from illumcli.images.names import NO_UTF8, no_utf8, printable
 from illumcli.images.png import PngFile

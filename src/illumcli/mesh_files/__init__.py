@@ -14,7 +14,7 @@ import numpy as np
 
 from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
-from illumcli.schema.families import modules
+from illumcli.schema.modules import modules
 
 NO_FORMATS = frozenset({"mtl", "output_mesh"})
 """Modules beside the formats."""

@@ -6,8 +6,6 @@ a run what its scene uses. Nothing is registered and no list is kept.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, reduce
 from importlib import import_module
@@ -18,31 +16,13 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator,
 
 from illumcli.schema.description import Description
 from illumcli.schema.messages import nearest, suggestion
+from illumcli.schema.modules import modules
 
 
 @cache
 def tags(package: str) -> tuple[str, ...]:
     """The tags of a family, sorted: its modules, without the helpers that begin with an underscore."""
     return modules(import_module(package).__path__)
-
-
-def modules(folders: Iterable[str]) -> tuple[str, ...]:
-    """The names of the modules and packages in folders, sorted, without those that begin with an underscore.
-
-    `pkgutil` would call a folder empty where the system refuses to list it.
-
-    Raises
-    ------
-    OSError
-        Such a refusal.
-    """
-    names = {
-        entry.name.partition(".")[0]
-        for folder in folders
-        for entry in os.scandir(folder)
-        if entry.name.endswith(".py") or entry.is_dir()
-    }
-    return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
 @cache

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import column_major, cross, dot, unit
-from illumcli.commands.schema import schema_of
+from illumcli.commands.schema_generator import schema_of
 from illumcli.schema.families import members, tag_of
 from illumcli.shading.terms import evaluate
 from illumcli.stress.sandbox import CheckResult

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from illumcli.tables import aligned
+from illumcli.tables import table
 from illumcli.verification.outcome import STANDARD_ERRORS, Outcome, TypeResult
 from illumcli.verification.single import FINE, SingleResult
 
@@ -24,7 +24,7 @@ def as_table(results: Sequence[TypeResult]) -> str:
             f"{result.used:.2g}",
         )
         lines.append((result.type, str(len(result.outcomes)), *numbers, verdict))
-    return f"{_table(lines, right=(1, 2, 4, 5))}\n\n{summary(results)}"
+    return f"{table(lines, right=(1, 2, 4, 5))}\n\n{summary(results)}"
 
 
 def summary(results: Sequence[TypeResult]) -> str:
@@ -74,14 +74,14 @@ def single_table(results: Sequence[SingleResult]) -> str:
         )
         for result in results
     ]
-    text = _table(lines, right=(1, 2, 4))
+    text = table(lines, right=(1, 2, 4))
     lost = [("digits lost in", "error", "reason", "inputs")]
     for result in results:
         if result.losses:
             loss = max(result.losses, key=lambda each: each.outcome.error)
             lost.append((loss.outcome.case.id, f"{loss.outcome.error:.1e}", loss.reason, loss.inputs))
     if len(lost) > 1:
-        text += "\n\n" + _table(lost, right=(1,))
+        text += "\n\n" + table(lost, right=(1,))
     return f"{text}\n\n{single_summary(results)}"
 
 
@@ -135,7 +135,3 @@ def _counted(count: int, what: str) -> str:
 
 def _finite(value: float) -> float | None:
     return value if value < float("inf") else None
-
-
-def _table(rows: Sequence[Sequence[str]], right: Sequence[int]) -> str:
-    return "\n".join(aligned(rows, right))

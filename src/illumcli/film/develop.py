@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.film.channels import ChannelType, bits_of, channel_types
 from illumcli.film.encode import picture, plain
 from illumcli.film.preview import reading, viewable
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
-from illumcli.images.channels import ChannelType, bits_of, channel_types
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_space import RenderSpace

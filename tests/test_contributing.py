@@ -84,13 +84,13 @@ def copy(tmp_path_factory) -> Path:
     return folder
 
 
-def run(folder: Path, *words: str) -> str:
-    """What a module of Python prints, run in the copy."""
+def run(folder: Path, *words: str, code: int = 0) -> str:
+    """What a module of Python prints, run in the copy, where it ends with this exit code."""
     environment = {**os.environ, "PYTHONPATH": str(folder / "src"), "ILLUM_CACHE": str(folder / "cache")}
     command = [sys.executable, "-m", *words]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 def test_examples_are_clean(copy):
@@ -121,6 +121,8 @@ def test_a_scene_is_rendered_with_all_examples(copy):
     run(copy, "check")
     falloff = ("--falloff", "sine", "--max-distance", "1", "--sampler", "r2", "--samples", "16")
     run(copy, "illumcli", "ao-bake", "pyramid.off", "-o", "w.npz", *falloff)
+    refused = run(copy, "illumcli", "ao-bake", "pyramid.off", "-o", "w.npz", "--falloff", "sine", code=2)
+    assert "--falloff sine needs --max-distance" in refused
     assert "once, as in dark dust" in run(copy, "illumcli", "models", "lunar_lambert")
     schema = run(copy, "illumcli", "schema")
     for name in ("slope", "incident_angles", "faceted", "r2"):

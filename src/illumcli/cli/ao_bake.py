@@ -68,17 +68,28 @@ def _settings(options: dict[str, Any]) -> BakeSettings:
 
 
 def _refuse_contradictions(options: dict[str, Any]) -> None:
-    falloff = options["falloff"]
     if options["samples"] is not None and options["target_error"] is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")
-    if options["tau"] is not None and falloff != "exponential":
-        raise click.UsageError("--tau belongs to --falloff exponential")
-    if options["exponent"] is not None and falloff != "power":
-        raise click.UsageError("--exponent belongs to --falloff power")
-    if options["max_distance"] is None and falloff in ("linear", "smooth", "power"):
-        raise click.UsageError(f"--falloff {falloff} needs --max-distance, as in --max-distance 0.5r")
+    _refuse_foreign_parameters(options)
     if options["target_error"] is not None and options["method"] == "fit":
         raise click.UsageError("--target-error works with --method vertex; give --samples")
+
+
+def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
+    """Refuse parameters that the falloff does not have, and its own that are missing."""
+    from illumcli.schema.families import member, members, tag_of
+
+    package, falloff = "illumcli.visibility.falloffs", options["falloff"]
+    fields = member(package, falloff).model_fields
+    for name in ("tau", "exponent"):
+        if options[name] is not None and name not in fields:
+            owners = [tag_of(cls) for cls in members(package) if name in cls.model_fields]
+            raise click.UsageError(f"--{name} belongs to --falloff {' or '.join(owners)}")
+    for name, field in fields.items():
+        if field.is_required() and options.get(name) is None:
+            option = name.replace("_", "-")
+            hint = ", as in --max-distance 0.5r" if name == "max_distance" else ""
+            raise click.UsageError(f"--falloff {falloff} needs --{option}{hint}")
 
 
 def _options(options: dict[str, Any]) -> BakeOptions:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+Space: TypeAlias = Literal["srgb", "linear"] | None
+"""How the numbers of an image code light; None where their type decides."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of linear R, G and B in the luminance Y (ITU-R BT.709)."""
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.color import from_srgb
+from illumcli.color import Space, from_srgb
 from illumcli.errors import InputError, OutputError
 from illumcli.film.channels import bits_of, numbers_of
 from illumcli.images.names import NO_UTF8, no_utf8, printable
@@ -92,9 +92,7 @@ def _texel_count(path: Path, modified: int, length: int) -> int:
         return source.texel_count
 
 
-def read_texture(
-    path: str | os.PathLike[str], space: Literal["srgb", "linear"] | None = None
-) -> NDArray[np.float32]:
+def read_texture(path: str | os.PathLike[str], space: Space = None) -> NDArray[np.float32]:
     """(H, W, C) float32, linear; the first row is the top of the image.
 
     Parameters
@@ -131,9 +129,7 @@ def read_texture(
     return texels
 
 
-def read_embedded_texture(
-    data: bytes, name: str, space: Literal["srgb", "linear"] | None
-) -> NDArray[np.float32]:
+def read_embedded_texture(data: bytes, name: str, space: Space) -> NDArray[np.float32]:
     """`read_texture` of an image that lies within another file; `name` is what it is called in messages.
 
     OpenImageIO reads files alone: the image stands in a temporary one meanwhile.

@@ -39,6 +39,7 @@ from illumcli.scene.spec import Obscurance, Scene
 from illumcli.shading.grain import tangents
 from illumcli.shading.materials import material, material_id
 from illumcli.shading.rates import RATES, normal, obscurance_normals, point_weights, points
+from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
 from illumcli.visibility.obscurance import baked_or_open, obscurance, obscurance_method
 from illumcli.visibility.open_hemisphere import known_open, open_triangles
@@ -180,8 +181,8 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         Node.of(hemispheres, **axes),
         Node.of(open_triangles),
         Node.of(partial(known_open, settings.samples), "known_open"),
-        Node.of(partial(stages.baked, files), "baked"),
-        Node.of(stages.baked_obscurance),
+        Node.of(partial(baked, files), "baked"),
+        Node.of(baked_obscurance),
         w,
     ]
 

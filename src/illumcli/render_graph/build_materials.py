@@ -8,6 +8,7 @@ from typing import Any
 
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.graph import Node
+from illumcli.images.textures import Images
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
 from illumcli.render_graph import needs, stages
@@ -39,7 +40,8 @@ def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     files = {model.file for model in models.values() if hasattr(model, "file")}
     measured = {file: FileFingerprint(partial(resolve, loaded, file)) for file in sorted(files)}
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
-    images = stages.Images({path: FileFingerprint(partial(resolve, loaded, path)) for path in named}, loaded)
+    contents = {path: FileFingerprint(partial(resolve, loaded, path)) for path in named}
+    images = Images(contents, partial(resolve, loaded))
 
     libraries = {"meshes": "meshes"} if any(imported) else {}
     nodes = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,8 @@ from illumcli.film.view import View, distance
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.mesh_checks import faults
-from illumcli.geometry.repairs import Repair, Repairs, note
-from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.rays import sampling
-from illumcli.rays.corner_weights import CornerWeights
 from illumcli.rays.interaction import Hits, SurfaceInteraction
-from illumcli.records import Record, Value
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import DepthCue
 from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
@@ -68,41 +64,6 @@ def render_space(object_bounds: ObjectBounds) -> RenderSpace:
     return object_bounds.render_space
 
 
-class BakedValues(Record):
-    """Baked obscurance at the scene's corners."""
-
-    values: CornerVectors  # (C, 1) NaN on meshes without baked values
-    repairs: Repairs
-
-
-def baked(files: tuple[tuple[str, FileFingerprint | None], ...], geometry: SceneGeometry) -> BakedValues:
-    """The baked values of each object: at corners if its file has them, otherwise at vertices.
-
-    Raises
-    ------
-    InputError
-        A file with values for another number of vertices.
-    """
-    from illumcli.visibility.baked import mesh_hash, read_npz
-
-    values = np.full((sum(len(placed.mesh.corners) for placed in geometry.placed), 1), np.nan, F)
-    repairs: dict[str, Repair] = {}
-    for (name, file), placed in zip(files, geometry.placed, strict=True):
-        if file is None:
-            continue
-        mesh, in_file = placed.mesh, read_npz(file.path)
-        at_corners = in_file.of_corners(name, mesh.corners, len(mesh.vertices))
-        if at_corners is None:
-            raise InputError(
-                f"{file.path}: holds {len(in_file.obscurance)} values, the mesh of {name} has "
-                f"{len(mesh.vertices)} vertices; bake it again"
-            )
-        if mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in in_file.hashes():
-            note(repairs, "values that were baked for another mesh of as many vertices", str(file.path))
-        values[placed.first_corner : placed.first_corner + len(at_corners), 0] = at_corners
-    return BakedValues(CornerVectors(values, np.arange(len(values), dtype=np.int32)), repairs)
-
-
 def materials_of(
     models: Mapping[Token, Any],
     measured: Mapping[str, FileFingerprint],
@@ -120,34 +81,6 @@ def materials_of(
     }
     libraries = {name: mesh for name, mesh in zip(imported, meshes, strict=False) if name}
     return materials(numbering, resolved, libraries)
-
-
-class Images(Value):
-    """Reads the textures of a scene, each once."""
-
-    contents: Mapping[str, FileFingerprint]
-    """The textures that the scene itself names, by path."""
-    loaded: Any = field(repr=False)
-    known: dict[Any, NDArray[np.float32]] = field(default_factory=dict, repr=False)
-
-    def __call__(self, path: str, space: Any) -> NDArray[np.float32]:
-        """(H, W, C) linear image of a texture of the scene, or of a mesh file's library."""
-        if (path, space) not in self.known:
-            self.known[path, space] = self._read(path, space)
-        return self.known[path, space]
-
-    def _read(self, path: str, space: Any) -> NDArray[np.float32]:
-        from illumcli.images.reader import read_embedded_texture, read_texture
-        from illumcli.mesh_files import embedded_image, image_within
-        from illumcli.scene.access import resolve
-
-        if path in self.contents:
-            return read_texture(self.contents[path].path, space)
-        if (within := image_within(path)) is None:
-            return read_texture(resolve(self.loaded, path), space)
-        file, number = within
-        data = embedded_image(resolve(self.loaded, file), number)
-        return read_embedded_texture(data, f"{file}: images[{number}]", space)
 
 
 # --- per tile ---------------------------------------------------------------------------------------------
@@ -169,12 +102,6 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
     pixel = hits.sample // samples.per_pixel
     sample = hits.sample - pixel * samples.per_pixel
     return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample + (samples.first or 0))
-
-
-def baked_obscurance(geometry: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:
-    """(M,) baked values interpolated over polygons; NaN on meshes without baked values."""
-    w: Floats = corner_weights.interpolate(geometry, baked.values)[:, 0]
-    return w
 
 
 def depth_cued(

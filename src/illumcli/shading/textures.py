@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, column_major, take_rows
+from illumcli.color import Space
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
@@ -152,7 +153,7 @@ def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexV
 
 def textures(
     object_names: Sequence[str],
-    read: Callable[[str, str | None], Floats],
+    read: Callable[[str, Space], Floats],
     purpose: str,
     geometry: SceneGeometry,
     materials: Materials,

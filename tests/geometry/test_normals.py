@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from illumcli.geometry import polygon_normals as polygon_normals_module
 from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import area_vectors, polygon_normals, reversed_polygons
@@ -322,3 +323,39 @@ def test_computed_normals_of_reversed_polygons_lie_on_the_side_of_the_files():
     touching = replace(mesh, corners=np.array([0, 1, 2, 3, 2, 1, 4, 7], np.int32))
     found = corner_normals(touching)
     assert (found.normals[found.index[6:], 2] == 1).all()  # no polygon beside is turned
+
+
+@pytest.mark.parametrize("kind", ["plain", "smoothing groups", "normals of the file", "turned"])
+def test_normals_are_the_same_whatever_the_blocks(monkeypatch, kind):
+    """A rough grid of triangles and quads, some doubled so that they cancel, some without area."""
+    random = np.random.default_rng(3)
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(9.0), np.arange(9.0)))
+    vertices = np.stack([x, y, random.normal(size=81) * 0.4], axis=1)
+    first = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = [[a, a + 1, a + 10, a + 9][: 3 + a % 2] for a in first]
+    faces += [faces[5][::-1], [3, 3, 4], [0, 1, 2, 12, 11, 10]]
+    mesh = Mesh(
+        vertices,
+        np.concatenate(faces).astype(np.int32),
+        np.cumsum([0, *map(len, faces)]).astype(np.int32),
+    )
+    turned = None
+    if kind == "smoothing groups":
+        mesh = replace(mesh, polygon_smoothing=random.integers(-1, 3, len(faces)).astype(np.int32))
+    elif kind == "normals of the file":
+        normals = np.concatenate([random.normal(size=(20, 3)), np.zeros((1, 3))])
+        rows = random.integers(-1, 21, len(mesh.corners)).astype(np.int32)
+        mesh = replace(mesh, normals=normals, corner_normals=rows)
+    elif kind == "turned":
+        turned = random.random(len(faces)) < 0.3
+
+    def results():
+        yield reversed_polygons(mesh)
+        for weights, crease, method in product(("angle", "area", "equal"), (None, 0.0, 30.0, 180.0), METHODS):
+            made = corner_normals(mesh, weights, crease, turned is None, method, turned)
+            yield from (made.normals, made.index, dict(made.repairs))
+
+    whole = list(results())
+    monkeypatch.setattr(polygon_normals_module, "BLOCK", 7)
+    for one, other in zip(whole, results(), strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -171,6 +171,31 @@ def test_a_seam_that_splits_vertices_does_not_split_the_part():
     assert parts_of(split).are_joined(np.zeros_like(b), b).all()
 
 
+@pytest.mark.parametrize("shared", ["vertices", "normals", "both"])
+def test_parts_do_not_depend_on_what_corners_share(shared):
+    """Two half spheres with a gap, whose corners are given in three ways."""
+    one = icosphere(2)
+    triangles = one.corners.reshape(-1, 3)
+    height = one.vertices[triangles, 1]
+    triangles = triangles[(height > 0.1).all(axis=1) | (height < -0.1).all(axis=1)]
+    numbers = np.arange(triangles.size).reshape(-1, 3)
+    vertices, corners = (
+        (one.vertices, triangles) if shared != "normals" else (one.vertices[triangles], numbers)
+    )
+    normals, rows = (one.vertices, triangles) if shared != "vertices" else (one.vertices[triangles], numbers)
+    if shared == "both":  # a normal of several vertices at vertices of several normals
+        normals = np.concatenate([normals, [normals[triangles[0, 0]]]])
+        rows = np.where((rows == triangles[0, 0]) & (numbers % 2 == 0), len(normals) - 1, rows)
+        vertices = np.concatenate([vertices, [vertices[triangles[0, 0]]]])
+        corners = np.where((corners == triangles[0, 0]) & (numbers % 3 == 0), len(vertices) - 1, corners)
+    mesh = Mesh.of_triangles(
+        vertices.reshape(-1, 3), corners, normals=normals.reshape(-1, 3), corner_normals=rows
+    )
+    b = np.arange(len(triangles), dtype=np.int32)
+    upper = one.vertices[triangles[:, 0], 1] > 0
+    np.testing.assert_array_equal(parts_of(mesh).are_joined(np.zeros_like(b), b), upper == upper[0])
+
+
 def test_objects_that_touch_stay_apart():
     one = icosphere(1)
     b = np.arange(2 * len(one.corners) // 3, dtype=np.int32)
@@ -183,3 +208,18 @@ def test_a_creased_edge_parts_the_surfaces_beside_it():
     sharp = SmoothParts(geometry, scene_normals(geometry, [corner_normals(box, crease=0.5)]))
     a, b = np.zeros(12, np.int32), np.arange(12, dtype=np.int32)
     np.testing.assert_array_equal(sharp.are_joined(a, b), geometry.polygons == 0)
+
+
+def test_vertices_of_several_normals_that_several_vertices_share_part_the_surfaces():
+    normals = np.array(
+        [np.linalg.svd(BOX[list(face)] - BOX[list(face)].mean(axis=0))[2][2] for face in BOX_FACES]
+    )
+    box = Mesh(
+        BOX,
+        np.ravel(BOX_FACES).astype(np.int32),
+        np.arange(0, 25, 4, dtype=np.int32),
+        normals=normals,
+        corner_normals=np.repeat(np.arange(6, dtype=np.int32), 4),
+    )
+    a, b = np.zeros(12, np.int32), np.arange(12, dtype=np.int32)
+    np.testing.assert_array_equal(parts_of(box).are_joined(a, b), b < 2)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 def components(
     first: NDArray[np.integer[Any]], second: NDArray[np.integer[Any]], count: int
-) -> NDArray[np.int64]:
+) -> NDArray[np.integer[Any]]:
     """(count,) the lowest node that each of `count` nodes is connected to.
 
     Where an edge joins two roots, the larger one is hooked below the smaller, then the trees are flattened;
@@ -21,9 +21,10 @@ def components(
     first, second : (E,) int
         Nodes that each edge joins.
     """
-    root = np.arange(count)
+    root = np.arange(count, dtype=first.dtype)
     while first.size:
-        low, high = np.sort([root.take(first), root.take(second)], axis=0)
+        one, other = root.take(first), root.take(second)
+        low, high = np.minimum(one, other), np.maximum(one, other)
         is_joining = low != high
         np.minimum.at(root, high[is_joining], low[is_joining])
         first, second = first[is_joining], second[is_joining]

@@ -9,21 +9,24 @@ Thürmer, G., Wüthrich, C. A. (1998). Computing vertex normals from polygonal f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, cross, dot, length, take_rows, unit
+from illumcli.arrays import Floats, Vectors, cross, dot, length, take_rows
 from illumcli.geometry.components import components
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import (
     EPS,
     PolygonMethod,
     area_vectors,
+    blocks,
     corner_edges,
     polygon_normals,
+    polygon_of_corners,
     reversed_polygons,
     unit_file_normals,
 )
@@ -114,68 +117,95 @@ def _computed(
     turned: NDArray[np.bool_] | None = None,
 ) -> CornerNormals:
     """Normals averaged from those of polygons; those that are `turned`, (P,), count with their other side."""
-    # Normals and weights of the polygons; a crease of 0 averages nothing.
-    polygons = polygon_normals(mesh, method)
-    weight = _corner_weights(mesh, weights, polygons)
-    if turned is not None:
-        polygons = np.where(turned[:, None], -polygons, polygons)
-    owner = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
+    polygons = _Polygons(mesh, method, weights, turned, bool((np.diff(mesh.starts) > 3).any()))
+
+    # A crease of 0 averages nothing.
     if crease == 0:
-        is_valid = dot(polygons, polygons) > 0
-        return CornerNormals(polygons, np.where(is_valid[owner], owner, -1).astype(np.int32), {})
+        normals, owner = polygons.normals(), polygon_of_corners(mesh)
+        is_valid = dot(normals, normals) > 0
+        return CornerNormals(normals, np.where(is_valid[owner], owner, -1).astype(np.int32), {})
 
     # Corners that share a pool are averaged: those of a vertex, or of a vertex and smoothing group.
-    pool, by_angle = (mesh.corners, None) if crease is not None else _pools(mesh, owner)
-    sums, total = _pool_sums(pool, weight, polygons, owner)
+    pool, by_angle = (mesh.corners, None) if crease is not None else _pools(mesh)
+    means, is_cancelled = _pool_means(pool, polygons)
 
     # Pools over which normals turn too far are split at their sharp edges.
     limit = np.radians(DEFAULT_CREASE if crease is None else crease)
-    creased = _creased(pool, by_angle, take_rows(polygons, owner), sums, limit) if limit < np.pi else pool[:0]
+    creased = _creased(pool, by_angle, means, polygons, limit) if limit < np.pi else np.zeros(0, np.intp)
     if creased.size:
-        fan = _fans_between_edges(mesh, creased, polygons, owner, limit)
-        fan_weight = None if weight is None else weight[creased]
-        fan_sums, fan_total = _pool_sums(fan, fan_weight, polygons, owner[creased])
+        part, own = polygons.around(creased)
+        fan = np.full(len(part.mesh.corners), -1)
+        fan[own] = _fans_between_edges(part, own, limit)
+        fan_means, fan_is_cancelled = _pool_means(fan, part)
         pool = pool.copy()
-        pool[creased] = len(sums) + fan
-        sums, total = np.concatenate([sums, fan_sums]), np.concatenate([total, fan_total])
-    return _without_cancelled(sums, total, pool.astype(np.int32), polygons, owner)
+        pool[creased] = len(means) + fan[own]
+        means = np.concatenate([means, fan_means])
+        is_cancelled = np.concatenate([is_cancelled, fan_is_cancelled])
 
-
-def _without_cancelled(
-    sums: Vectors, total: Floats, index: NDArray[np.int32], polygons: Vectors, owner: NDArray[np.int32]
-) -> CornerNormals:
-    """The sums made unit; corners whose sum cancels get their polygon's own normal."""
-    is_cancelled = length(sums) <= 16 * EPS * total
+    # Corners whose pool cancels have their polygon's own normal.
+    index, repairs = pool.astype(np.int32, copy=False), {}
     cancelled = np.flatnonzero(is_cancelled[index])
-    if not len(cancelled):
-        return CornerNormals(unit(sums), index.astype(np.int32), {})
-    replacing, row = np.unique(owner[cancelled], return_inverse=True)
-    normals = take_rows(polygons, replacing)
-    is_valid = dot(normals, normals)[row] > 0
-    index = index.copy()
-    index[cancelled] = np.where(is_valid, len(sums) + row, -1)
-    count = int(np.count_nonzero(is_valid))
-    repairs = {"vertices whose polygons cancel": count} if count else {}
-    return CornerNormals(np.concatenate([unit(sums), normals]), index.astype(np.int32), repairs)
+    if cancelled.size:
+        part, own = polygons.around(cancelled)
+        normals, row = part.normals(), polygon_of_corners(part.mesh)[own]
+        is_valid = dot(normals, normals)[row] > 0
+        index = index.copy()
+        index[cancelled] = np.where(is_valid, len(means) + row, -1)
+        means = np.concatenate([means, normals])
+        if count := int(np.count_nonzero(is_valid)):
+            repairs["vertices whose polygons cancel"] = count
+    return CornerNormals(means, index, repairs)
 
 
-def _corner_weights(mesh: Mesh, weights: Weights, polygons: Vectors) -> Floats | None:
-    """(C,) weight of each corner's polygon at the corner's vertex; None if all are equal."""
-    size = np.diff(mesh.starts)
-    if weights == "equal":
-        return None
-    if weights == "area":
-        return np.repeat(length(area_vectors(mesh)), size)
-    following, previous = corner_edges(mesh)
-    normal = cross(following, previous)
-    angle = np.arctan2(length(normal), dot(following, previous))
-    if mesh.polygon_count and size.max() > 3:  # a reflex corner spans more than half a turn
-        is_reflex = dot(normal, take_rows(polygons, np.repeat(np.arange(len(size)), size))) < 0
-        angle = np.where(is_reflex, 2 * np.pi - angle, angle)
-    return angle
+class _Polygons(Record):
+    """Polygons of a mesh, and what counts of them at their corners."""
+
+    mesh: Mesh
+    method: PolygonMethod
+    weights: Weights
+    turned: NDArray[np.bool_] | None  # (P,) which count with their other side
+    has_larger: bool
+    """Has the whole mesh polygons of more than three corners?"""
+
+    def blocks(self) -> Iterator[tuple[slice, _Polygons]]:
+        """Consecutive polygons, and the numbers of their corners."""
+        for polygons, corners, part in blocks(self.mesh):
+            turned = None if self.turned is None else self.turned[polygons]
+            yield corners, replace(self, mesh=part, turned=turned)
+
+    def around(self, corners: NDArray[np.intp]) -> tuple[_Polygons, NDArray[np.intp]]:
+        """The polygons of some corners in their order, and which of their own corners these are."""
+        owner = np.searchsorted(self.mesh.starts, corners, side="right") - 1
+        which, row = np.unique(owner, return_inverse=True)
+        size = np.diff(self.mesh.starts)[which]
+        starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int32)
+        shift = self.mesh.starts[which] - starts[:-1]
+        every = np.arange(starts[-1]) + np.repeat(shift, size)
+        part = Mesh(self.mesh.vertices, self.mesh.corners[every], starts)
+        turned = None if self.turned is None else self.turned[which]
+        return replace(self, mesh=part, turned=turned), corners - shift[row]
+
+    def normals(self) -> Vectors:
+        """(P, 3) unit normals, on the side that counts."""
+        normals = polygon_normals(self.mesh, self.method)
+        return normals if self.turned is None else np.where(self.turned[:, None], -normals, normals)
+
+    def corner_weights(self) -> Floats | float:
+        """(C,) weight of each corner's polygon at the corner's vertex; 1 if all are equal."""
+        if self.weights == "equal":
+            return 1.0
+        if self.weights == "area":
+            return np.repeat(length(area_vectors(self.mesh)), np.diff(self.mesh.starts))
+        following, previous = corner_edges(self.mesh)
+        normal = cross(following, previous)
+        angle = np.arctan2(length(normal), dot(following, previous))
+        if self.has_larger:  # a reflex corner spans more than half a turn
+            of_polygon = take_rows(polygon_normals(self.mesh, self.method), polygon_of_corners(self.mesh))
+            angle = np.where(dot(normal, of_polygon) < 0, 2 * np.pi - angle, angle)
+        return angle
 
 
-def _pools(mesh: Mesh, owner: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+def _pools(mesh: Mesh) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
     """Which corners are averaged together, by the file's smoothing groups.
 
     Returns
@@ -187,7 +217,7 @@ def _pools(mesh: Mesh, owner: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[
     """
     if mesh.polygon_smoothing is None:
         return mesh.corners, None
-    group = mesh.polygon_smoothing[owner]
+    group = mesh.polygon_smoothing[polygon_of_corners(mesh)]
     known, number = np.unique(group, return_inverse=True)
     key = mesh.corners.astype(np.int64) * len(known) + number
     alone = len(mesh.vertices) * len(known) + np.arange(len(group))
@@ -195,46 +225,57 @@ def _pools(mesh: Mesh, owner: NDArray[np.int32]) -> tuple[NDArray[Any], NDArray[
     return pool.ravel(), group < 0
 
 
-def _pool_sums(
-    pool: NDArray[Any], weight: Floats | None, polygons: Vectors, owner: NDArray[np.int32]
-) -> tuple[Vectors, Floats]:
-    """(K, 3) weighted sums of the polygon normals at the corners of each pool, and (K,) of the weights."""
-    total = np.bincount(pool, weight).astype(np.float64)
-    sums = np.empty((len(total), 3), order="F")
-    for axis in range(3):
-        part = polygons[:, axis][owner]
-        sums[:, axis] = np.bincount(pool, part if weight is None else part * weight)
-    return sums, total
+def _pool_means(pool: NDArray[Any], polygons: _Polygons) -> tuple[Vectors, NDArray[np.bool_]]:
+    """(K, 3) unit mean of the polygon normals at the corners of each pool, and (K,) where they cancel.
+
+    `pool`, (C,), is the number of each corner's pool, -1 for corners that do not count.
+    """
+    count = int(pool.max(initial=-1)) + 1
+    sums, total = np.zeros((count, 3), order="F"), np.zeros(count)
+    for corners, part in polygons.blocks():
+        row, owner = pool[corners].astype(np.intp), polygon_of_corners(part.mesh)
+        weight = np.broadcast_to(part.corner_weights(), row.shape)
+        if row.min() < 0:
+            counts = np.flatnonzero(row >= 0)
+            row, owner, weight = row[counts], owner[counts], weight[counts]
+        np.add.at(total, row, weight)
+        for column, normal in zip(sums.T, part.normals().T, strict=True):
+            np.add.at(column, row, normal[owner] * weight)
+    size = length(sums)
+    sums *= np.divide(1, size, out=np.zeros(count), where=size > 0)[:, None]
+    return sums, size <= 16 * EPS * total
 
 
 def _creased(
     pool: NDArray[Any],
     by_angle: NDArray[np.bool_] | None,
-    normal: Vectors,
-    sums: Vectors,
+    means: Vectors,
+    polygons: _Polygons,
     limit: float,
 ) -> NDArray[np.intp]:
     """Corners of the pools that may hold a sharp edge.
 
-    Those are pools in which some polygon's normal, (C, 3), is farther than half of `limit` [rad] from the
-    mean; in the others any two normals are within `limit` of each other.
+    Those are pools in which some polygon's normal is farther than half of `limit` [rad] from the mean; in the
+    others any two normals are within `limit` of each other.
     """
-    difference = take_rows(unit(sums), pool) - normal
-    is_far = (dot(difference, difference) > (2 * np.sin(limit / 4)) ** 2) & (dot(normal, normal) > 0)
-    if by_angle is not None:
-        is_far &= by_angle
-    has_crease = np.zeros(len(sums), np.bool_)
-    has_crease[pool[is_far]] = True
+    has_crease = np.zeros(len(means), np.bool_)
+    for corners, part in polygons.blocks():
+        normal = take_rows(part.normals(), polygon_of_corners(part.mesh))
+        difference = take_rows(means, pool[corners]) - normal
+        is_far = (dot(difference, difference) > (2 * np.sin(limit / 4)) ** 2) & (dot(normal, normal) > 0)
+        if by_angle is not None:
+            is_far &= by_angle[corners]
+        has_crease[pool[corners][is_far]] = True
     return np.flatnonzero(has_crease[pool])
 
 
-def _fans_between_edges(
-    mesh: Mesh, corners: NDArray[Any], polygons: Vectors, owner: NDArray[np.int32], limit: float
-) -> NDArray[np.int64]:
+def _fans_between_edges(polygons: _Polygons, corners: NDArray[Any], limit: float) -> NDArray[np.int64]:
     """(M,) a number for the fan of each of these corners, which are all corners of their vertices.
 
     A fan is a run of polygons around a vertex that follow each other over edges of at most `limit` [rad].
     """
+    mesh, normals, owner = polygons.mesh, polygons.normals(), polygon_of_corners(polygons.mesh)
+
     # Next and previous corner within each polygon, and each corner's place among `corners`.
     following = np.arange(1, len(mesh.corners) + 1)
     following[mesh.starts[1:] - 1] = mesh.starts[:-1]
@@ -258,7 +299,7 @@ def _fans_between_edges(
         if not same.size:
             break
         a, b = edge[same], edge[same + step]
-        difference = take_rows(polygons, owner[a]) - take_rows(polygons, owner[b])
+        difference = take_rows(normals, owner[a]) - take_rows(normals, owner[b])
         is_smooth = dot(difference, difference) <= chord * chord
         a, b = a[is_smooth], b[is_smooth]
         is_opposite = mesh.corners[a] == mesh.corners[following[b]]  # as neighbours run along an edge

@@ -1,8 +1,8 @@
 """Normals of polygons.
 
-All work is in float64, on the corners of all polygons at once. Sums are formed from vectors that start at
-the polygon's first corner, so a mesh far from the origin keeps its digits. Every polygon has at least three
-corners.
+All work is in float64, on the corners of a block of polygons at once. Sums are formed from vectors that start
+at the polygon's first corner, so a mesh far from the origin keeps its digits. Every polygon has at least
+three corners.
 
 References
 ----------
@@ -13,12 +13,14 @@ Theoharis, T. et al. (2008). Graphics and Visualization, eq. 12.31 to 12.33.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Vectors, cross, dot, length, take_rows, unit
+from illumcli.arrays import Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.geometry.mesh import Mesh
 
 PolygonMethod: TypeAlias = Literal["cross", "edge_average", "newell", "plane"]
@@ -26,6 +28,10 @@ PolygonMethod: TypeAlias = Literal["cross", "edge_average", "newell", "plane"]
 EPS = np.finfo(np.float64).eps
 OPPOSITE = -0.01
 """Cosine below which a normal of the file clearly points to the other side of its polygon."""
+
+BLOCK = 1 << 13
+"""Polygons whose arrays are in memory together: they stay in a processor's own cache, and a mesh of 10^7
+triangles takes no gigabytes for them."""
 
 CornerIndex: TypeAlias = NDArray[np.int32] | slice
 """A corner of every polygon."""
@@ -46,7 +52,11 @@ def polygon_normals(mesh: Mesh, method: PolygonMethod = "newell") -> Vectors:
     -------
     (P, 3) float64; zero for degenerate polygons: all corners on a line, to the precision of doubles.
     """
-    newell = unit(area_vectors(mesh))
+    return _in_blocks(mesh, partial(_polygon_normals, method))
+
+
+def _polygon_normals(method: PolygonMethod, mesh: Mesh) -> Vectors:
+    newell = unit(_area_vectors(mesh))
     if method == "newell":
         return newell
     first = mesh.starts[:-1]
@@ -72,10 +82,12 @@ def reversed_polygons(mesh: Mesh) -> NDArray[np.bool_] | None:
     if mesh.normals is None or mesh.corner_normals is None or not mesh.polygon_count:
         return None
     normals, is_valid = unit_file_normals(mesh.normals)
-    polygon = np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
-    cosine = dot(take_rows(normals, mesh.corner_normals), take_rows(polygon_normals(mesh), polygon))
-    opposite = (cosine < OPPOSITE) & (mesh.corner_normals >= 0) & is_valid[mesh.corner_normals]
-    out: NDArray[np.bool_] = np.logical_and.reduceat(opposite, mesh.starts[:-1])
+    out = np.empty(mesh.polygon_count, np.bool_)
+    for polygons, corners, part in blocks(mesh):
+        row = mesh.corner_normals[corners]
+        cosine = dot(take_rows(normals, row), take_rows(polygon_normals(part), polygon_of_corners(part)))
+        opposite = (cosine < OPPOSITE) & (row >= 0) & is_valid[row]
+        np.logical_and.reduceat(opposite, part.starts[:-1], out=out[polygons])
     return out if out.any() else None
 
 
@@ -94,6 +106,35 @@ def area_vectors(mesh: Mesh) -> Vectors:
     The sum of the cross products of the fan from the first corner, which is Newell's sum with that corner as
     the origin. Also right for concave polygons.
     """
+    return _in_blocks(mesh, _area_vectors)
+
+
+def blocks(mesh: Mesh) -> Iterator[tuple[slice, slice, Mesh]]:
+    """Consecutive polygons of a mesh: their numbers, those of their corners, and a mesh of them alone
+    over the same vertices."""
+    for first in range(0, mesh.polygon_count, BLOCK):
+        starts = mesh.starts[first : first + BLOCK + 1]
+        corners = slice(int(starts[0]), int(starts[-1]))
+        part = Mesh(mesh.vertices, mesh.corners[corners], starts - starts[0])
+        yield slice(first, first + part.polygon_count), corners, part
+
+
+def polygon_of_corners(mesh: Mesh) -> NDArray[np.int32]:
+    """(C,) the polygon that each corner belongs to."""
+    return np.repeat(np.arange(mesh.polygon_count, dtype=np.int32), np.diff(mesh.starts))
+
+
+def _in_blocks(mesh: Mesh, of_polygons: Callable[[Mesh], Vectors]) -> Vectors:
+    """(P, 3) float64 what a function says of the polygons, asked block by block."""
+    if mesh.polygon_count <= BLOCK:
+        return of_polygons(mesh)
+    out = np.empty((mesh.polygon_count, 3), order="F")
+    for polygons, _, part in blocks(mesh):
+        out[polygons] = of_polygons(part)
+    return out
+
+
+def _area_vectors(mesh: Mesh) -> Vectors:
     a, b, fans = _fan_edges(mesh)
     vectors = _sum_per_polygon(cross(a, b), fans)
     rounding = 4 * EPS * _sum_per_polygon(dot(a, a) + dot(b, b), fans)
@@ -125,7 +166,7 @@ def corner_edges(mesh: Mesh) -> tuple[Vectors, Vectors]:
 
 def _corner_points(mesh: Mesh) -> NDArray[np.float64]:
     """(C, 3) position of each corner, components contiguous."""
-    return take_rows(np.asfortranarray(mesh.vertices), mesh.corners)
+    return column_major(mesh.vertices.take(mesh.corners, axis=0))
 
 
 def _first_and_last(mesh: Mesh) -> tuple[CornerIndex, CornerIndex]:
@@ -149,8 +190,8 @@ def _fan_edges(mesh: Mesh) -> tuple[Vectors, Vectors, NDArray[np.integer[Any]]]:
     count = np.maximum(np.diff(mesh.starts) - 2, 0)
     fans = np.concatenate([[0], np.cumsum(count)])
     if (count == 1).all():
-        vertices = np.asfortranarray(mesh.vertices)
-        origin, second, third = (take_rows(vertices, mesh.corners[k::3]) for k in range(3))
+        points = mesh.vertices.take(mesh.corners, axis=0)
+        origin, second, third = (column_major(points[k::3]) for k in range(3))
     else:
         points = _corner_points(mesh)
         corner = np.arange(fans[-1]) - np.repeat(fans[:-1] - mesh.starts[:-1] - 1, count)

@@ -7,6 +7,7 @@ another smooth part can cast a shadow; one of the same part is the surface itsel
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,38 +48,55 @@ class SmoothParts:
         return out
 
     @cached_property
-    def _part(self) -> NDArray[np.int64]:
+    def _part(self) -> NDArray[np.integer[Any]]:
         """(T,) a number for the part of each triangle; threads that compute it at once get the same."""
-        point = self._corner_points()
-        first, second = point[:, :2].T.ravel(), point[:, 1:].T.ravel()
-        return components(first, second, point.max(initial=-1) + 1).take(point[:, 0])
+        corner = self._corner_points()
+        first, second = corner[:, :2].T.ravel(), corner[:, 1:].T.ravel()
+        return components(first, second, int(corner.max(initial=-1)) + 1).take(corner[:, 0])
 
-    def _corner_points(self) -> NDArray[np.int64]:
+    def _corner_points(self) -> NDArray[np.int32]:
         """(T, 3) a number for the object, position and normal of each corner; equal corners share it."""
-        # Number the positions, apart for each object.
+        # Pairs of a vertex and a normal; those of equal object, position and rounded normal share a number.
         geometry = self._geometry
+        pair, vertex, row = self._pairs()
         of_vertex = np.zeros(len(geometry.vertices), np.int64)
         of_vertex[geometry.triangles] = geometry.objects[:, None]
         # + 0.0 makes zeros of both signs the same bits
-        x, y, z = ((column + F(0)).view(np.uint32).astype(np.int64) for column in geometry.vertices.T)
-        position = _number(x << 32 | y, of_vertex << 32 | z)
+        x, y, z = (
+            (column.take(vertex) + F(0)).view(np.uint32).astype(np.int64) for column in geometry.vertices.T
+        )
+        a, b, c = (
+            (np.rint(column.take(row) * NORMAL_STEPS) + NORMAL_STEPS).astype(np.int64)
+            for column in self._normals.values.T
+        )
+        return _number(x << 32 | y, of_vertex.take(vertex) << 32 | z, a << 32 | b << 16 | c).take(pair)
 
-        # Number the rounded normals, then the pairs of both.
-        a, b, c = (np.rint(self._normals.values.T * NORMAL_STEPS) + NORMAL_STEPS).astype(np.int64)
-        direction = _number(a << 32 | b << 16 | c)
-        corner = direction.take(self._normals.index.take(geometry.corners))
-        return _number(
-            (position.take(geometry.triangles) * (corner.max(initial=0) + 1) + corner).ravel()
-        ).reshape(-1, 3)
+    def _pairs(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Pairs of a vertex and a normal: (T, 3) that of each corner, (K,) their vertices, (K,) their rows.
+
+        Most often a vertex has one normal, or a normal one vertex, and the pairs need no search.
+        """
+        triangles, rows = self._geometry.triangles, len(self._normals.values)
+        index = self._normals.index.take(self._geometry.corners)
+        row = np.zeros(len(self._geometry.vertices), np.int32)
+        row[triangles] = index
+        if (row.take(triangles) == index).all():
+            return triangles, np.arange(len(row)), row
+        vertex = np.zeros(rows, np.int32)
+        vertex[index] = triangles
+        if (vertex.take(index) == triangles).all() and index.min() >= 0:
+            return index, vertex, np.arange(rows)
+        known, pair = np.unique(triangles * np.int64(rows) + index % rows, return_inverse=True)
+        return pair.reshape(-1, 3), *np.divmod(known, rows)
 
 
-def _number(*keys: NDArray[np.int64]) -> NDArray[np.int64]:
+def _number(*keys: NDArray[np.int64]) -> NDArray[np.int32]:
     """(N,) a number for each distinct combination of keys, each (N,), from 0."""
     order = np.lexsort(keys)
     new = np.zeros(len(order), np.bool_)
     for key in keys:
         ordered = key.take(order)
         new[1:] |= ordered[1:] != ordered[:-1]
-    out = np.empty(len(order), np.int64)
+    out = np.empty(len(order), np.int32)
     out[order] = np.cumsum(new)
     return out

@@ -112,7 +112,7 @@ def test_what_cannot_be_measured_is_refused(scene):
         ({"overrides": ("obscurance=null",), "vary": "obscurance"}, "no obscurance to vary"),
         ({"vary": "obscurance", "layer": "light:point1"}, "no layer"),
         ({"vary": "obscurance", "layer": "point1"}, "casts no obscurance ray"),
-        ({"vary": "pixels", "layer": "depth"}, "no mean"),
+        ({"vary": "pixels", "layer": "depth"}, "not a mean"),
         ({"vary": "pixels", "first": 1, "last": 8}, "--from 1"),
         ({"first": 16, "last": 16}, "at least twice"),
         ({"camera": "left"}, "no camera 'left'; there are: main"),

@@ -84,9 +84,9 @@ def test_pilots_share_no_random_number_with_the_picture(scene, monkeypatch):
 
 
 def test_nothing_to_reach_and_too_much(scene):
-    with pytest.raises(InputError, match="nothing to reach"):
+    with pytest.raises(InputError, match="--target-error needs one"):
         choose_sampling(scene, 0.01, only=["depth"])
-    with pytest.raises(LimitError, match="aim for a larger"):
+    with pytest.raises(LimitError, match="choose a larger"):
         choose_sampling(scene, 1e-9)
 
 

@@ -193,7 +193,7 @@ def test_what_is_wrong_with_a_view_is_told(tmp_path, said, fact):
 
 def test_a_scene_has_no_view_of_the_studio(tmp_path):
     (tmp_path / "s.yaml").write_text("version: 1\n")
-    with pytest.raises(InputError, match=r"s.yaml is no mesh without a scene; change its camera"):
+    with pytest.raises(InputError, match=r"s.yaml is not a mesh file; change its camera"):
         load(tmp_path / "s.yaml", ["studio.up=z"])
 
 

@@ -261,10 +261,10 @@ def test_an_override_changes_one_use_of_an_alias(write):
         ("objects.pot.material=wall", "no object 'pot'; did you mean 'teapot'?"),
         ("objects.teapot.material=gold", "no material 'gold'; there are: clay, wall"),
         ("lights.0.position.x=1", "no part 'x' in position; number its parts from 0"),
-        ("camera.up.0=1", "the scene does not say camera.up; give it whole, as -D camera.up=..."),
+        ("camera.up.0=1", "the scene has no camera.up; give the whole, as -D camera.up=..."),
         (
             "materials.clay.diffuse.0=1",
-            "nothing is inside materials.clay.diffuse, which is 0.5; give it whole",
+            "materials.clay.diffuse is 0.5 and has no parts; replace the whole",
         ),
         ("film.samples", "write PATH=VALUE, as in -D film.samples=16"),
         ("film..samples=1", "write PATH=VALUE"),

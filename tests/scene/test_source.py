@@ -106,10 +106,10 @@ NINE = {  # the rows of the YAML table in the notes on robustness; each must be 
     "alias bomb": (
         b"a0: &a0 [1, 2]\n"
         + b"".join(b"a%d: &a%d [*a%d, *a%d]\n" % (i, i, i - 1, i - 1) for i in range(1, 30)),
-        "the aliases write out more than 10 times the text",
+        "the aliases expand to more than 10 times the text",
     ),
     "long integer": (b"a: " + b"9" * 5000, "s.yaml:1:1: a: a number of 5000 digits; at most 64 count"),
-    "cycle": (b"a: &a [*a]", "s.yaml:1:8: a.0: the alias *a stands inside itself"),
+    "cycle": (b"a: &a [*a]", "s.yaml:1:8: a.0: the alias *a is inside its own anchor"),
     "repeated key": (
         b"a: 1\nb: 2\na: 3",
         "s.yaml:3:1: the key 'a' stands twice, first in line 1; remove one",

@@ -1,1 +1,1 @@
-"""Error against time: how far an image is from its limit, and how finely to sample for a given error."""
+"""Error against time: the sampling error of an image, and the sampling that a given error needs."""

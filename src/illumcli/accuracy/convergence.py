@@ -1,4 +1,4 @@
-"""Run time against error: a layer at doubling samples, beside a reference from other random numbers."""
+"""Convergence: error and time of a layer at 1, 2, 4, ... samples, against a reference with other seeds."""
 
 from __future__ import annotations
 
@@ -25,41 +25,41 @@ from illumcli.visibility.samplers import SAMPLERS
 
 IMAGES = 5
 """Images that are held at once, in double precision."""
-DOUBLED: dict[Vary, tuple[int, int]] = {"obscurance": (4, 256), "pixels": (2, 64), "both": (8, 512)}
-"""From where to where samples are doubled by default: rays, samples, or rays of all samples of a pixel."""
+RANGES: dict[Vary, tuple[int, int]] = {"obscurance": (4, 256), "pixels": (2, 64), "both": (8, 512)}
+"""Default least and greatest count per pixel: obscurance rays, samples, obscurance rays of all samples."""
 
 RunKey: TypeAlias = tuple[str, int, int]
 """Sampler, count and repeat."""
 
 
 class ConvergenceSettings(Value):
-    """What is measured."""
+    """What is varied and measured."""
 
     overrides: tuple[str, ...] = ()
     vary: Vary | None = None
     """`obscurance`: rays per sample, with one sample through each pixel's centre. `pixels`: samples per
-    pixel, each with the scene's obscurance rays. `both`: the two in turn. By default obscurance where the
-    scene has any."""
+    pixel, each with the scene's obscurance rays. `both`: the two in turn. By default obscurance if there is
+    any in the scene."""
     first: int | None = None
     last: int | None = None
-    """The fewest and most per pixel of what is doubled; by default those of `DOUBLED`."""
+    """Least and greatest count per pixel; by default those of `RANGES`."""
     layer: str | None = None
-    """By default `obscurance` where only that is varied, else `beauty`."""
+    """By default `obscurance` if only that is varied, otherwise `beauty`."""
     samplers: tuple[str, ...] = tuple(SAMPLERS)
     repeats: int = 3
     width: int | None = 320
-    """The film is scaled down to at most this: error per pixel hardly depends on it."""
+    """The film is scaled down to at most this width, on which the error per pixel hardly depends."""
     camera: str | None = None
     """By default the first."""
     seed: int | None = None
     """By default the scene's."""
     threads: int | None = None
     cache: bool = True
-    """Keep the reference for later runs."""
+    """Cache the reference for later runs."""
 
 
 class Convergence(Value):
-    """A layer's error at every sampling, in the order in which JSON has it."""
+    """A layer's error at every sampling; the fields in the order of the JSON output."""
 
     scene: str
     layer: str
@@ -74,7 +74,7 @@ class Convergence(Value):
     curves: tuple[Curve, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """The result as JSON holds it; what is not a finite number is null."""
+        """The result for JSON output; numbers that are not finite are null."""
         return _finite({"illum": __version__, **asdict(self), "versions": versions()})
 
 
@@ -84,12 +84,12 @@ def measure_convergence(
     progress: Progress = no_progress,
     planned: Callable[[list[str]], None] = lambda contents: None,
 ) -> Convergence:
-    """A scene's layer rendered at doubling samples, by every sampler in turn, and its error.
+    """The error of a scene's layer at doubling sample counts, with every sampler.
 
     Parameters
     ----------
     planned
-        Gets the content of every image before any is rendered, in the order of the result's runs.
+        Called with the content hash of every image before any is rendered, in the order of the result's runs.
     """
     settings = settings or ConvergenceSettings()
     loaded = load(path, settings.overrides)
@@ -97,11 +97,11 @@ def measure_convergence(
         loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": settings.seed}))
     scene = loaded.scene
 
-    # what is varied, of which layer, and how far
+    # What is varied, for which layer, and from where to where.
     vary = settings.vary or ("obscurance" if scene.obscurance is not None else "pixels")
     name = settings.layer or ("obscurance" if vary == "obscurance" else "beauty")
     layer = sampled_layer(loaded, name, settings.threads, settings.camera, settings.width)
-    few, many = DOUBLED[vary]
+    few, many = RANGES[vary]
     first = settings.first or few
     last = settings.last or max(many, 2 * first)
     levels = samplings(scene, vary, first, last, settings.samplers)
@@ -109,7 +109,7 @@ def measure_convergence(
     held = IMAGES * len(layer.layer.channels)
     refuse_memory(layer.view.height, layer.view.width, held, expected_memory(loaded, scene), str(path))
 
-    # the content of every image
+    # The content hash of every image.
     finest = max(levels, key=lambda level: level.rays)
     seeds = [stream(scene.seed, f"converge:{repeat}") for repeat in range(settings.repeats)]
     contents: dict[RunKey, str] = {
@@ -122,12 +122,12 @@ def measure_convergence(
     in_order = sorted(contents, key=lambda key: (settings.samplers.index(key[0]), *key[1:]))
     planned([contents[key] for key in in_order])
 
-    # the images and their errors
+    # Render the images and compute their errors.
     truth, reference = reference_image(layer, finest, vary, open_store() if settings.cache else None)
     runs: dict[RunKey, Run] = {}
     total, done = settings.repeats * sum(map(_cost, levels)), 0
     for repeat, seed in enumerate(seeds):
-        for level in levels:  # in turn, so that other load of the machine meets all samplers alike
+        for level in levels:  # samplers in turn, so that other load on the machine affects all alike
             key = level.sampler, _count(level, vary), repeat
             values, rays, seconds = layer.render(replace(level, seed=seed))
             error = rmse_of(values, truth, reference.rmse)
@@ -157,24 +157,24 @@ def _curves(
 
 
 def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequence[str]) -> list[Sampling]:
-    """Every sampling to measure, from few to many, samplers in turn, with seed 0.
+    """Every sampling to measure, counts ascending, samplers in turn, with seed 0.
 
     Raises
     ------
     InputError
-        There is nothing to double, or too little room to do so.
+        The scene has nothing to vary, or there is no second count in the range.
     """
     least = {"obscurance": 1, "pixels": 2, "both": 4}[vary]
     if first < least:
-        raise InputError(f"--from {first}: with --vary {vary} the first error that is random is at {least}")
+        raise InputError(f"--from {first}: with --vary {vary} the least count with a random error is {least}")
     if last < 2 * first:
-        raise InputError(f"from {first} to {last} nothing can be doubled; let --to be at least twice --from")
+        raise InputError(f"from {first} to {last} there is one count only; let --to be at least twice --from")
     if vary != "pixels" and scene.obscurance is None:
         raise InputError(
             "the scene has no obscurance to vary; use --vary pixels, or -D obscurance.samples=64"
         )
 
-    # samples per pixel and rays per sample at each count
+    # Samples per pixel and rays per sample at each count.
     rays = scene.obscurance.samples if scene.obscurance is not None else 0
     levels = []
     for count in [first << k for k in range((last // first).bit_length())]:
@@ -185,17 +185,17 @@ def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequenc
 
 
 def _count(sampling: Sampling, vary: Vary) -> int:
-    """Of what is doubled, per pixel."""
+    """The count per pixel that is varied."""
     return sampling.pixel if vary == "pixels" else sampling.rays
 
 
 def _cost(sampling: Sampling) -> int:
-    """Rays per pixel, those of the camera included."""
+    """Rays per pixel, camera rays included."""
     return sampling.pixel * (1 + sampling.obscurance)
 
 
 def _refuse_unvaried(layer: SampledLayer, vary: Vary) -> None:
-    """Raise InputError for a layer that does not depend on what is varied."""
+    """Raise InputError if a layer does not depend on what is varied."""
     plan = layer.planned(Sampling(1, 1, "spiral", 0))
     if vary == "obscurance" and "obscurance" not in plan.buffers:
         raise InputError(
@@ -204,7 +204,7 @@ def _refuse_unvaried(layer: SampledLayer, vary: Vary) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """The same with None for every number that is not finite."""
+    """`value` with None for every number that is not finite."""
     if isinstance(value, dict):
         return {name: _finite(part) for name, part in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""The files of a convergence measurement: its table and the plot of its curves."""
+"""The files of a convergence measurement: a table as CSV, and a plot of the curves."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from illumcli.images.contents import image_contents
 
 
 class ConvergenceFiles:
-    """The files to write; those that hold the same measurement already are kept.
+    """The files to write; files that already hold the same measurement are kept.
 
     Raises
     ------
     InputError
-        A suffix that is not written; matplotlib is not installed.
+        A suffix that cannot be written; matplotlib is not installed.
     OutputError
         A file that cannot be written.
     """
@@ -47,12 +47,12 @@ class ConvergenceFiles:
                 raise InputError(f"pictures of curves need matplotlib; {advice}") from None
 
     def look(self, contents: Sequence[str]) -> None:
-        """See which files hold what is made from `contents` already.
+        """Find out which files already hold the measurement with these content hashes.
 
         Raises
         ------
         OutputError
-            A different file is there and is not to be replaced; a file cannot be written.
+            A different file exists and may not be replaced; a file cannot be written.
         """
         self._content = digest(contents)
         if self._table is not None and is_kept(self._table, contents, report_contents, self._force):
@@ -61,7 +61,7 @@ class ConvergenceFiles:
             self.kept.append(self._plot)
 
     def write(self, result: Convergence) -> None:
-        """Write what is not kept."""
+        """Write the files that are not kept."""
         if self._table is not None and self._table not in self.kept:
             write_text(self._table, convergence_csv(result))
         if self._plot is not None and self._plot not in self.kept:
@@ -71,19 +71,19 @@ class ConvergenceFiles:
 
 
 def plot_contents(path: Path) -> list[str]:
-    """The content that a plot of curves names."""
+    """The content hashes in a plot of curves."""
     return image_contents(path) if path.suffix.lower() == ".png" else report_contents(path)
 
 
 def write_plot(path: Path, result: Convergence, content: str) -> None:
-    """Plot error over samples and over seconds on logarithmic axes; the file names its content."""
+    """Plot error over samples and over seconds on logarithmic axes; the file holds the content hash."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
     kind = path.suffix.lower()[1:]
     with rc_context({"svg.hashsalt": "illum", "font.size": 9}):
-        # the curves
+        # The curves.
         figure = Figure(figsize=(9, 4), layout="constrained")
         over_count, over_seconds = figure.subplots(1, 2, sharey=True)
         for curve in result.curves:
@@ -93,7 +93,7 @@ def write_plot(path: Path, result: Convergence, content: str) -> None:
             over_count.loglog([p.count for p in shown], errors, "o-", base=2, label=name)
             over_seconds.loglog([p.seconds for p in shown], errors, "o-", label=curve.sampler)
 
-        # the reference's own error, grid and labels
+        # The error of the reference, grid and labels.
         for axes in (over_count, over_seconds):
             axes.axhline(result.reference.rmse, color="0.6", linewidth=0.8, linestyle=":")
             axes.xaxis.set_minor_formatter(NullFormatter())
@@ -104,7 +104,7 @@ def write_plot(path: Path, result: Convergence, content: str) -> None:
         over_count.legend()
         figure.suptitle(f"{result.scene}, {result.width} x {result.height}")
 
-        # the file, with its content and the same bytes for the same curves
+        # The file, with its content hash; the same curves give the same bytes.
         out = io.BytesIO()
         of_svg = {"Date": None, "Identifier": content, "Keywords": BLANK}
         metadata = of_svg if kind == "svg" else {"illum:content": content}

@@ -1,4 +1,4 @@
-"""A convergence measurement as a table, as CSV, and as a plot of characters."""
+"""A convergence measurement as a table, as CSV, and as a text plot."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ COLUMNS = (
 
 
 def convergence_table(result: Convergence) -> str:
-    """A row per sampler and sampling, the slopes below."""
-    # a line per sampling, with the samples that random sampling would need where it was measured
-    ruled = "random" in {curve.sampler for curve in result.curves}
+    """A row per sampler and sampling, and the slopes below."""
+    # A line per sampling; if random sampling was measured, with the samples that it would need.
+    with_random = "random" in {curve.sampler for curve in result.curves}
     titles = (
         "sampler",
         "samples",
@@ -29,7 +29,7 @@ def convergence_table(result: Convergence) -> str:
         "seconds",
         "RMSE",
         "+-",
-        *(("random needs",) * ruled),
+        *(("random needs",) * with_random),
     )
     rows = [titles]
     for curve in result.curves:
@@ -38,18 +38,18 @@ def convergence_table(result: Convergence) -> str:
                 curve.sampler, str(p.pixel), str(p.obscurance), str(p.rays), f"{p.seconds:.3f}",
                 f"{p.rmse:.5f}", "-" if math.isnan(p.spread) else f"{p.spread:.5f}",
             )  # fmt: skip
-            rows.append((*row, _times(advantage(result, p.count, p.rmse))) if ruled else row)
+            rows.append((*row, _times(advantage(result, p.count, p.rmse))) if with_random else row)
     lines = aligned(rows, right=range(len(titles)))
 
-    # what was measured, and against what
+    # The measurement and its reference.
     reference, half = result.reference, result.reference.sampling
     lines.append(
         f"{result.scene}: {result.layer} of {result.camera}, {result.width} x {result.height}, "
         f"{result.threads} threads, {result.repeats} repeats"
     )
     lines.append(
-        f"reference: 2 x {half.pixel} samples of {half.obscurance} rays, RMSE {reference.rmse:.2g}, taken off"
-        + (", from the store" if reference.reused else "")
+        f"reference: 2 x {half.pixel} samples of {half.obscurance} rays, RMSE {reference.rmse:.2g}, "
+        "which is subtracted" + (", from the cache" if reference.reused else "")
     )
     lines += [
         f"slope {curve.sampler}: {curve.slope:.3f} +- {curve.slope_error:.3f}" for curve in result.curves
@@ -58,9 +58,9 @@ def convergence_table(result: Convergence) -> str:
 
 
 def advantage(result: Convergence, count: int, rmse: float) -> float:
-    """How many times as many samples random sampling needs for this error, by its fitted line."""
-    scale = [curve for curve in result.curves if curve.sampler == "random"]
-    return scale[0].count_for(rmse) / count if scale else math.nan
+    """Factor by which random sampling needs more samples for this error, from its fitted line."""
+    random = [curve for curve in result.curves if curve.sampler == "random"]
+    return random[0].count_for(rmse) / count if random else math.nan
 
 
 def _times(factor: float) -> str:
@@ -68,7 +68,7 @@ def _times(factor: float) -> str:
 
 
 def convergence_csv(result: Convergence) -> str:
-    """A line per picture."""
+    """A line per image."""
     rows = [
         (
             result.scene, result.camera, result.layer, result.width, result.height, result.vary,
@@ -84,7 +84,7 @@ def convergence_csv(result: Convergence) -> str:
 
 def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str:
     """Error over samples, drawn with characters on logarithmic axes."""
-    # the marks, and the range of each axis
+    # The markers, and the range of each axis.
     dots = [
         (math.log2(p.count), math.log2(p.rmse), SAMPLERS[curve.sampler].mark)
         for curve in curves
@@ -97,14 +97,14 @@ def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str
         sorted([*values, values[0]]) for values in list(zip(*dots, strict=True))[:2]
     )
 
-    # marks at their places
+    # Put the markers into a field of characters.
     field = [[" "] * width for _ in range(height)]
     for x, y, mark in dots:
         column = round((x - left) / ((right - left) or 1) * (width - 1))
         row = round((high - y) / ((high - low) or 1) * (height - 1))
         field[row][column] = mark
 
-    # axes and legend
+    # Add axes and legend.
     edges = {0: f"{2**high:.2g}", height - 1: f"{2**low:.2g}"}
     lines = [f"{edges.get(k, ''):>8} |{''.join(line).rstrip()}" for k, line in enumerate(field)]
     ends = f"{2**left:.0f}".ljust(width - 8) + f"{2**right:.0f}".rjust(8)

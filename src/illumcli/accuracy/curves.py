@@ -23,7 +23,7 @@ class Run(Value):
     rmse: float
     """Against the reference, whose own error is subtracted."""
     content: str
-    """Hash of all that the error depends on."""
+    """Hash of everything that the error depends on."""
 
 
 class Point(Value):
@@ -31,7 +31,7 @@ class Point(Value):
 
     pixel: int
     obscurance: int
-    count: int  # samples or rays per pixel, which are doubled from point to point
+    count: int  # samples or rays per pixel; doubles from point to point
     rays: int
     seconds: float  # median
     rmse: float  # over all repeats
@@ -49,20 +49,20 @@ class Curve(Value):
     constant: float
 
     def count_for(self, rmse: float) -> float:
-        """How many samples have this error, by the fitted line; nan where there is none."""
+        """Number of samples with this error, from the fitted line; nan if there is none."""
         if not (rmse > 0 and self.slope < 0):
             return math.nan
         return math.exp((math.log(rmse) - self.constant) / self.slope)
 
 
 def rmse_of(values: NDArray[np.float32], truth: NDArray[np.float64], reference: float) -> float:
-    """Root of the mean squared difference, less the error of the reference itself; at least 0."""
+    """Root mean squared difference, with the squared error of the reference subtracted; at least 0."""
     square = np.square(values - truth).mean() - reference**2
     return math.sqrt(max(float(square), 0.0))
 
 
 def point_of(sampling: Sampling, count: int, runs: Sequence[Run]) -> Point:
-    """The repeats at one sampling, pooled."""
+    """The point of all repeats at one sampling."""
     errors = np.array([run.rmse for run in runs])
     pooled = math.sqrt(np.square(errors).mean())
     spread = float(errors.std(ddof=1) / math.sqrt(len(errors))) if len(errors) > 1 else math.nan
@@ -78,7 +78,7 @@ def curve_through(sampler: str, points: Sequence[Point]) -> Curve:
 
 
 def fit_line(pairs: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
-    """Slope, its standard error and constant by least squares; nan where the pairs do not determine them."""
+    """Slope, its standard error and constant by least squares; nan if the pairs do not determine them."""
     x, y = np.array(pairs, np.float64).reshape(-1, 2).T
     squares = float(np.square(x - x.mean()).sum()) if len(x) else 0.0
     if squares == 0:

@@ -1,4 +1,4 @@
-"""One layer of a scene rendered at any sampling, all of it or some pixels, to measure its error."""
+"""Renders one layer of a scene at any sampling, the whole image or some pixels, to measure its error."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from illumcli.scene.spec import Scene
 
 
 class Sampling(Value):
-    """How finely an image is sampled, and with which random numbers."""
+    """The sampling of an image: counts, sampler and seed."""
 
-    pixel: int  # samples per pixel; 1 looks through the pixel's centre
+    pixel: int  # samples per pixel; a single one is at the pixel's centre
     obscurance: int  # rays per sample
     sampler: str
     seed: int
@@ -42,7 +42,7 @@ class Sampling(Value):
 
 
 OF_SAMPLING = ("obscurance_method",)
-"""Buffers that no tile changes and the sampling does."""
+"""Buffers of the whole scene that depend on the sampling."""
 
 
 class SampledLayer(Record):
@@ -59,7 +59,7 @@ class SampledLayer(Record):
         return self.loaded.scene
 
     def seen_by(self, view: View) -> SampledLayer:
-        """The same from another view, all of whose pixels get all samples."""
+        """The same layer from another view, without adaptive sampling."""
         if view.camera.fit is not None:
             name = f"camera:{view.name}"
             self._compute(build(self.scene, self.loaded).topological_order([name]))
@@ -67,13 +67,13 @@ class SampledLayer(Record):
         return replace(self, view=replace(view, adaptive=None))
 
     def _compute(self, nodes: Iterable[Node]) -> None:
-        """Compute what is not shared yet."""
+        """Compute the buffers that are missing or depend on the sampling."""
         for node in nodes:
             if node.output not in self.shared or node.output in OF_SAMPLING:
                 self.shared[node.output] = node.run(self.shared)
 
     def planned(self, sampling: Sampling) -> Plan:
-        """The plan at a sampling; the buffers of the whole scene are computed."""
+        """The plan at a sampling; computes the buffers of the whole scene."""
         update: dict[str, Any] = {"seed": sampling.seed}
         if self.scene.obscurance is not None:
             finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
@@ -102,7 +102,7 @@ class SampledLayer(Record):
         return layers[self.layer.name].astype(np.float64), sum(run.stats.rays.values())
 
     def random_pixels(self, count: int, purpose: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Columns and rows of `count` pixels drawn at random; of all of them where they are fewer."""
+        """Columns and rows of `count` pixels drawn at random, or of all pixels if there are fewer."""
         pixels = self.view.width * self.view.height
         random = np.random.default_rng(stream(self.scene.seed, purpose))
         y, x = np.divmod(np.sort(random.choice(pixels, min(count, pixels), replace=False)), self.view.width)
@@ -116,12 +116,12 @@ def sampled_layer(
     camera: str | None = None,
     width: int | None = None,
 ) -> SampledLayer:
-    """A scene's layer, ready to be sampled.
+    """A scene's layer, ready to be rendered at any sampling.
 
     Parameters
     ----------
     name : str
-        Of a layer that is the mean of its pixels' samples; data layers such as depth have no error.
+        A layer that is the mean of a pixel's samples; data layers such as depth have no error.
     camera : str, optional
         By default the first.
     width : int, optional
@@ -136,7 +136,7 @@ def sampled_layer(
     view = chosen_view(views(loaded.scene), camera)
     if len(outputs) != 1 or outputs[0].data:
         raise InputError(
-            f"layer '{name}' is no mean of a pixel's samples; take beauty, ambient, obscurance or one light"
+            f"layer '{name}' is not a mean of samples; take beauty, ambient, obscurance or one light"
         )
     if width is not None and view.width > width:
         view = replace(view, width=width, height=max(1, round(view.height * width / view.width)))

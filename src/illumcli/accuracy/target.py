@@ -1,8 +1,8 @@
-"""Choose sample counts for an image of a given error, and measure the error of that image.
+"""Chooses sample counts for a target error, and measures the error of the image.
 
-Choosing counts by the samples of the image would bias it. Instead, pilots with other random numbers render
+Choosing counts by the image's own samples would bias it. Instead, pilots with other random numbers render
 some pixels twice: half the mean squared difference of the pairs is an unbiased estimate of the image's mean
-squared error. The image itself then has fixed counts, as if the scene had named them.
+squared error. The image itself then has fixed counts, as if the scene had set them.
 
 References
 ----------
@@ -28,20 +28,20 @@ from illumcli.render_graph.schedule import outputs_of, reached
 from illumcli.scene.load import load
 
 MIN_PIXELS, FILM_SHARE = 4000, 50
-"""Pixels that a pilot renders twice: one in 50 of the film, but at least so many, since few hold edges."""
+"""Pixels that a pilot renders twice: one in 50 of the film, but at least 4000, since few contain edges."""
 SEEDS = 8
-"""Pairs of seeds that share a pilot's pixels."""
+"""Pairs of seeds of a pilot, each for an equal part of its pixels."""
 MAX_SAMPLES = 4096
 """Samples per pixel, at most."""
 RAYS = (4, 16)
-"""Rays per sample that pilots try; from half of the least to twice the most are chosen."""
+"""Obscurance rays per sample of the pilots; the choice is between half the first and twice the second."""
 ATTEMPTS = 8
 MARGIN = 0.9
-"""Share of the target that pilots must stay below: they measure the error to a tenth."""
+"""Factor on the target: pilots measure the error to about a tenth."""
 SAMPLE_COST = 8
 """Cost of a camera sample, counted in obscurance rays."""
 STEEPEST, FLATTEST = 2.0, 1.0
-"""Powers of a fitted variance law: at most the square of the count, at least that of independent samples."""
+"""Bounds of the exponent of a variance law: 1 is independent samples."""
 
 
 class VarianceLaw(Value):
@@ -54,7 +54,7 @@ class VarianceLaw(Value):
     def through(
         cls, few: tuple[int, float], many: tuple[int, float], flattest: float = FLATTEST
     ) -> VarianceLaw:
-        """The law through the variances at two counts; 0 where neither has a variance."""
+        """The law through the variances at two counts, given as (count, variance); 0 if both are 0."""
         (n, v), (m, w) = few, many
         if v <= 0 or w <= 0:
             return cls(max(v * n**flattest, w * m**flattest), flattest)
@@ -78,28 +78,28 @@ class SamplingChoice(Record):
 
     @property
     def overrides(self) -> tuple[str, ...]:
-        """The counts as `-D` gives them."""
+        """The counts in the form of `-D`."""
         overrides = [f"film.samples={self.sampling.pixel}"]
         scene = self.layers[0].scene
-        if scene.film.adaptive is not None:  # every pixel counts for the error that was asked for
+        if scene.film.adaptive is not None:  # the choice is for images without adaptive sampling
             overrides.append("film.adaptive=null")
         for name, camera in scene.named_cameras().items():
             if camera.samples is not None:
-                place = f"cameras.{name}" if scene.cameras else "camera"
-                overrides.append(f"{place}.samples={self.sampling.pixel}")
+                path = f"cameras.{name}" if scene.cameras else "camera"
+                overrides.append(f"{path}.samples={self.sampling.pixel}")
         if self.sampling.obscurance:
             overrides.append(f"obscurance.samples={self.sampling.obscurance}")
         return tuple(overrides)
 
     def reached(self) -> float:
-        """RMSE of the image, the largest of all cameras: one in 50 of its pixels, paired with other samples
-        of the same counts."""
+        """RMSE of the image, the largest over the cameras: one in 50 of its pixels is rendered again, with
+        the same counts and other random numbers."""
         rendered = replace(self.sampling, seed=self.layers[0].scene.seed)
         pairs = [paired_error(each, rendered, "reached", rendered.seed) for each in self.layers]
         return math.sqrt(max(variance for variance, _ in pairs))
 
     def as_data(self) -> dict[str, float]:
-        """The choice as reports hold it."""
+        """The choice for reports."""
         return {
             "target": self.target,
             "reached": self.reached(),
@@ -120,16 +120,16 @@ def choose_sampling(
 ) -> SamplingChoice:
     """Samples per pixel and obscurance rays per sample that reach the RMSE `target` at the least cost.
 
-    The error is that of the first layer asked for that is a mean of samples, `beauty` where it is among them.
+    The error is that of `beauty` if it is requested, otherwise of the first layer that is a mean of samples.
 
     Raises
     ------
     InputError
         No layer has an error.
     LimitError
-        The target takes more than `MAX_SAMPLES` samples per pixel.
+        The target needs more than `MAX_SAMPLES` samples per pixel.
     """
-    # the layer, and whether it casts obscurance rays
+    # The layer, and whether it casts obscurance rays.
     loaded = load(path, overrides)
     if seed is not None:
         loaded = replace(loaded, scene=loaded.scene.model_copy(update={"seed": seed}))
@@ -137,15 +137,13 @@ def choose_sampling(
     refuse_rays(graph, outputs)
     means = [layer for layer in outputs if not layer.data]
     if not means:
-        raise InputError(
-            f"{path}: no layer asked for is a mean of samples; --target-error has nothing to reach"
-        )
+        raise InputError(f"{path}: no requested layer is a mean of samples; --target-error needs one")
     layer = min(means, key=lambda layer: layer.buffer != "beauty")
     first = sampled_layer(loaded, layer.name, threads)
     layers = tuple(map(first.seen_by, graph.views))
     has_rays = "obscurance" in reached(graph, outputs) and loaded.scene.obscurance is not None
 
-    # counts of least cost by the pilots' laws, until pairs at these counts confirm them
+    # The counts of least cost by the pilots' laws, with a lower aim until pairs at these counts confirm it.
     pilots = [Pilot(each, has_rays) for each in layers]
     goal = (MARGIN * target) ** 2
     aim, rays = goal, 0
@@ -167,7 +165,7 @@ def choose_sampling(
 
 
 class Pilot:
-    """Laws of a layer's variance, from some pixels that are rendered twice at a few counts."""
+    """Variance laws of a layer, fitted to some pixels that are rendered twice at a few counts."""
 
     def __init__(self, layer: SampledLayer, has_rays: bool) -> None:
         scene = layer.scene
@@ -177,8 +175,8 @@ class Pilot:
         self.laws = {each: self._law(layer, each) for each in (RAYS if has_rays else (0,))}
 
     def _law(self, layer: SampledLayer, each: int) -> VarianceLaw:
-        """Variance over samples per pixel, with so many rays each. One sample per pixel is not tried: pairs
-        of pixel centres cannot see its error at edges."""
+        """Variance over samples per pixel, with `each` rays per sample. It is not measured at one sample per
+        pixel, which is always at the pixel's centre: pairs do not show its error at edges."""
         variances = []
         for pixel in (2, 8):
             sampling = replace(self.sampling, pixel=pixel, obscurance=each)
@@ -189,14 +187,14 @@ class Pilot:
         return VarianceLaw.through(few, many)
 
     def variance(self, pixel: int, each: int) -> float:
-        """The variance at counts: a power law in the rays, through the laws at two numbers of rays."""
+        """The variance at counts: a power law in the rays per sample, through the laws at two of them."""
         if len(self.laws) == 1:
             return self.laws[0].at(pixel)
         few, many = ((rays, law.at(pixel)) for rays, law in self.laws.items())
         return VarianceLaw.through(few, many, flattest=0.0).at(each)
 
     def counts(self, aim: float, target: float) -> tuple[int, int]:
-        """Samples per pixel, a power of two, and rays per sample of least cost for a variance of `aim`.
+        """Samples per pixel, a power of two, and rays per sample for a variance of `aim`, at the least cost.
 
         Raises
         ------
@@ -211,8 +209,7 @@ class Pilot:
         ]
         if not enough:
             raise LimitError(
-                f"an error of {target:g} takes more than {MAX_SAMPLES} samples per pixel; aim for a larger "
-                "one"
+                f"an error of {target:g} needs more than {MAX_SAMPLES} samples per pixel; choose a larger one"
             )
         _, pixel, each = min(enough)
         return pixel, each
@@ -221,19 +218,19 @@ class Pilot:
 def paired_error(
     layer: SampledLayer, sampling: Sampling, purpose: str, seed: int | None = None
 ) -> tuple[float, int]:
-    """Mean square error at a sampling, from pairs of renderings of some pixels, and the rays it took.
+    """Mean square error at a sampling, from pairs of renders of some pixels, and the rays that were cast.
 
-    One of each pair has the random numbers of `seed` where it is given; all others depend on `purpose`. The
-    pixels are divided into groups of different seeds: the pattern of rays over the film differs from seed to
-    seed by one shift for all pixels, so that two seeds alone may agree everywhere by chance.
+    If `seed` is given, one render of each pair has its random numbers; those of all others depend on
+    `purpose`. The pixels are divided into groups with different seeds: the patterns of two seeds differ by
+    one shift for all pixels of the film, so a single pair of seeds may agree everywhere by chance.
     """
-    # pixels at random, in groups
+    # Random pixels, in groups.
     x, y = layer.random_pixels(max(MIN_PIXELS, layer.view.width * layer.view.height // FILM_SHARE), purpose)
-    mix = np.random.default_rng(0).permutation(len(x))
+    shuffled = np.random.default_rng(0).permutation(len(x))
 
-    # both renderings of each group
+    # Both renders of each group.
     square, rays = 0.0, 0
-    for group, index in enumerate(np.array_split(mix, SEEDS)):
+    for group, index in enumerate(np.array_split(shuffled, SEEDS)):
         seeds = [stream(layer.scene.seed, f"{purpose}:{group}:{half}") for half in "ab"]
         first_seed = seeds[0] if seed is None else seed
         a, first = layer.render_pixels(replace(sampling, seed=first_seed), x[index], y[index])

@@ -140,9 +140,7 @@ def _described(
         for step in steps[:-1]:
             here = here.setdefault(step, {})
             if not isinstance(here, dict):
-                return None, [
-                    f"-D {text}: nothing is inside {step}, which has a value of its own; give it whole"
-                ]
+                return None, [f"-D {text}: {step} is a value and has no parts; replace the whole"]
         here[steps[-1]] = value
         text_of[steps] = text
 

@@ -1,4 +1,4 @@
-"""Which files a scene may read and write: those in the folders near it, and in those of ILLUM_ALLOW."""
+"""Which files a scene may read and write: files in the folders near it, and in those of ILLUM_ALLOW."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ PATHS = ("file", "texture", "obscurance")  # keys whose text is a path, besides 
 
 
 def resolve(loaded: SceneFile, path: str) -> Path:
-    """The file that a scene means by `path`: regular, and inside the folders it may read from.
+    """The file that a path in a scene names: a regular file inside the folders that the scene may read.
 
     Raises
     ------
     InputError
-        With the place in the scene, and the way out.
+        No such file, or outside of these folders; with the place in the scene.
     """
     file = file_inside(path, loaded.folder, loaded.roots)
     if isinstance(file, Path):
@@ -36,9 +36,17 @@ def resolve(loaded: SceneFile, path: str) -> Path:
 
 
 def refuse_outside(loaded: SceneFile, number: int, path: Path) -> None:
-    """Raise InputError where the pattern of this number in `outputs.files` leads to `path`, outside the
-    folders that the scene may read from, or holds control characters. Links are followed; a pattern that `-D`
-    gives may lead anywhere."""
+    """Raise InputError if a name pattern of a scene leads outside of the folders that it may write to.
+
+    Also if the pattern has control characters. Links are followed. A pattern from `-D` may lead anywhere.
+
+    Parameters
+    ----------
+    number : int
+        Index of the pattern in `outputs.files`.
+    path : Path
+        The file that it names.
+    """
     at = ("outputs", "files", number)
     node = loaded.tree.find(at)
     if node is None or node.place.source.startswith("-D "):
@@ -47,7 +55,7 @@ def refuse_outside(loaded: SceneFile, number: int, path: Path) -> None:
         fact = f"character U+{ord(control[0]):04X} is not text; take it out of the name"
         raise InputError(message_at(loaded, at, fact))
     folder = Path(os.path.realpath(path)).parent
-    with suppress(OSError):  # a plain name is safe wherever the user stands, be it the top of the disk
+    with suppress(OSError):  # a plain name is allowed in any current folder, even in the root folder
         if folder == Path.cwd().resolve():
             return
     if not any(folder.is_relative_to(root) for root in loaded.roots):
@@ -58,7 +66,7 @@ def refuse_outside(loaded: SceneFile, number: int, path: Path) -> None:
 
 
 def file_problems(loaded: SceneFile) -> list[str]:
-    """What is wrong with each path in the scene, a line each."""
+    """One line for each faulty path in the scene."""
     files = [
         (at, node, file_inside(str(node.value), loaded.folder, loaded.roots))
         for at, node in paths_in(loaded.tree)
@@ -67,7 +75,7 @@ def file_problems(loaded: SceneFile) -> list[str]:
 
 
 def paths_in(tree: Node) -> Iterator[tuple[source.Path, Node]]:
-    """The texts of a tree that are paths of files."""
+    """The nodes of a tree whose text is the path of a file."""
     for path, node in tree.places():
         key = path[-1] if path else None
         if isinstance(node.value, str) and (key in PATHS or (key == "mesh" and "." in node.value)):
@@ -75,7 +83,8 @@ def paths_in(tree: Node) -> Iterator[tuple[source.Path, Node]]:
 
 
 def readable_folders(folder: Path) -> tuple[Path, ...]:
-    """The scene's folder, its parent and the current one, none of them the whole disk; those allowed."""
+    """The scene's folder, its parent, the current one and those of ILLUM_ALLOW; the first three only if they
+    are not the root folder."""
     near = [each.resolve() for each in (folder, folder.resolve().parent)]
     with suppress(OSError):  # a current folder that was removed opens nothing
         near.append(Path.cwd().resolve())
@@ -84,7 +93,7 @@ def readable_folders(folder: Path) -> tuple[Path, ...]:
 
 
 def file_inside(text: str, folder: Path, roots: Sequence[Path]) -> Path | str:
-    """The file at `text`, or what is wrong with it; outside the roots nothing is looked at."""
+    """The file at `text`, or what is wrong with it. Outside of the roots the disk is not accessed."""
     path = folder / text
     try:
         target = path.resolve()
@@ -99,7 +108,7 @@ def file_inside(text: str, folder: Path, roots: Sequence[Path]) -> Path | str:
 
 
 def _near(path: Path) -> str:
-    """The way out of a misspelt name: the nearest name in its folder."""
+    """Advice for a file that does not exist: the nearest name in its folder."""
     try:
         names = tuple(sorted(each.name for each in path.parent.iterdir()))
     except OSError:

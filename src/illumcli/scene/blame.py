@@ -1,4 +1,8 @@
-"""Finds the override that causes a fault: the last one without which the scene does not have it."""
+"""Attributes faults of a scene to the overrides that cause them.
+
+An override causes a fault if the scene did not have the fault before it was applied. So if a scene has
+faults, its trees before each override are validated, too.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ _PLAIN = re.compile(r"[A-Za-z_][\w./-]*")
 
 
 class PlacedFault(NamedTuple):
-    """A fault of a tree and where a reader looks for it."""
+    """A fault of a scene's tree, with its place in a file or override."""
 
     place: Place
     path: source.Path
@@ -23,7 +27,7 @@ class PlacedFault(NamedTuple):
 
 
 class Applied(NamedTuple):
-    """An override, and the scene's tree before it."""
+    """An override, and the scene's tree before it was applied."""
 
     change: Override
     before: Node
@@ -35,39 +39,51 @@ def blamed(
     applied: Sequence[Applied],
     faults_of: Callable[[Node], Sequence[PlacedFault]],
 ) -> Iterator[Problem | PlacedFault]:
-    """Each fault of `tree` that stands in a file, but comes from an override, as a problem of that; the
-    others as they are.
+    """The faults of `tree`; those in a file that an override causes become problems at the override.
 
-    `faults_of` gives the faults of a tree. A fault is the same in two trees where its place and its fact are.
+    Parameters
+    ----------
+    tree_faults : sequence of PlacedFault
+        The faults of `tree`, which has all overrides.
+    applied : sequence of Applied
+        The overrides in order.
+    faults_of : callable
+        The faults of a tree. Faults of two trees are the same if place and text are.
     """
-    written = [fault for fault in tree_faults if fault.place.line]
-    known = (
-        [{(each.place, each.fact) for each in faults_of(step.before)} for step in applied] if written else []
+    # The faults before each override; a fault whose place is an override needs no search.
+    in_files = [fault for fault in tree_faults if fault.place.line]
+    before = (
+        [{(each.place, each.fact) for each in faults_of(step.before)} for step in applied] if in_files else []
     )
-    left_over: dict[int, list[PlacedFault]] = {}
+
+    # The last override before which the scene did not have the fault causes it.
+    unsuited: dict[int, list[PlacedFault]] = {}
     for fault in tree_faults:
-        new = [k for k, faults in enumerate(known) if (fault.place, fault.fact) not in faults]
-        if not fault.place.line or not new:
+        without = [k for k, faults in enumerate(before) if (fault.place, fault.fact) not in faults]
+        if not fault.place.line or not without:
             yield fault
-        elif _is_left_over(fault, applied[new[-1]].change, tree):
-            left_over.setdefault(new[-1], []).append(fault)
+        elif _is_unsuited(fault, applied[without[-1]].change, tree):
+            unsuited.setdefault(without[-1], []).append(fault)
         else:
-            yield Problem(applied[new[-1]].change.value.place, fault.path, fault.fact)
-    for k, faults in left_over.items():
+            yield Problem(applied[without[-1]].change.value.place, fault.path, fault.fact)
+
+    # One problem for all keys that an override of a tag (`model: phong`) makes unknown.
+    for k, faults in unsuited.items():
         change = applied[k].change
-        yield Problem(change.value.place, (), _left_over(change, [fault.path for fault in faults], tree))
+        yield Problem(change.value.place, (), _unsuited_keys(change, [fault.path for fault in faults], tree))
 
 
-def _is_left_over(fault: PlacedFault, change: Override, tree: Node) -> bool:
-    """Is it a key that does not suit its neighbour, which the override changed?"""
+def _is_unsuited(fault: PlacedFault, change: Override, tree: Node) -> bool:
+    """True if the fault is a key that became unknown because the override changed the tag beside it."""
     if len(fault.path) != len(change.steps) or not fault.fact.startswith("unknown key "):
         return False
-    neighbour = tree.find((*fault.path[:-1], change.steps[-1]))
-    return neighbour is not None and neighbour.place == change.value.place
+    tag = tree.find((*fault.path[:-1], change.steps[-1]))
+    return tag is not None and tag.place == change.value.place
 
 
-def _left_over(change: Override, paths: Sequence[source.Path], tree: Node) -> str:
-    """What an override left behind that says what its part is, and how to replace the whole part."""
+def _unsuited_keys(change: Override, paths: Sequence[source.Path], tree: Node) -> str:
+    """Message for an override of a tag: the keys that no longer suit it, and how to replace the part."""
+    # The part without those keys.
     *above, key = change.steps
     kind = NAMED[above[0]] if len(above) == 2 and above[0] in NAMED else above[-1]
     part = tree.find(paths[0][:-1])
@@ -75,6 +91,7 @@ def _left_over(change: Override, paths: Sequence[source.Path], tree: Node) -> st
     names = [str(path[-1]) for path in paths]
     values = part.plain()
     kept = {key: values[key]} | {name: value for name, value in values.items() if name not in names}
+
     listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     return (
         f"leaves {listed}, which {kept[key]} does not have; replace the whole {kind}, as "

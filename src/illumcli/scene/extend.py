@@ -1,4 +1,4 @@
-"""Scenes that extend others: files read one after the other, their trees merged."""
+"""Scenes that extend others: reads the files and merges their trees."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from illumcli.scene.access import file_inside, paths_in
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
 from illumcli.schema.messages import describe
 
-MAX_EXTENDS = 8  # files, one extending the next
+MAX_EXTENDS = 8  # length of a chain of files, each of which extends the next
 MAX_FILES = 64
-CHOICES = ("model", "shape", "falloff", "law", "D", "F")  # keys that tell what a mapping is
+CHOICES = ("model", "shape", "falloff", "law", "D", "F")  # keys that are the tag of a mapping
 
 
 @dataclass
 class SceneReader:
-    """Scene files being read, one extending the next."""
+    """Reads a scene file and the files that it extends; collects the problems of all."""
 
     roots: tuple[Path, ...]
     problems: list[Problem] = field(default_factory=list)
@@ -28,8 +28,8 @@ class SceneReader:
     nodes: int = 0
 
     def file(self, path: Path, above: tuple[Path, ...]) -> Node | None:
-        """The tree of a scene with all it extends; `above` are the files that led here."""
-        # read the text
+        """The tree of a scene file, merged with all that it extends; `above` are the files that extend it."""
+        # Read the text.
         self.files += 1
         try:
             with path.open("rb") as stream:
@@ -39,7 +39,7 @@ class SceneReader:
             self.problems.append(Problem(Place(str(path)), (), f"cannot be read: {fact}"))
             return None
 
-        # read its tree, within the limits for all files together
+        # Parse it, within the limits for all files together.
         tree, problems = source.read(text, str(path))
         self.problems += problems
         if tree is None or not isinstance(tree.value, dict):
@@ -52,7 +52,7 @@ class SceneReader:
             self.problems.append(Problem(tree.place, (), f"more than {MAX_NODES} parts with all it extends"))
             return None
 
-        # merge the scenes that it extends in turn, and itself on top
+        # Merge the scenes that it extends in turn, and this one on top.
         entries = dict(tree.value)
         extends = entries.pop("extends", None)
         tree = replace(tree, value=entries)
@@ -67,7 +67,7 @@ class SceneReader:
         return tree if base is None else merged(base, tree)
 
     def base(self, node: Node, path: Path, above: tuple[Path, ...]) -> Node | None:
-        """The tree of one file that `path` extends, its own paths rewritten from the folder of `path`."""
+        """The tree of one file that `path` extends, with its paths made relative to the folder of `path`."""
         if fact := self.refusal(node, path, above):
             self.problems.append(Problem(node.at, ("extends",), fact))
             return None
@@ -76,14 +76,14 @@ class SceneReader:
         return _moved(tree, folder) if tree and folder else tree
 
     def refusal(self, node: Node, path: Path, above: tuple[Path, ...]) -> str | None:
-        """What is wrong with the file that `path` extends; None where nothing is."""
+        """Why the file that `path` extends is refused; None if it is not."""
         if not isinstance(node.value, str):
             return f"must be the path of a scene, is {describe(node.value)}"
         file = file_inside(node.value, path.parent, self.roots)
         if isinstance(file, str):
             return file
         if any(file.samefile(each) for each in above):
-            return f"{node.value} extends itself; take one extends: away"
+            return f"{node.value} extends itself; remove one extends:"
         if len(above) > MAX_EXTENDS:
             return f"more than {MAX_EXTENDS} files, each extending the next"
         return f"more than {MAX_FILES} files in all" if self.files >= MAX_FILES else None
@@ -92,7 +92,7 @@ class SceneReader:
 def merged(base: Node, over: Node) -> Node:
     """`over` on top of `base`: mappings merge, anything else replaces, `null` removes.
 
-    A mapping with a key that tells what it is (`model: phong`) replaces one that is something else.
+    A mapping with another tag (`model: phong`) replaces the one below instead of merging with it.
     """
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
@@ -108,7 +108,7 @@ def merged(base: Node, over: Node) -> Node:
 
 
 def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
-    """What a mapping is, by its keys. A mesh or material named like one is no text."""
+    """The tag of a mapping, from its keys; a mesh or material that is named like a tag is not text."""
     texts = {key: node.value for key, node in entries.items() if isinstance(node.value, str)}
     return {key: value for key, value in texts.items() if key in CHOICES} | {
         key: True for key in ("file", "texture", "vertex") if key in texts
@@ -116,7 +116,7 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
 
 
 def _moved(tree: Node, folder: str) -> Node:
-    """The tree with its paths, written from `folder`, rewritten from the folder above."""
+    """The tree with its paths, which are relative to `folder`, made relative to the folder above."""
     for path, node in list(paths_in(tree)):
         tree = _with(tree, path, replace(node, value=os.path.join(folder, str(node.value))))
     return tree

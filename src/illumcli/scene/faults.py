@@ -1,4 +1,4 @@
-"""pydantic's errors in the words of a scene file: which part, and what is wrong with it."""
+"""Translates pydantic's errors into faults of a scene: the path of a part, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from illumcli.schema.description import Description
 from illumcli.schema.families import Family, UnknownMember, member, tag_of, tags
 from illumcli.schema.messages import no_choice, sentence, short, suggestion, wrong_length
 
-Fault = tuple[Path, str]  # which part, what is wrong
+Fault = tuple[Path, str]  # path of the part, what is wrong with it
 
 
 def faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterator[Fault]:
@@ -23,7 +23,7 @@ def faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterato
     ----------
     error : ValidationError
     cls : type of Description
-        What refused `tree`.
+        The class that refused `tree`.
     tree
         What was validated: dicts, lists and scalars.
     """
@@ -56,8 +56,7 @@ def _faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterat
                 yield path, f"no {_key(annotation)} '{short(tag)}'; {suggestion(tag, known)}"
             case "union_tag_not_found":
                 yield path, f"missing key '{_key(annotation)}'"
-            case _:
-                # an error of a type of our own has our own text
+            case _:  # errors that validators of this package raise already have their message
                 yield path, sentence(kind, context, value) or fault["msg"]
         if isinstance(unknown := context.get("error"), UnknownMember):
             mapping = part_at(path[:-1], tree)
@@ -66,9 +65,9 @@ def _faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterat
 
 
 def _located(loc: tuple[str | int, ...], cls: type[Description], tree: Any) -> tuple[Path, Any]:
-    """The steps of an error's location that stand in the file, and the annotation of what it is about.
+    """The steps of an error's location that are in the file, and the annotation of the part.
 
-    The others name a choice of a union, or belong to what a short form stands for.
+    Other steps name a choice of a union, or are in the long form of a value that the file has in short form.
     """
     path: list[str | int] = []
     annotation: Any = cls
@@ -96,7 +95,7 @@ def _key(annotation: Any) -> Any:
 
 
 def part_at(path: Path, tree: Any) -> Any:
-    """The part of `tree` at `path`; a value equal to nothing else where there is none."""
+    """The part of `tree` at `path`; `_NOTHING` if there is none."""
     for step in path:
         is_inside = step in tree if isinstance(tree, dict) else isinstance(step, int) and step < _count(tree)
         if not is_inside:
@@ -113,7 +112,7 @@ _NOTHING = object()
 
 
 def _short_lists(error: ValidationError) -> dict[tuple[str | int, ...], int]:
-    """Lists with too few parts, and how many they need: pydantic names each missing one."""
+    """Lists with too few elements, and how many they need; pydantic reports each missing one."""
     lengths: dict[tuple[str | int, ...], int] = {}
     for fault in error.errors(include_url=False, include_context=False, include_input=False):
         *above, last = fault["loc"] or ("",)
@@ -123,9 +122,9 @@ def _short_lists(error: ValidationError) -> dict[tuple[str | int, ...], int]:
 
 
 def _other_faults(family: Family, mapping: Mapping[str, Any]) -> Iterator[Fault]:
-    """What else is wrong with a mapping whose tag is misspelt: by the member that is meant.
+    """Other faults of a mapping whose tag is misspelt, according to the member with the nearest tag.
 
-    Where none is near, a key that every member that has it refuses.
+    If no tag is near: the faults of each key that all members with this key refuse.
     """
     if meant := family.meant(mapping):
         yield from _faults_as(meant, family.tag, mapping)
@@ -142,7 +141,7 @@ def _other_faults(family: Family, mapping: Mapping[str, Any]) -> Iterator[Fault]
 
 
 def _faults_as(cls: type[Description], tag: str, mapping: Mapping[str, Any]) -> Iterator[Fault]:
-    """What is wrong with a mapping as a member of a family, its tag aside."""
+    """The faults of a mapping as a member of a family, whatever its tag is."""
     as_member = {**mapping, tag: tag_of(cls)}
     try:
         cls.model_validate(as_member)

@@ -1,4 +1,4 @@
-"""Scene files: read, extend, override, validate; every problem at once."""
+"""Loads scene files: read, extend, override and validate; all problems are reported at once."""
 
 from __future__ import annotations
 
@@ -27,35 +27,35 @@ D = TypeVar("D", bound=Description)
 
 
 def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
-    """The scene in the file `path`, or the studio scene around `path` where that is a mesh.
+    """The scene in a file, or the studio scene with the mesh of a mesh file.
+
+    A scene may read files in its own folder, the folder above, the current one and those of ILLUM_ALLOW.
 
     Parameters
     ----------
     path : Path
         A scene, or a mesh file.
     overrides : sequence of str
-        `PATH=VALUE`, applied in turn; the value is YAML, and `null` takes a part away.
-
-    It may read files in its own folder, the folder above, the current one and those of ILLUM_ALLOW.
+        `PATH=VALUE`, applied in turn; the value is YAML, and `null` removes a part.
 
     Raises
     ------
     InputError
-        Every problem of the scene, by place.
+        All problems of the scene, ordered by place.
     """
     reader = SceneReader(readable_folders(path.parent))
     changes = [change for text in overrides if (change := parse(text, reader.problems))]
     settings = [change for change in changes if change.steps[0] == SETTINGS]
 
-    # the tree as written, or the studio's around a mesh
+    # The tree of the file, or of the studio with the mesh.
     if is_mesh_file(path):
         tree = _studio(path, settings, reader)
     else:
         tree = reader.file(path, ())
-        way_out = f"{path} is no mesh without a scene; change its camera and the transforms of its objects"
-        reader.problems += [Problem(change.value.place, (), way_out) for change in settings]
+        fact = f"{path} is not a mesh file; change its camera and the transforms of its objects"
+        reader.problems += [Problem(change.value.place, (), fact) for change in settings]
 
-    # overrides in turn; each with the tree before it, so that a fault can be traced to one
+    # Overrides in turn, each with the tree before it, so that a fault can be attributed to one.
     applied: list[Applied] = []
     if tree is not None:
         for change in changes:
@@ -63,7 +63,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
                 applied.append(Applied(change, tree))
                 tree = changed
 
-    # what the tree describes, or all that is wrong with it
+    # Validate the tree.
     scene = None if tree is None else _validated(Scene, tree, reader.problems, applied)
     if scene is None or tree is None or reader.problems:
         raise InputError(problem_lines(reader.problems, overrides))
@@ -72,7 +72,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
 
 
 def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> Node | None:
-    """The studio's scene around the mesh in the file `path`."""
+    """The tree of the studio scene with the mesh file `path`."""
     tree, given = reader.file(STUDIO, ()), Node({}, Place(str(STUDIO)))
     for change in settings:
         given = assign(given, change, reader.problems) or given
@@ -86,7 +86,7 @@ def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> No
 def _validated(
     kind: type[D], tree: Node, problems: list[Problem], applied: Sequence[Applied] = ()
 ) -> D | None:
-    """The description that a tree writes, or None after adding what is wrong with it to `problems`."""
+    """The description that a tree describes; None if it has faults, which are added to `problems`."""
     description, tree_faults = _judged(kind, tree)
     known = {problem.place for problem in problems}
     problems += [
@@ -98,7 +98,7 @@ def _validated(
 
 
 def _judged(kind: type[D], tree: Node) -> tuple[D | None, list[PlacedFault]]:
-    """The description that a tree writes, or None and what is wrong with it."""
+    """The description that a tree describes, or None and its faults."""
     plain = tree.plain()
     try:
         return kind.model_validate(plain), []

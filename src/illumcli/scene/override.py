@@ -21,7 +21,7 @@ NAMED = {
 
 
 class Override(Value):
-    """A value for the part of a scene at `steps`: keys, and numbers or names of list elements."""
+    """A value for the part of a scene at `steps`, which are keys, and numbers or names of list elements."""
 
     steps: tuple[str, ...]
     value: Node
@@ -30,11 +30,11 @@ class Override(Value):
 
 
 class _NoSuchPart(Exception):
-    """The path names nothing; the text says what there is."""
+    """The path names no part of the scene; the text lists the parts."""
 
 
 def parse(text: str, problems: list[Problem]) -> Override | None:
-    """The override that `PATH=VALUE` describes; None after adding what is wrong with it to `problems`."""
+    """The override that `PATH=VALUE` describes; None if it is malformed, which is added to `problems`."""
     place = Place(f"-D {text}")
     path, equals, value = text.partition("=")
     steps = tuple(path.strip().split("."))
@@ -49,7 +49,7 @@ def parse(text: str, problems: list[Problem]) -> Override | None:
 
 
 def assign(tree: Node, override: Override, problems: list[Problem]) -> Node | None:
-    """`tree` with the override's value in it; None after adding to `problems` why it has no such place."""
+    """`tree` with the override's value in it; None if the path does not exist (added to `problems`)."""
     try:
         return _put(tree, (), override.steps, override.value)
     except _NoSuchPart as fact:
@@ -58,7 +58,7 @@ def assign(tree: Node, override: Override, problems: list[Problem]) -> Node | No
 
 
 def _put(node: Node | None, path: tuple[str, ...], steps: tuple[str, ...], value: Node) -> Node | None:
-    """`node`, which stands at `path`, with `value` at `steps` below it; None where that removes it."""
+    """The node at `path` with `value` at `steps` below it; None if that removes it."""
     if not steps:
         return None if value.value is None else value
     here = node.value if node else None
@@ -69,16 +69,16 @@ def _put(node: Node | None, path: tuple[str, ...], steps: tuple[str, ...], value
     if node and isinstance(here, list):
         return _put_in_list(here, node, path, steps, value)
     name = ".".join(path)
-    raise _NoSuchPart(f"nothing is inside {name}, which is {describe(here)}; give it whole, as -D {name}=...")
+    raise _NoSuchPart(f"{name} is {describe(here)} and has no parts; replace the whole, as -D {name}=...")
 
 
 def _new(path: tuple[str, ...], steps: tuple[str, ...]) -> dict[str, Node]:
-    """What stands at `path` before anything is written there."""
+    """The empty mapping that is put at `path`, where the scene has nothing, to hold an override."""
     name = ".".join(path)
     if path in (("objects",), ("lights",)):
         raise _NoSuchPart(f"the scene has no {name}")
     if steps[0].isdigit():
-        raise _NoSuchPart(f"the scene does not say {name}; give it whole, as -D {name}=...")
+        raise _NoSuchPart(f"the scene has no {name}; give the whole, as -D {name}=...")
     return {}
 
 
@@ -105,7 +105,7 @@ def _put_in_list(
 
 
 def _index(parts: list[Node], path: tuple[str, ...], step: str) -> int:
-    """Which element of the list at `path` a step means: by number, by its name, or by its default name."""
+    """Index of the element of the list at `path` that a step names: by number, name or default name."""
     if step.isdigit() and step.isascii() and len(step) < 9:
         if int(step) < len(parts):
             return int(step)
@@ -117,7 +117,7 @@ def _index(parts: list[Node], path: tuple[str, ...], step: str) -> int:
 
 
 def _element_names(parts: list[Node], path: tuple[str, ...]) -> tuple[str, ...]:
-    """The names of objects and of lights as the scene knows them; other lists have none."""
+    """The names of objects or lights, default names included; elements of other lists have none."""
     if path not in (("objects",), ("lights",)):
         return ()
 
@@ -135,5 +135,5 @@ def _element_names(parts: list[Node], path: tuple[str, ...]) -> tuple[str, ...]:
 def _no(group: str, name: str, known: tuple[str, ...]) -> str:
     if group not in NAMED:
         return f"no part '{name}' in {group}; number its parts from 0"
-    way = suggestion(name, known) if known else f"the scene has no {group}"
-    return f"no {NAMED[group]} '{name}'; {way}"
+    advice = suggestion(name, known) if known else f"the scene has no {group}"
+    return f"no {NAMED[group]} '{name}'; {advice}"

@@ -1,4 +1,4 @@
-"""Lines about a scene: each problem once, in the order in which a reader finds them."""
+"""Problems of a scene as lines: each once, ordered by file, line and override."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from illumcli.scene.source import Path, Place, Problem
 
 
 def problem_at(place: Place, path: Path, fact: str) -> Problem:
-    """A problem with the part of `path` that its place does not say already: an override names its own."""
+    """A problem; if its place is an override, without the steps of `path` that the override shows already."""
     if place.source.startswith("-D "):
         path = path[place.source.partition("=")[0].count(".") + 1 :]
     return Problem(place, path, fact)
 
 
 def problem_lines(problems: Sequence[Problem], overrides: Sequence[str] = ()) -> list[str]:
-    """One line each, once: files as they were read, by line; then the overrides as they were given."""
+    """One line for each distinct problem: files in the order of reading, by line, then overrides in order."""
     read = [problem.place.source for problem in problems if problem.place.line]
     sources = list(dict.fromkeys([*read, *(f"-D {text}" for text in overrides)]))
 

@@ -1,4 +1,4 @@
-"""Names in a scene that lead nowhere, stand twice or exclude each other."""
+"""Faults of names in a scene: names that do not exist, that are used twice or that exclude each other."""
 
 from __future__ import annotations
 
@@ -16,13 +16,12 @@ from illumcli.schema.messages import suggestion
 
 
 def reference_faults(scene: Any) -> Iterator[Fault]:
-    """Every such fault with its path.
+    """All such faults with their paths.
 
     Parameters
     ----------
     scene
-        A `Scene`, or its text as dicts and lists, which may hold any other fault: what cannot be understood
-        is passed over.
+        A `Scene`, or its text as dicts and lists, which may have other faults: malformed parts are ignored.
     """
     yield from _camera_faults(scene)
     for i, thing in enumerate(_parts(_get(scene, "objects"))):
@@ -33,7 +32,7 @@ def reference_faults(scene: Any) -> Iterator[Fault]:
 
 
 def _camera_faults(scene: Any) -> Iterator[Fault]:
-    """Cameras beside a camera, and names of objects that are to fill the picture."""
+    """Both camera and cameras, and names of objects that cameras fit."""
     if _get(scene, "camera") is not None and _get(scene, "cameras"):
         yield ("camera",), "give either camera or cameras, not both"
     things = _parts(_get(scene, "objects"))
@@ -45,7 +44,7 @@ def _camera_faults(scene: Any) -> Iterator[Fault]:
 
 
 def _object_faults(scene: Any, thing: Any) -> Iterator[Fault]:
-    """Names of meshes and materials in one object, and its overrides of a material."""
+    """Names of meshes and materials in one object, and its overrides of material parameters."""
     meshes, materials = (_names(_get(scene, kind)) for kind in ("meshes", "materials"))
     mesh, material, fallback = (_get(thing, key) for key in ("mesh", "material", "fallback"))
     if isinstance(mesh, str) and mesh not in meshes and "." not in mesh:
@@ -61,7 +60,7 @@ def _object_faults(scene: Any, thing: Any) -> Iterator[Fault]:
 
 
 def _name_faults(kind: str, things: Any) -> Iterator[Fault]:
-    """Names that two objects or two lights share, default names among them, and lights called as a layer."""
+    """Names that two objects or two lights share, default names included, and lights named like a layer."""
     taken = {_default_name(kind, thing, i + 1) for i, thing in enumerate(things) if not _get(thing, "name")}
     for i, thing in enumerate(things):
         name = _get(thing, "name")
@@ -83,12 +82,12 @@ def _cameras(scene: Any) -> Iterator[tuple[Path, Any]]:
 
 
 def _default_name(kind: str, thing: Any, number: int) -> str:
-    """What the part of this number is called where its author does not say."""
+    """Name of the object or light of this number if the scene gives it none."""
     return f"{'object' if kind == 'objects' else _get(thing, 'light')}{number}"
 
 
 def _override_faults(material: Any, override: dict[str, Any]) -> Iterator[Fault]:
-    """Faults of the overrides alone; those of the material itself are found where it stands."""
+    """Faults of the overrides alone; those of the material are reported at its own place."""
     if isinstance(material, Description):
         base = dict(material)
     else:
@@ -108,8 +107,8 @@ def _override_faults(material: Any, override: dict[str, Any]) -> Iterator[Fault]
 
 def _no(kind: str, name: str, known: Mapping[str, Any]) -> str:
     plural = {"mesh": "meshes"}.get(kind, f"{kind}s")
-    way = suggestion(name, tuple(known)) if known else f"the scene has no {plural}"
-    return f"no {kind} '{name}'; {way}"
+    advice = suggestion(name, tuple(known)) if known else f"the scene has no {plural}"
+    return f"no {kind} '{name}'; {advice}"
 
 
 def _get(thing: Any, key: str) -> Any:

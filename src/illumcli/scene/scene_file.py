@@ -1,4 +1,4 @@
-"""A scene that was read: the description, and what was written to get it."""
+"""A scene that was read: its description, and the tree of the file that it comes from."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from illumcli.scene.unused import lacking, unused
 
 
 class SceneFile(Value):
-    """A valid scene and what was written to get it."""
+    """A valid scene, with the file and overrides that it comes from."""
 
     scene: Scene
     path: Path
     folder: Path
-    """Where the paths in the scene begin."""
+    """The folder that paths in the scene are relative to."""
     name: str
     """The file's name without its suffix."""
     overrides: dict[str, Any]
     """Value by path, as given with -D, for patterns of file names."""
     tree: Node = field(repr=False)
-    """The scene as written, extended and overridden, with the place of every part."""
+    """The file's tree after extension and overrides, with the place of every node."""
     roots: tuple[Path, ...] = field(repr=False)
     """The folders that the scene may read from."""
 
@@ -36,7 +36,7 @@ class SceneFile(Value):
 def unused_lines(
     loaded: SceneFile, scene: Scene, layers: Collection[str], files: Collection[str]
 ) -> list[str]:
-    """What stands in the scene and has no effect, a line each; arguments as those of `unused`."""
+    """One line for each key in the scene that has no effect; arguments as of `unused`."""
     parts = ((path, fact, loaded.tree.find(path)) for path, fact in unused(scene, layers, files))
     written = ((node.at, path, fact) for path, fact, node in parts if node is not None)
     return problem_lines(
@@ -45,10 +45,10 @@ def unused_lines(
 
 
 def lacking_lines(loaded: SceneFile, scene: Scene, layers: Collection[str]) -> list[str]:
-    """What pictures of the scene lack, a line each; arguments as those of `lacking`."""
+    """A line if images of the scene would be empty or black; arguments as of `lacking`."""
     return [message_at(loaded, path, fact) for path, fact in lacking(scene, layers)]
 
 
 def message_at(loaded: SceneFile, path: source.Path, fact: str) -> str:
-    """A line about a part of the scene, with its place."""
+    """A message about a part of the scene, with its place."""
     return str(problem_at((loaded.tree.find(path) or loaded.tree).at, path, fact))

@@ -1,8 +1,8 @@
-"""YAML text -> plain data in which every part knows its line and column.
+"""YAML text -> a tree of plain data, in which every node has its line and column.
 
-The text is read as events, so that depth, size and repetition are limited before anything is built. Numbers
+The text is read as events, so that depth, size and repetition are limited before anything is built. Scalars
 follow the core schema of YAML 1.2: `1e3` is a number, `012` is twelve, and `no`, `1:30` and dates are text.
-PyYAML itself follows YAML 1.1 and keeps the last of two equal keys; nothing else of ours imports it.
+PyYAML itself follows YAML 1.1 and keeps the last of two equal keys. No other module imports it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _WORDS: dict[str, Scalar] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-_WAYS_OUT = (  # words of the parser's messages -> what most often helps
+_ADVICE = (  # part of the parser's message -> what most often helps
     ("cannot start any token", "indent with spaces, not tabs, and quote text that begins with a sign"),
     ("mapping values are not allowed", "check the indentation, and quote text that holds ': '"),
     ("expected ':'", "write `key: value`"),
@@ -51,7 +51,7 @@ _WAYS_OUT = (  # words of the parser's messages -> what most often helps
 
 
 class Place(NamedTuple):
-    """Where something is written: a file with line and column from 1, or, at line 0, an override."""
+    """A place in a file, with line and column from 1; line 0 means that `source` is an override."""
 
     source: str
     line: int = 0
@@ -62,7 +62,7 @@ class Place(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """One fault: where it is written, which part of the scene it concerns, and what is wrong."""
+    """One fault: its place, the path of the part of the scene that it concerns, and what is wrong."""
 
     place: Place
     path: Path
@@ -76,21 +76,21 @@ class Problem(NamedTuple):
 
 @dataclass(slots=True)
 class Node:
-    """A part of a document: a scalar, a list of nodes or nodes by key. Treat it as read-only."""
+    """A part of a document: a scalar, a list of nodes, or a mapping from keys to nodes. Read-only."""
 
     value: Scalar | list[Node] | dict[str, Node]
     place: Place
-    key: Place | None = None  # of its own key, where it stands in a mapping
-    size: int = 1  # nodes, aliases written out
+    key: Place | None = None  # place of its key, if it is in a mapping
+    size: int = 1  # number of nodes, with aliases expanded
     depth: int = 1
 
     @property
     def at(self) -> Place:
-        """Where a reader looks for it: its key, or itself in a list."""
+        """The place that messages name: of its key if it has one, otherwise its own."""
         return self.key or self.place
 
     def plain(self) -> Any:
-        """Its value as dict, list, str, int, float, bool and None."""
+        """The value as dict, list, str, int, float, bool and None."""
         match self.value:
             case dict(entries):
                 return {key: node.plain() for key, node in entries.items()}
@@ -100,7 +100,7 @@ class Node:
                 return scalar
 
     def find(self, path: Path) -> Node | None:
-        """The node at `path`; None where nothing is written there."""
+        """The node at `path`; None if there is none."""
         node: Node | None = self
         for step in path:
             match node.value if node else None, step:
@@ -113,7 +113,7 @@ class Node:
         return node
 
     def places(self, path: Path = ()) -> Iterator[tuple[Path, Node]]:
-        """Every node with its path, in the order of the text."""
+        """All nodes with their paths, in the order of the text."""
         yield path, self
         match self.value:
             case dict(entries):
@@ -125,23 +125,24 @@ class Node:
 
 
 def read(text: bytes, name: str, fixed: Place | None = None) -> tuple[Node | None, list[Problem]]:
-    """The one document in `text`, and every problem found; the faulty scalars stay in it as text.
+    """The document in `text`, and all problems; faulty scalars remain in it as text.
 
     Parameters
     ----------
     text : bytes
         UTF-8, at most 1 MiB.
     name : str
-        The file, as places name it.
+        Name of the file in places.
     fixed : Place, optional
-        The place of every part, instead of line and column: for the value of an override.
+        The place of all nodes, instead of line and column: for the value of an override.
 
     Returns
     -------
     node : Node or None
-        None where the problems left nothing to go on with.
+        None if the problems left no document.
     problems : list of Problem
     """
+    # Refuse what is not a small text file.
     place = fixed or Place(name, 1, 1)
     if len(text) > MAX_BYTES:
         return None, [Problem(place, (), f"larger than {MAX_BYTES} bytes; a scene is a small text file")]
@@ -154,6 +155,7 @@ def read(text: bytes, name: str, fixed: Place | None = None) -> tuple[Node | Non
     if control := _CONTROL.search(decoded):
         at = fixed or _place_after(decoded[: control.start()], name)
         return None, [Problem(at, (), f"character U+{ord(control[0]):04X} is not text; remove it")]
+
     composer = _Composer(decoded, lambda mark: fixed or Place(name, mark.line + 1, mark.column + 1))
     return composer.document(place), composer.problems
 
@@ -163,23 +165,23 @@ def _place_after(text: str, name: str) -> Place:
 
 
 class _Refused(Exception):
-    """A fault after which the rest of the text is not read."""
+    """A fault that ends the reading of the text."""
 
 
 @dataclass
 class _Composer:
-    """Builds nodes from events; each method starts at the event that opens its node."""
+    """Builds nodes from events. The methods for nodes begin after the event that opens the node."""
 
     text: str
     place: Callable[[Any], Place]
     problems: list[Problem] = field(default_factory=list)
     anchors: dict[str, Node | None] = field(default_factory=dict)  # None while it is being built
-    written: int = 0
-    nodes: int = 0
+    written: int = 0  # nodes in the text
+    nodes: int = 0  # nodes with aliases expanded
     aliases: int = 0
 
     def document(self, start: Place) -> Node | None:
-        """The one document, or None after adding to `problems` why it cannot be read."""
+        """The document; None if it cannot be read, which is added to `problems`."""
         try:
             return self.root() or Node(None, start)
         except _Refused:
@@ -194,7 +196,7 @@ class _Composer:
             return None
 
     def root(self) -> Node | None:
-        """The root of the one document; None where there is none."""
+        """The root node of the document; None if the text has no document."""
         events = yaml.parse(self.text, Loader=_LOADER)
         root = None
         for event in events:
@@ -205,10 +207,10 @@ class _Composer:
         return root
 
     def refusal_before(self, mark: Any) -> Problem | None:
-        """What is refused in the text before `mark`, where the parser stopped.
+        """The limit that the text exceeds before `mark`, where the parser stopped; None if it exceeds none.
 
-        The parser scans ahead of its events, and newer ones stop at a depth of their own: what comes before
-        that place is read alone, so that the limits here decide, whatever the parser's are.
+        The parser scans ahead of its events, and newer versions have a depth limit of their own. So the text
+        before the mark is read separately, and the limits here decide, whatever those of the parser are.
         """
         before = _Composer(self.text[: mark.index], self.place)
         try:
@@ -227,7 +229,8 @@ class _Composer:
         self.problems.append(Problem(self.place(mark), path, fact))
 
     def node(self, event: Any, events: Iterator[Any], path: Path, depth: int, key: Any = None) -> Node:
-        """The node that `event` opens, below `path`; `key` is the mark of its own key."""
+        """The node at `path` that `event` opens; `key` is the mark of its key."""
+        # Aliases, and limits.
         mark = key or event.start_mark
         if isinstance(event, yaml.AliasEvent):
             return self.alias(event, mark, path, depth)
@@ -235,10 +238,14 @@ class _Composer:
         self.count(mark, 1)
         if depth > MAX_DEPTH:
             self.refuse(mark, f"nested deeper than {MAX_DEPTH} levels")
+
+        # Anchors and tags.
         if event.anchor is not None:
             self.anchors[event.anchor] = None
         if event.tag is not None and event.tag != "!":
             self.problem(mark, path, f"the tag {short(event.tag)} is not read; write the plain value")
+
+        # The value.
         if isinstance(event, yaml.ScalarEvent):
             node = Node(self.scalar(event, mark, path), self.place(event.start_mark))
         elif isinstance(event, yaml.SequenceStartEvent):
@@ -264,7 +271,9 @@ class _Composer:
             self.refuse(mark, f"more than {MAX_ALIASES} aliases")
         if node is None:
             fact = (
-                "stands inside itself" if event.anchor in self.anchors else f"has no anchor &{name} before it"
+                "is inside its own anchor"
+                if event.anchor in self.anchors
+                else f"has no anchor &{name} before it"
             )
             self.problem(mark, path, f"the alias *{name} {fact}")
             return Node(f"*{name}", self.place(mark))
@@ -272,7 +281,7 @@ class _Composer:
             self.refuse(mark, f"nested deeper than {MAX_DEPTH} levels by aliases")
         self.count(mark, node.size)
         if self.nodes > MAX_GROWTH * (self.written + MAX_ALIASES):
-            self.refuse(mark, f"the aliases write out more than {MAX_GROWTH} times the text")
+            self.refuse(mark, f"the aliases expand to more than {MAX_GROWTH} times the text")
         return node
 
     def sequence(self, events: Iterator[Any], path: Path, depth: int) -> list[Node]:
@@ -301,7 +310,7 @@ class _Composer:
         return merged | entries
 
     def merged(self, value: Node, path: Path, mark: Any) -> dict[str, Node]:
-        """What `<<:` brings: the entries of a mapping or of several, the first of which wins."""
+        """The entries that `<<:` merges: of one mapping, or of several, of which the first has priority."""
         entries: dict[str, Node] = {}
         for part in value.value if isinstance(value.value, list) else [value]:
             if isinstance(part.value, dict):
@@ -311,12 +320,16 @@ class _Composer:
         return entries
 
     def scalar(self, event: Any, mark: Any, path: Path) -> Scalar:
+        """The value of a scalar: quoted text as it is, plain text by YAML 1.2's core schema."""
+        # Text, and a colour that YAML takes for a comment.
         text = event.value
         if not event.implicit[0] or event.style:
             return text
         if not text and (color := _UNQUOTED.match(self.text, event.end_mark.index)):
             self.problem(mark, path, f'{color[1]} is a comment here; write "{color[1]}" in quotes')
             return color[1]
+
+        # null, true, false; numbers.
         if text in _WORDS:
             return _WORDS[text]
         if _NOT_FINITE.fullmatch(text):
@@ -348,7 +361,7 @@ def _branch(value: list[Node] | dict[str, Node], parts: Iterable[Node], place: P
 
 def _syntax(error: yaml.MarkedYAMLError) -> str:
     message = " ".join(f"{error.problem or ''} {error.context or ''}".split())
-    way_out = next(
-        (way_out for words, way_out in _WAYS_OUT if words in message), "correct the text here or just above"
+    advice = next(
+        (advice for part, advice in _ADVICE if part in message), "correct the text here or just above"
     )
-    return f"not YAML: {short(message, 160)}; {way_out}"
+    return f"not YAML: {short(message, 160)}; {advice}"

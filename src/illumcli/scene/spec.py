@@ -1,6 +1,6 @@
-"""A scene as data: frozen descriptions, no arrays, no files opened.
+"""The description of a scene: frozen pydantic models, without arrays or open files.
 
-The JSON schema in ``schemas/scene.schema.json`` is made from this module.
+The JSON schema in ``schemas/scene.schema.json`` is generated from this module.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Count: TypeAlias = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Strict(False)]
 Matrix: TypeAlias = Annotated[tuple[Row, Row, Row, Row], Strict(False)]
 
-# names of tables, whose rows say what each means
+# Names from tables, whose rows document them.
 if TYPE_CHECKING:
     Layer: TypeAlias = str
     Rate: TypeAlias = str
@@ -59,34 +59,34 @@ else:
 
 
 class Normals(Description):
-    """How a mesh gets the normals that shading interpolates."""
+    """The normals of a mesh that shading interpolates."""
 
     source: Literal["file", "computed"] = "file"
-    """`file`: the file's own where it has them, computed ones elsewhere. `computed`: made from the polygons,
-    whatever the file has."""
+    """`file`: the file's normals where it has them, computed ones elsewhere. `computed`: computed from the
+    polygons, even if the file has normals."""
     weights: Literal["angle", "area", "equal"] = "angle"
-    """What each polygon counts for in a vertex normal. `angle`: its angle at the vertex, so that it does not
-    matter how faces are cut into polygons. `area`: its area. `equal`: as much as any other."""
+    """Weight of a polygon in a vertex normal. `angle`: its angle at the vertex, so that the normal does not
+    depend on how faces are split into polygons. `area`: its area. `equal`: the same for all."""
     crease: Annotated[float, Field(ge=0, le=180)] | None = None
-    """Polygons that meet at more than this keep their edge sharp [degrees]; 180: none. By default the file's
-    smoothing groups say so, and 40 degrees where it has none."""
+    """Edges whose polygons meet at a larger angle than this are sharp [degrees]; 180: none. By default the
+    file's smoothing groups decide, and 40 degrees if it has none."""
     polygon: Literal["newell", "cross", "edge_average", "plane"] = "newell"
-    """How a polygon's own normal is found. `newell`: by Newell's sum over all corners, which suits every
-    polygon. `cross`: by the edges at the first corner. `edge_average`: as the mean over all corners of the
+    """How a polygon's normal is computed. `newell`: by Newell's sum over all corners, which suits every
+    polygon. `cross`: from the edges at the first corner. `edge_average`: as the mean over all corners of the
     edges' cross products. `plane`: of the plane through the first three corners."""
 
 
 class MeshFile(Description):
-    """A mesh read from a file; its suffix says the format."""
+    """A mesh read from a file; the suffix is the format."""
 
     file: str
     """Path, from the scene's folder."""
     normals: Normals = DEFAULTS
     """Where the normals that shading interpolates come from."""
     materials: bool = False
-    """True: import the materials that the file's own library describes."""
+    """True: import the materials of the file."""
     obscurance: str | None = None
-    """Path of values that `illum ao-bake` wrote for this mesh as .npz: no obscurance ray is cast for it."""
+    """Path of an .npz file that `illum ao-bake` wrote for this mesh: no obscurance rays are cast from it."""
 
 
 def _mesh_kind(value: Any) -> str:
@@ -101,17 +101,17 @@ MeshSource: TypeAlias = Annotated[
 
 
 class Transform(Description):
-    """Where an object stands: scaled, rotated, fitted, translated, in this order, then the matrix."""
+    """Transform of an object: scale, rotate, fit and translate, in this order, then the matrix."""
 
     scale: Annotated[Vector, Shorthand(spread)] = (1.0, 1.0, 1.0)
     """One factor, or one per axis; negative ones mirror."""
     rotate: Vector = (0.0, 0.0, 0.0)
     """About x, then y, then z [degrees]."""
     fit: Positive | None = None
-    """Scale and move what is rotated so that half its box's diagonal is this long and it stands on y = 0,
-    centred on the y axis [scene units]."""
+    """Scale and move the rotated object so that half the diagonal of its bounding box has this length and the
+    box stands on y = 0, centred on the y axis [scene units]."""
     translate: Vector = (0.0, 0.0, 0.0)
-    """By how much it is moved along x, y and z [scene units]."""
+    """Translation along x, y and z [scene units]."""
     matrix: Matrix | None = None
     """Four rows, applied last to column vectors; the last one is 0 0 0 1."""
 
@@ -128,12 +128,12 @@ class Transform(Description):
 
 
 class Grain(Description):
-    """Grain in rings about an axis, as on a turned or brushed disc."""
+    """Grain in circles about an axis, as on a turned or brushed disc."""
 
     axis: Direction = (0.0, 1.0, 0.0)
-    """Direction of the axis, in the object's own coordinates."""
+    """Direction of the axis, in object space."""
     centre: Vector = (0.0, 0.0, 0.0)
-    """A point on the axis, in the object's own coordinates before its transform."""
+    """A point on the axis, in object space, before the transform."""
 
 
 NameOrMesh: TypeAlias = Annotated[
@@ -151,44 +151,43 @@ AnyGrain: TypeAlias = Annotated[
 
 
 class Object(Description):
-    """A mesh with a material in a place."""
+    """A mesh with a material and a transform."""
 
     mesh: NameOrMesh
     """The name of a mesh, the path of a mesh file, or a mesh described in place."""
     name: Name | None = None
-    """Names the object in messages, overrides and files; by default `object1` and so on."""
+    """Name of the object in messages, overrides and files; by default `object1` and so on."""
     material: NameOrMaterial | None = None
-    """The name of a material, or one described in place; by default the materials that the mesh file
-    selects by name, and light grey Lambert for what selects none."""
+    """The name of a material, or one described in place. By default the scene's materials that the mesh file
+    selects by name, and light grey Lambert for polygons without one."""
     fallback: NameOrMaterial | None = None
-    """Where no `material` is given: show the materials, textures and vertex colours that the mesh file itself
-    describes, whatever the scene calls its own, and this material, by name or in place, where it has none.
-    What MTL calls intensities are shares of the light then, and ambient light leaves by diffuse colours."""
+    """If no `material` is given: use the materials, textures and vertex colours of the mesh file, even if the
+    scene has materials of the same names, and this material, by name or in place, for polygons without one.
+    Intensities of MTL are then taken as reflectances, and the diffuse colour reflects ambient light."""
     override: dict[str, Any] = DEFAULTS
-    """Parameters of the material that this object has otherwise."""
+    """Parameters of the material that differ on this object."""
     transform: Transform = DEFAULTS
-    """Where it stands, and how large."""
+    """Position, orientation and size."""
     shading: Rate | None = None
-    """How often its material is evaluated; by default as often as the scene says."""
+    """How often its material is evaluated; by default the scene's rate."""
     grain: AnyGrain | None = None
-    """Tangent of anisotropic materials: a direction the grain follows, or rings about an axis;
-    by default the direction of growing u."""
+    """Tangent of anisotropic materials: a direction, or circles about an axis; by default increasing u."""
 
 
 class _Camera(Description):
     position: Vector = (1.8, 1.9, 3.6)
-    """Where the eye is [scene units]; by default where it sees an object fitted to radius 1."""
+    """Position of the eye [scene units]; the default suits an object fitted to radius 1."""
     target: Vector = (0.0, 0.75, 0.0)
-    """What it looks at, the middle of the picture [scene units]."""
+    """The point in the middle of the image [scene units]."""
     up: Direction = (0.0, 1.0, 0.0)
-    """Any vector not along the line of sight; where it is, another axis is taken."""
+    """Any vector that is not along the line of sight; if it is, another axis is used."""
     fit: Name | None = None
-    """Name of the object that is to fill the picture: the camera keeps its direction and moves to where all
-    of the object is inside; an orthographic one also takes its extent from it."""
+    """Name of an object that fills the image: the camera keeps its direction and moves until all of the
+    object is visible; an orthographic camera also sets its extent."""
     width: Count | None = None
-    """Width of its picture [pixels]; by default the film's."""
+    """Width of its image [pixels]; by default the film's."""
     height: Count | None = None
-    """Height of its picture [pixels]; by default the film's."""
+    """Height of its image [pixels]; by default the film's."""
     samples: Count | None = None
     """Samples per pixel; by default the film's."""
 
@@ -230,26 +229,26 @@ Camera: TypeAlias = Annotated[
 
 
 class Filter(Description):
-    """The pixel filter, by sampling positions from it: pixels share no samples."""
+    """The pixel filter, by importance sampling: sample positions are drawn from it, and pixels share none."""
 
     filter: Literal["box", "tent", "gaussian"] = "box"
-    """`box`: all samples of the pixel weigh the same. `tent`: less, the farther from the pixel's centre.
-    `gaussian`: by a bell curve, the softest."""
+    """`box`: uniform over the pixel. `tent`: weight falls linearly with the distance from the pixel's centre.
+    `gaussian`: a bell curve, the softest."""
     width: Positive = 1.0
     """Support of box and tent, and two standard deviations of the Gaussian, either side [half pixels]."""
 
 
 class Adaptive(Description):
-    """Few samples for every pixel, and all of them only where these differ from each other or from those of
-    the neighbouring pixels: in object or normal, and each layer in its own light.
+    """Adaptive sampling: few samples for every pixel, and all of them only if these differ from each other or
+    from those of neighbouring pixels, in object, in normal, or, layer by layer, in light.
 
-    Not unbiased: what the few samples miss, as things smaller than the gaps between them, stays missed.
+    It is biased: features smaller than the spacing of the first samples stay missed.
     """
 
     first: Count = 4
-    """Samples that every pixel gets."""
+    """Samples of every pixel."""
     difference: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """How far light may differ among them, as a share of the brightest."""
+    """Greatest difference in light among them, as a share of the brightest."""
 
 
 def _adaptive(value: Any) -> Any:
@@ -262,25 +261,25 @@ AdaptiveOrCount: TypeAlias = Annotated[
 
 
 class Film(Description):
-    """Size and sampling of the picture."""
+    """Size and sampling of the image."""
 
     width: Count = 1280
-    """Width of the picture [pixels]."""
+    """Width of the image [pixels]."""
     height: Count = 720
-    """Height of the picture [pixels]."""
+    """Height of the image [pixels]."""
     samples: Count = 4
-    """Per pixel; 1 looks through the pixel's centre."""
+    """Samples per pixel; a single one is at the pixel's centre."""
     adaptive: (
         Annotated[Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)] | None
     ) = None
-    """Take all samples only where fewer differ; a number says how many every pixel gets. By default every
-    pixel gets all."""
+    """Adaptive sampling: all samples only where fewer differ; a number is short for `first`. By default every
+    pixel has all samples."""
     filter: Filter = DEFAULTS
-    """From which part of and around a pixel its samples come."""
+    """The pixel filter."""
     background: Color | None = None
-    """Behind everything; by default nothing, with alpha 0."""
+    """Radiance behind all objects; by default none, with alpha 0."""
     exposure: Annotated[float, Field(ge=-64, le=64)] = 0.0
-    """Of 8-bit pictures [stops]; EXR keeps the light as it is."""
+    """Exposure of 8-bit images [stops]; EXR files hold radiance without it."""
 
 
 def _ambient(value: Any) -> Any:
@@ -295,35 +294,35 @@ FORMS = ("separate", "coupled")
 
 
 class Ambient(Description):
-    """I_a, light from everywhere, weighed by obscurance."""
+    """I_a, light from all directions, multiplied by obscurance."""
 
     color: Color = (0.0, 0.0, 0.0)
-    """I_a, its colour; black is none."""
+    """I_a; black is none."""
     form: Literal["separate", "coupled"] = "separate"
-    """`separate`: k_a I_a w + direct. `coupled`: (k_a I_a + direct) w + I_d, as one text prints it, with I_d
-    the direct light before the material; it counts direct light twice."""
+    """`separate`: k_a I_a w + direct. `coupled`: (k_a I_a + direct) w + I_d, as printed by Theoharis et al.
+    (2008), eq. 12.75, where I_d is the irradiance of the lights; it counts direct light twice."""
 
 
 AmbientText: TypeAlias = Ambient | Color | Literal["separate", "coupled"]  # how a scene may write it
 
 
 class DepthCue(Description):
-    """Depth cueing: what is far away fades into a colour, whatever its material and light.
+    """Depth cueing: distant surfaces fade into a colour, whatever their material and light.
 
-    L' = (1 - a) L + a color,  a = strength * (distance - near) / (far - near), held within 0..strength
+    L' = (1 - a) L + a color,  a = strength * (distance - near) / (far - near), clamped to 0..strength
 
     After Warnock (1969), A hidden surface algorithm for computer generated halftone pictures, University of
-    Utah, where intensity falls with the distance from the eye. No light behaves so; it orders by depth.
+    Utah, where intensity falls with the distance from the eye. Not physical; it shows the order in depth.
     """
 
     near: NonNegative
-    """Distance from the eye up to which nothing fades [scene units]."""
+    """Distance from the eye at which fading begins [scene units]."""
     far: Positive
-    """Distance from which on it fades no further [scene units]."""
+    """Distance from the eye at which fading ends [scene units]."""
     strength: Share = 1.0
-    """How much of the colour replaces the surface's at `far`."""
+    """Share of the colour at `far` and beyond."""
     color: Color = (0.0, 0.0, 0.0)
-    """What it fades into: black, or the background's colour, as haze does."""
+    """The colour that surfaces fade into: black, or that of the background, as in haze."""
 
     @model_validator(mode="after")
     def _fades_somewhere(self) -> Self:
@@ -333,72 +332,71 @@ class DepthCue(Description):
 
 
 class Obscurance(Description):
-    """w(p) by Monte Carlo: how open each point is to the ambient light."""
+    """w(p) by Monte Carlo: the share of ambient light that reaches each point."""
 
     samples: Annotated[int, Field(ge=1, le=65536)] = 64
     """Rays per pixel sample."""
     falloff: AnyFalloff = default_of({"falloff": "step"})
-    """By default every occluder counts fully: ambient occlusion."""
+    """Weight of occluders by distance; by default every occluder counts fully: ambient occlusion."""
     sampler: Sampler = "spiral"
-    """Which directions the rays of a point have."""
+    """The point set of ray directions."""
     faces: Literal["count", "ignore", "one_sided"] = "count"
-    """What becomes of a ray that meets a face from behind. `count`: the face hides like any other. `ignore`:
-    the ray passes through. `one_sided`: it counts as free."""
+    """How back faces are treated. `count`: they occlude like front faces. `ignore`: rays pass through them.
+    `one_sided`: they end the ray, unoccluded."""
     about: Literal["shading", "geometric"] = "shading"
-    """What the hemisphere stands about. `shading`: the interpolated normal that direct light is shaded with;
-    directions that point below the polygon are mirrored at its plane. `geometric`: the polygon's own."""
+    """Axis of the hemisphere. `shading`: the interpolated normal that direct light is shaded with; directions
+    that point below the polygon are mirrored at its plane. `geometric`: the polygon's normal."""
 
 
 class Outputs(Description):
-    """What is written."""
+    """Layers and files of a render."""
 
     layers: Annotated[ListOf[Layer], Field(min_length=1)] = ("beauty",)
-    """What is made of the scene."""
+    """The layers that are rendered."""
     files: Annotated[ListOf[str], Field(min_length=1)] = ("{scene}.{camera}.png",)
-    """Name patterns, from the current folder: `.exr` holds every layer in one file, `.png` is one
-    file per layer (`{layer}` in its name when there are several): light as sRGB, all else as plain numbers;
-    text in the file says how to read them."""
+    """Name patterns, relative to the current folder. `.exr` has all layers in one file. `.png` has one file
+    per layer (`{layer}` in its name if there are several), with light as sRGB and data as plain numbers; the
+    file's metadata tell how to read them."""
     colour: Literal["half", "float"] = "half"
-    """Precision of colour in EXR; depth, positions, normals and ids are always 32-bit. `half`: 16 bits, up to
-    65504. `float`: 32 bits."""
+    """Precision of colours in EXR; depth, positions, normals and ids always have 32 bits. `half`: 16 bits, up
+    to 65504. `float`: 32 bits."""
 
 
 class Scene(Description):
-    """Everything a scene file says."""
+    """The content of a scene file."""
 
     version: Literal[1]
     """Version of the scene format."""
     camera: Camera | None = None
-    """The one camera, named `main`."""
+    """A single camera, named `main`."""
     cameras: dict[Name, Camera] = DEFAULTS
-    """Several cameras by name; instead of `camera`."""
+    """Several cameras by name, instead of `camera`."""
     film: Film = DEFAULTS
-    """Size and sampling of the picture."""
+    """Size and sampling of the image."""
     shading: Rate = "phong"
-    """How often the model is evaluated."""
+    """The shading rate: how often models are evaluated."""
     terminator: Literal["smooth", "none"] = "smooth"
-    """Where shadows of smooth shading begin. `smooth`: on the surface that the normals imply, so that coarse
-    polygons cast no shadow on its lit side. `none`: on the polygons themselves."""
+    """The shadow terminator of smooth shading. `smooth`: shadow rays start on the surface that the normals
+    imply, so that coarse polygons cast no shadow on its lit side. `none`: they start on the polygons."""
     ambient: Annotated[Ambient, BeforeValidator(_ambient, json_schema_input_type=AmbientText)] = DEFAULTS
-    """Colour, form or both of the light from everywhere. `separate`: it is added to the direct light.
-    `coupled`: it is weighed together with it, as one text prints it."""
+    """Colour, form or both of ambient light. `separate`: it is added to the direct light. `coupled`: both are
+    multiplied by obscurance, as printed by Theoharis et al. (2008)."""
     obscurance: Obscurance | None = None
-    """How the ambient light is weighed by what surrounds a point; by default w = 1 and no ray is cast for
-    it."""
+    """Obscurance of ambient light by nearby surfaces; by default w = 1 and no rays are cast."""
     depth_cue: DepthCue | None = None
-    """Fade the beauty with the distance from the eye; by default not."""
+    """Fade the beauty with the distance from the eye; by default it does not fade."""
     meshes: dict[Name, MeshSource] = DEFAULTS
     """Files and shapes by name, for objects to share."""
     materials: dict[Name, AnyModel] = DEFAULTS
     """Illumination models with their parameters by name, for objects and mesh files to select."""
     objects: ListOf[Object] = ()
-    """What is seen: meshes with their material and place."""
+    """Meshes with their materials and transforms."""
     lights: ListOf[AnyLight] = ()
-    """Lamps and suns; without any, what is lit is lit by ambient light alone."""
+    """The lights; without any there is only ambient light."""
     outputs: Outputs = DEFAULTS
     """Layers and files that are written."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
-    """Of every random number: the same seed makes the same picture."""
+    """Seed of all random numbers: the same seed gives the same image."""
 
     @model_validator(mode="after")
     def _names_lead_somewhere(self) -> Self:
@@ -413,7 +411,7 @@ class Scene(Description):
         return self
 
     def material_of(self, thing: Object) -> AnyModel | None:
-        """The object's own material with its overrides; None where the mesh selects materials."""
+        """The object's material with its overrides; None if the mesh selects materials."""
         material = thing.material
         model = self.materials[material] if isinstance(material, str) else material
         if not thing.override:
@@ -422,7 +420,7 @@ class Scene(Description):
         return type(base).model_validate({**dict(base), **thing.override})
 
     def fallback_of(self, thing: Object) -> AnyModel | None:
-        """The object's fallback; None where it has a material or asks for no other."""
+        """The object's fallback; None if it has a material or no fallback."""
         fallback = thing.fallback
         if thing.material is not None:
             return None
@@ -441,7 +439,7 @@ class Scene(Description):
 
 
 def default_material() -> AnyModel:
-    """Light grey Lambert, for what has no material."""
+    """The material of polygons without one: light grey Lambert."""
     from illumcli.models.lambert import Lambert
 
     return Lambert()

@@ -1,7 +1,7 @@
-"""The scene around a mesh that is given instead of a scene, and how it turns with the view that is asked for.
+"""The scene that `illum render MESH` shows a mesh in, adapted to the requested view.
 
-AZIMUTH goes about the axis that is up, in degrees: 0 looks at the front, the side of +z where y is up (of -y
-where z is up), 90 at the side of +x. ELEVATION rises from the horizon to 90 straight above.
+The azimuth is an angle about the up axis in degrees: 0 looks at the front, the side of +z if y is up (of -y
+if z is up), 90 at the side of +x. The elevation is 0 at the horizon and 90 straight above.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from illumcli.schema.description import DEFAULTS, Description
 
 STUDIO = Path(__file__).with_name("studio.yaml")
 SETTINGS = "studio"
-"""First step of the overrides that set what a `Studio` holds: `-D studio.view=[90,10]`."""
+"""First step of overrides of the fields of `Studio`: `-D studio.view=[90,10]`."""
 
 Azimuth: TypeAlias = Annotated[float, Field(ge=-360, le=360)]
 Elevation: TypeAlias = Annotated[float, Field(ge=-90, le=90)]
@@ -36,7 +36,7 @@ class Studio(Description):
 
 
 class Settings(Description):
-    """What overrides may say besides the scene."""
+    """What overrides may set in addition to the scene."""
 
     studio: Studio = DEFAULTS
 
@@ -49,14 +49,15 @@ ROTATIONS: Mapping[str, tuple[float, float, float]] = {
     "-y": (180, 0, 0),
     "-z": (90, 0, 0),
 }
-"""What turns each axis up: degrees about x, then y, then z."""
+"""Rotation of a mesh that turns each axis upwards: degrees about x, then y, then z."""
 
 
 def arranged(tree: Node, studio: Studio) -> Node:
-    """The studio's scene as a view and a mesh's axes ask for it.
+    """The studio's scene for the view and the mesh's up axis.
 
-    The lights go around with the camera, and nothing stands between the mesh and a camera below its floor.
+    The lights turn about the up axis with the camera. The floor is removed if the camera is below it.
     """
+    # The changes by path, as overrides; None removes a part.
     changes: dict[str, Sequence[float] | None] = {}
     if studio.up != "y":
         changes["objects.subject.transform.rotate"] = ROTATIONS[studio.up]
@@ -68,7 +69,7 @@ def arranged(tree: Node, studio: Studio) -> Node:
             sin(elevation),
             cos(azimuth) * cos(elevation),
         )
-        # what is up in the picture stays so straight above and below
+        # An up vector perpendicular to the line of sight is valid at any elevation.
         changes["camera.up"] = (
             -sin(azimuth) * sin(elevation),
             cos(elevation),
@@ -76,10 +77,12 @@ def arranged(tree: Node, studio: Studio) -> Node:
         )
         turn = azimuth - atan2(x, z)
         for number in range(len(_parts(tree, "lights"))):
-            place = _numbers(tree, ("lights", number, "position"))
-            changes[f"lights.{number}.position"] = _turned(place, turn)
+            position = _numbers(tree, ("lights", number, "position"))
+            changes[f"lights.{number}.position"] = _turned(position, turn)
         if elevation < 0:
             changes["objects.floor"] = None
+
+    # Apply them.
     problems: list[Problem] = []
     for path, numbers in changes.items():
         at = Place(str(STUDIO))
@@ -103,6 +106,6 @@ def _parts(tree: Node, name: str) -> list[Node]:
 
 
 def _turned(position: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
-    """A position turned about the y axis, from z towards x."""
+    """The position rotated about the y axis, from z towards x."""
     x, y, z = position
     return x * cos(angle) + z * sin(angle), y, z * cos(angle) - x * sin(angle)

@@ -19,14 +19,14 @@ from illumcli.shading.rates import RATES
 
 
 def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Iterator[Fault]:
-    """The part and the fact of whatever has no effect; parts that the scene does not write are among them.
+    """Path and message of each key that has no effect; keys that the scene leaves at their default included.
 
     Parameters
     ----------
     layers : collection of str
         Layers that are rendered.
     files : collection of str
-        Name patterns of the files that are written; none where the scene's own are not.
+        Name patterns of the files that are written; none if the scene's own are not used.
     """
     yield from _views(scene)
     yield from _ambient(scene, layers)
@@ -40,7 +40,7 @@ def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Ite
 
 
 def lacking(scene: Scene, layers: Collection[str]) -> Iterator[Fault]:
-    """The part that a picture lacks where there is nothing to see or no light to see it by, and the fact."""
+    """Path and message of the part that is missing if an image would be empty or black."""
     if not scene.objects:
         yield ("objects",), "the scene has none, its pictures are empty; add objects: [{mesh: FILE}]"
     elif not scene.lights and not any(scene.ambient.color) and LIT & set(layers) and not _may_emit(scene):
@@ -53,7 +53,7 @@ LIT = {"beauty", "ambient", "diffuse", "specular"}
 
 
 def _may_emit(scene: Scene) -> bool:
-    """May some surface send light of its own?"""
+    """True if some surface may emit light."""
     for (_, source), thing in zip(_sources(scene), scene.objects, strict=True):
         material = scene.material_of(thing)
         if material is None and (thing.fallback is not None or getattr(source, "materials", False)):
@@ -85,7 +85,7 @@ def _views(scene: Scene) -> Iterator[Fault]:
 
 
 def _parallel(a: Any, b: Any) -> bool:
-    """Have two vectors the same direction, or the opposite one, as far as a camera can tell?"""
+    """True if two vectors have the same or opposite directions, within a camera's tolerance."""
     a, b = ([x / max(map(abs, vector)) for x in vector] for vector in (a, b))
     cross = [a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))]
     size = sum(x * x for x in a) * sum(x * x for x in b)
@@ -93,7 +93,7 @@ def _parallel(a: Any, b: Any) -> bool:
 
 
 def _ambient(scene: Scene, layers: Collection[str]) -> Iterator[Fault]:
-    """Obscurance that weighs no light, or is there already."""
+    """Obscurance where there is no ambient light, or where all values are baked."""
     sources = [source for _, source in _sources(scene)]
     baked = [isinstance(source, MeshFile) and source.obscurance is not None for source in sources]
     if baked and all(baked):
@@ -116,12 +116,13 @@ def _sources(scene: Scene) -> list[tuple[Path, Any]]:
 
 
 def _meshes(scene: Scene) -> Iterator[Fault]:
-    """Keys of mesh files that no object with the mesh makes use of."""
+    """Keys of mesh files that no object with the mesh uses."""
     users: dict[Path, list[Object]] = {}
     for (path, source), thing in zip(_sources(scene), scene.objects, strict=True):
         if isinstance(source, MeshFile):
             users.setdefault(path, []).append(thing)
     for path, things in users.items():
+        # Materials of the file, and normals.
         if all(thing.material is not None for thing in things):
             fact = "is not used, its objects have materials of their own; leave these, or this, out"
             yield (*path, "materials"), fact
@@ -133,7 +134,8 @@ def _meshes(scene: Scene) -> Iterator[Fault]:
 
 
 def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
-    """Keys of one object, its material's among them."""
+    """Keys of one object and of its material."""
+    # Grain, fallback, override and transform.
     path: Path = ("objects", number)
     model = scene.material_of(thing)
     if model is not None and model.isotropic:
@@ -147,6 +149,8 @@ def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
     x, y, z = thing.transform.scale
     if thing.transform.fit is not None and x == y == z > 0:
         yield (*path, "transform", "scale"), "is not used, fit says the size; leave one of them out"
+
+    # Channels of textures that are read as colours.
     if model is not None:
         written = ("materials", thing.material) if isinstance(thing.material, str) else (*path, "material")
         for where in (written, (*path, "override")):

@@ -1,4 +1,4 @@
-"""The variants of a scene that `-D`, `--rows` and `--frames` describe: values of paths, and frames."""
+"""The variants of a scene in a sweep, from `-D`, `--rows` and `--frames`."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)(log)?")
 
 
 class Axis(Value):
-    """One path of the scene and the values it takes, as YAML."""
+    """A path in the scene and its values, as YAML."""
 
     path: str
     values: tuple[str, ...]
 
 
 class Variant(Value):
-    """One variant of a scene: the value of every path that varies, and the frame."""
+    """A variant of a scene: the value of each path that varies, and the frame."""
 
     values: Mapping[str, str]
     frame: int = 0
 
     @property
     def overrides(self) -> list[str]:
-        """The values as `-D` gives them."""
+        """The values in the form of `-D`."""
         return [f"{path}={value}" for path, value in self.values.items()]
 
     @property
@@ -59,12 +59,12 @@ def variants_of(
     Parameters
     ----------
     texts : sequence of str
-        `PATH=a,b,c`, `PATH=START:STOP:COUNT` or `PATH=START:STOP:COUNTlog`, as `-D` gives them.
+        `PATH=a,b,c`, `PATH=START:STOP:COUNT` or `PATH=START:STOP:COUNTlog`, the arguments of `-D`.
     together : bool
-        First values together, second values together, ...; else every value with every other, the last path
-        fastest.
+        Combine the first values, the second values, and so on; otherwise every value with every other, the
+        last path fastest.
     rows : Path, optional
-        CSV: paths in its first line, a variant in each other.
+        CSV: paths in its first line, the values of a variant in each other line.
     frames : str, optional
         `FIRST:LAST` or `FIRST:LAST:STEP`, both ends included; values may be formulas of `frame`.
 
@@ -72,7 +72,7 @@ def variants_of(
     ------
     InputError
     """
-    # values of each path, rows of the table, frames
+    # Values of each path, rows of the table, frames; refuse too many.
     numbers = _frames(frames) if frames else None
     axes = [axis_of(text) for text in texts]
     table = _rows(rows) if rows else [{}]
@@ -82,7 +82,7 @@ def variants_of(
     if count > MAX_VARIANTS:
         raise InputError(f"{count} variants are more than {MAX_VARIANTS}; sweep them in parts")
 
-    # every combination of them
+    # All combinations of them.
     grid = list(_together(axes) if together else _grid(axes))
     variants = []
     for row, point in itertools.product(table, grid):
@@ -196,7 +196,7 @@ def _together(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
 
 def _rows(path: Path) -> list[dict[str, str]]:
     """The rows of a CSV of overrides, path -> value."""
-    # lines that are not blank
+    # Read the lines that are not blank.
     try:
         with path.open("rb") as file:
             text = file.read(MAX_TABLE_BYTES + 1)
@@ -207,7 +207,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
-    # paths in the first, values in all others
+    # Paths in the first line, values in all others.
     if len(lines) < 2:
         raise InputError(f"{path}: has no rows; write the paths in its first line and values below")
     head = [cell.strip() for cell in lines[0]]
@@ -217,7 +217,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
         if len(line) != len(head)
     ]
     if not all(head) or len(set(head)) < len(head):
-        problems.append(f"{path}: every column must be named by a path of its own")
+        problems.append(f"{path}: the first line must name a different path for every column")
     if problems:
         raise InputError(problems)
     return [dict(zip(head, (cell.strip() for cell in line), strict=True)) for line in lines[1:]]

@@ -21,6 +21,7 @@ SCRIPTS = {
     "memory": "cpu per pixel",
     "replay": "ratio whole / rays alone",
     "adaptive": "samples saved",
+    "reconstruction": "blades",
 }
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from illumcli.visibility.reconstruction import MARGIN, RADII, ObjectPixels, joined, reconstructed, window_sums
+from illumcli.visibility.object_pixels import ObjectPixels, joined
+from illumcli.visibility.reconstruction import MARGIN, RADII, reconstructed, window_sums
 
 
 @pytest.fixture

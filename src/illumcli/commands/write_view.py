@@ -15,6 +15,7 @@ from illumcli.film.develop import ErrorSums, Target, how_to_read
 from illumcli.film.tiles import Tile
 from illumcli.progress import Progress
 from illumcli.render_graph.execute import Planes, Run, bands
+from illumcli.render_graph.needs import reconstructs
 from illumcli.render_graph.schedule import Plan
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Scene
@@ -82,5 +83,6 @@ def metadata(scene: Scene, target: Target, space: RenderSpace) -> Mapping[str, A
         "illum:seed": str(scene.seed),
         "illum:exposure": scene.film.exposure,
         "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
+        "illum:obscurance_reconstructed": int(reconstructs(scene)),
         **how_to_read(target, space),
     }

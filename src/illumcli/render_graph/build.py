@@ -41,11 +41,15 @@ from illumcli.shading.materials import material, material_id
 from illumcli.shading.rates import RATES, normal, obscurance_normals, point_weights, points
 from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
+from illumcli.visibility.object_pixels import object_pixels
 from illumcli.visibility.obscurance import baked_or_open, obscurance, obscurance_method
 from illumcli.visibility.open_hemisphere import known_open, open_triangles
+from illumcli.visibility.reconstruction import reconstructed_obscurance
 from illumcli.visibility.shadows import ray_origins
 
-GIVEN = ("view", "tile")
+SURROUNDINGS = "surrounding_pixels"
+"""The buffer `object_pixels` of a tile and its surroundings, so far as a reconstruction reads them."""
+GIVEN = ("view", "tile", SURROUNDINGS)
 """Buffers that need no node."""
 SHAPE = ("object_id", "geometric_normal")
 """Buffers whose differences show edges, where adaptive sampling takes more samples whatever the light."""
@@ -166,6 +170,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     files = baked_files(scene, loaded)
     some_baked = any(file for _, file in files)
     settings = scene.obscurance or Obscurance()
+    settings = settings.model_copy(update={"reconstruct": None})  # no ray depends on it
     by_face = {"triangle_normals": "triangle_normals"} if settings.faces != "count" else {}
     axes = {"obscurance_normals": "obscurance_normals"} if _about_shading(scene) else {}
     partly_baked = {"baked_obscurance": "baked_obscurance"} if some_baked else {}
@@ -173,6 +178,13 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         w = Node.of(baked_or_open, "obscurance")
     else:
         w = Node.of(obscurance, **partly_baked)
+    nodes = [w]
+    if needs.reconstructs(scene):
+        nodes = [
+            replace(w, output="raw_obscurance"),
+            Node.of(object_pixels, **partly_baked),
+            Node.of(reconstructed_obscurance, "obscurance"),
+        ]
     return [
         Node.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
         Node.of(partial(obscurance_normals, tuple(needs.rates(scene))), "obscurance_normals"),
@@ -183,7 +195,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         Node.of(partial(known_open, settings.samples), "known_open"),
         Node.of(partial(baked, files), "baked"),
         Node.of(baked_obscurance),
-        w,
+        *nodes,
     ]
 
 
@@ -208,7 +220,9 @@ def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:
     """Why the scene itself makes buffers unnecessary, by buffer."""
     # Emission, ambient light and obscurance.
     reasons: dict[str, str] = {}
-    traced = ("obscurance_draws", "obscurance_method", "hemispheres", "known_open")
+    traced = ["obscurance_draws", "obscurance_method", "hemispheres", "known_open"]
+    if needs.reconstructs(scene):
+        traced += ["raw_obscurance", "object_pixels"]
     if not needs.is_emissive(scene):
         reasons |= dict.fromkeys(("emission", "emission_materials"), "no material emits")
     if not needs.is_ambient(scene):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,12 @@ from illumcli.lights._incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import SHAPE
+from illumcli.render_graph.build import SHAPE, SURROUNDINGS
 from illumcli.render_graph.schedule import Plan
+from illumcli.visibility.object_pixels import ObjectPixels, within
+from illumcli.visibility.reconstruction import MARGIN
 
+Result = TypeVar("Result")
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32; ids are uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> its values as the cache stores them
 Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
@@ -157,12 +160,14 @@ def bands(
         try:
             pending: list[tuple[Tile, Future[tuple[Mapping[str, NDArray[Any]], Kept]]]] = []
             queue = iter([tile for row in rows for tile in row])
+            ahead = _Ahead(common, rows, pool)
 
             # Keep a row of tiles and a few more in progress, so that no thread waits for the consumer.
             def submit() -> None:
                 for tile in queue:
-                    pending.append((tile, pool.submit(compute, common, tile)))
-                    if len(pending) >= run.threads + 1 + len(rows[0]):
+                    future = ahead.submit(tile) if plan.before else pool.submit(compute, common, tile)
+                    pending.append((tile, future))
+                    if len(pending) >= run.threads + 1 + (0 if plan.before else len(rows[0])):
                         break
 
             submit()
@@ -173,10 +178,7 @@ def bands(
                 kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
-                    # Short waits, so that an interrupt reaches this thread.
-                    while not wait([future], timeout=0.2, return_when=FIRST_COMPLETED).done:
-                        pass
-                    layers, others = future.result()
+                    layers, others = _result(future)
                     for name, values in layers.items():
                         if name not in band:
                             band[name] = np.empty((height, view.width, values.shape[2]), values.dtype)
@@ -194,10 +196,89 @@ def bands(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
+def _result(future: Future[Result]) -> Result:
+    """What a thread computed; waits in short steps, so that an interrupt reaches this thread."""
+    while not wait([future], timeout=0.2, return_when=FIRST_COMPLETED).done:
+        pass
+    return future.result()
+
+
+class _Started(Record):
+    """A tile of which some nodes have run."""
+
+    tile: Tile
+    buffers: dict[str, Any]
+    kept: Kept
+
+
+class _Ahead:
+    """Runs the first nodes of tiles some rows ahead of the others, which read the pixels around."""
+
+    def __init__(self, common: _Common, rows: Sequence[Sequence[Tile]], pool: ThreadPoolExecutor) -> None:
+        self.common, self.rows, self.pool = common, rows, pool
+        self.first_row, self.next_row = 0, 0
+        self.started: dict[Tile, Future[_Started]] = {}
+        self.pixels: dict[Tile, ObjectPixels] = {}
+
+    def submit(self, tile: Tile) -> Future[tuple[Mapping[str, NDArray[Any]], Kept]]:
+        """Run the other nodes of a tile, once the first ones of the tiles around have run."""
+        # Start the first nodes of all rows that this tile reads, and of one more, so that no thread waits.
+        lower = tile.y + tile.height + MARGIN
+        while self.next_row < len(self.rows) and (
+            self.next_row == 0 or self.rows[self.next_row - 1][0].y < lower
+        ):
+            for each in self.rows[self.next_row]:
+                self.started[each] = self.pool.submit(_first_nodes, self.common, each)
+            self.next_row += 1
+
+        # Drop the pixels that no later tile reads.
+        upper = tile.y - MARGIN
+        while self.rows[self.first_row][0].y + self.rows[self.first_row][0].height <= upper:
+            for each in self.rows[self.first_row]:
+                del self.pixels[each]
+            self.first_row += 1
+
+        # The pixels around, of the row itself and all that reach into its margin.
+        parts = []
+        for row in self.rows[self.first_row : self.next_row]:
+            for each in row if row[0].y < lower else ():
+                if each not in self.pixels:
+                    self.pixels[each] = _result(self.started[each]).buffers["object_pixels"].pixels
+                if each.x < tile.x + tile.width + MARGIN and each.x + each.width > tile.x - MARGIN:
+                    parts.append(self.pixels[each])
+        own = _result(self.started.pop(tile))
+        return self.pool.submit(_last_nodes, self.common, own, parts)
+
+
+def _first_nodes(common: _Common, tile: Tile) -> _Started:
+    """A tile after the nodes whose results the tiles around read."""
+    started = _Started(tile, _given(common, common.plan.view, tile), {})
+    _run_nodes(common, started, range(common.plan.before))
+    return started
+
+
+def _last_nodes(
+    common: _Common, started: _Started, parts: Sequence[ObjectPixels]
+) -> tuple[Mapping[str, NDArray[Any]], Kept]:
+    """One tile's developed layers, and its buffers for the cache; `parts` are the pixels around."""
+    plan = common.plan
+    started.buffers[SURROUNDINGS] = within(parts, started.tile, MARGIN)
+    _run_nodes(common, started, range(plan.before, len(plan.tile)))
+    return _developed(common, started.tile, started.buffers), started.kept
+
+
 def at_pixels(
     plan: Plan, shared: Mapping[str, Any], run: Run, x: NDArray[np.int64], y: NDArray[np.int64]
 ) -> Planes:
-    """Layer -> (K, channels) at K pixels of a view, equal to what `bands` computes there."""
+    """Layer -> (K, channels) at K pixels of a view, equal to what `bands` computes there.
+
+    Raises
+    ------
+    ValueError
+        The plan reads the pixels around those asked for.
+    """
+    if plan.before:
+        raise ValueError("pixels that read those around them are not rendered alone")
     count = max(1, MAX_TILE_SAMPLES // plan.view.samples)
     pieces = [Scattered.at(x[a : a + count], y[a : a + count]) for a in range(0, len(x), count)]
     stop, recorder = threading.Event(), BufferRecorder(NO_CACHE, {}, plan.view)
@@ -215,20 +296,38 @@ def at_pixels(
 def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
     """One tile's developed layers, and its buffers for the cache."""
     buffers, kept = _buffers(common, common.plan.view, tile)
+    return _developed(common, tile, buffers), kept
+
+
+def _developed(common: _Common, tile: Tile, buffers: Mapping[str, Any]) -> Mapping[str, NDArray[Any]]:
+    """One tile's developed layers."""
     start = time.perf_counter()
     out = common.develop(tile, _pixels(common.plan, buffers, common.plan.view, tile))
     common.stats.add({"film": time.perf_counter() - start}, {})
-    return out, kept
+    return out
 
 
 def _buffers(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
     """The buffers of one tile that the film reads, and those for the cache; `view` says how many samples."""
+    started = _Started(tile, _given(common, view, tile), {})
+    _run_nodes(common, started, range(len(common.plan.tile)))
+    return started.buffers, started.kept
+
+
+def _given(common: _Common, view: View, tile: Tile) -> dict[str, Any]:
+    """The buffers that the nodes of a tile start from."""
     buffers: dict[str, Any] = {**common.shared, "view": view, "tile": tile}
-    tracer = None
     if "tracer" in common.shared:
-        tracer = buffers["tracer"] = common.shared["tracer"].counting(common.stop)
-    seconds, rays, unlit, kept = {}, {}, {}, {}
-    for number, node in enumerate(common.plan.tile):
+        buffers["tracer"] = common.shared["tracer"].counting(common.stop)
+    return buffers
+
+
+def _run_nodes(common: _Common, started: _Started, numbers: range) -> None:
+    """Run the nodes of these numbers on the buffers of a tile."""
+    buffers, tracer = started.buffers, started.buffers.get("tracer")
+    seconds, rays, unlit = {}, {}, {}
+    for number in numbers:
+        node = common.plan.tile[number]
         if common.stop.is_set():
             raise Interrupted
 
@@ -243,12 +342,11 @@ def _buffers(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], K
 
         # Hand it to the cache, and drop the buffers that no later node needs.
         if node.output in common.recorder.names:
-            kept[node.output] = common.recorder.take(node.output, buffers, tile)
+            started.kept[node.output] = common.recorder.take(node.output, buffers, started.tile)
         for name in node.inputs.values():
             if common.last_use.get(name) == number:
                 buffers.pop(name, None)
     common.stats.add(seconds, rays, unlit)
-    return buffers, kept
 
 
 def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:

@@ -81,7 +81,8 @@ def _rays_of(scene: Scene, samples: int, computed: set[str]) -> dict[str, int]:
         if f"shadow:{name}" in computed and light.shadows and any(light.color()):
             rays[f"shadow:{name}"] = samples
     if {"obscurance", "obscurance_draws"} <= computed and scene.obscurance:
-        rays["obscurance"] = samples * scene.obscurance.samples
+        traced = "raw_obscurance" if "raw_obscurance" in computed else "obscurance"
+        rays[traced] = samples * scene.obscurance.samples
     return rays
 
 

@@ -123,6 +123,11 @@ def active_lights(scene: Scene) -> dict[str, Light]:
     return {name: light for name, light in scene.named_lights().items() if is_on(light)}
 
 
+def reconstructs(scene: Scene) -> bool:
+    """Is w fitted to the surface around each pixel?"""
+    return bool(scene.obscurance and scene.obscurance.reconstruct) and not all_baked(scene)
+
+
 def is_baked(scene: Scene) -> list[bool]:
     """For each object, True if its mesh names a file of baked obscurance."""
     return [getattr(source_of(scene, thing.mesh), "obscurance", None) is not None for thing in scene.objects]

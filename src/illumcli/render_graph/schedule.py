@@ -10,10 +10,10 @@ from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import Layer
 from illumcli.records import Value
-from illumcli.render_graph.build import GIVEN, SHAPE, Graph
+from illumcli.render_graph.build import GIVEN, SHAPE, SURROUNDINGS, Graph
 from illumcli.render_graph.cached import Lookup
 from illumcli.render_graph.keys import Keys, code
-from illumcli.render_graph.needs import layers, views
+from illumcli.render_graph.needs import layers, reconstructs, views
 from illumcli.render_graph.replicates import BLOCK
 from illumcli.scene.spec import Scene
 
@@ -33,6 +33,8 @@ class Plan(Value):
     once: tuple[Node, ...]
     tile: tuple[Node, ...]
     lookup: Lookup = NOTHING_CACHED
+    before: int = 0
+    """How many of the steps of a tile run before the others read what these made of the tiles around."""
 
     @property
     def buffers(self) -> set[str]:
@@ -83,6 +85,15 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
         Layers that do not exist, or that this film cannot have.
     """
     outputs = tuple(layers(scene, only or scene.outputs.layers))
+    if reconstructs(scene) and any(view.is_adaptive for view in views(scene)):
+        raise InputError(
+            "obscurance.reconstruct needs the same samples in every pixel; leave it out, or film.adaptive"
+        )
+    if reconstructs(scene) and any(layer.per_pixel for layer in outputs):
+        raise InputError(
+            "the layer error is that of samples which are not reconstructed; leave it out, or "
+            "obscurance.reconstruct"
+        )
     if any(layer.per_pixel for layer in outputs) and any(view.is_adaptive for view in views(scene)):
         raise InputError(
             "the layer error is that of a fixed number of samples; leave it out, or film.adaptive"
@@ -120,7 +131,12 @@ def schedule(graph: Graph, outputs: Sequence[Layer], view: View, lookup: Lookup 
             tile.append(node)
         else:
             once.append(node)
-    return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup)
+    before = 0
+    if any(SURROUNDINGS in node.inputs.values() for node in tile):
+        needed = {node.output for node in graph.topological_order(["object_pixels"])}
+        tile.sort(key=lambda node: node.output not in needed)
+        before = sum(node.output in needed for node in tile)
+    return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
 
 
 def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> frozenset[str]:

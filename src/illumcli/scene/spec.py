@@ -346,6 +346,9 @@ class Obscurance(Description):
     about: Literal["shading", "geometric"] = "shading"
     """Axis of the hemisphere. `shading`: the interpolated normal that direct light is shaded with; directions
     that point below the polygon are mirrored at its plane. `geometric`: the polygon's normal."""
+    reconstruct: bool | None = None
+    """True: fit w to the surface around each pixel, object by object, which takes a tenth of the rays for the
+    same error. By default only where `--target-error` chooses the rays."""
 
 
 class Outputs(Description):

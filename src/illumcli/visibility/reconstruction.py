@@ -20,13 +20,15 @@ reconstruction. ACM Transactions on Graphics 31(6).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, Floats
+from illumcli.film.tiles import Tile
 from illumcli.records import Record
+from illumcli.visibility.object_pixels import FEATURES, ObjectPixels, SampledPixels, is_within
 
 CELL = 2
 """Pixels along a cell, which begin at even columns and rows of the film."""
@@ -47,7 +49,6 @@ ROUNDING = 4e-14
 CELLS_AT_ONCE = 1 << 13
 """Cells that are solved together: their moments fit into a core's own cache."""
 
-FEATURES = 6
 PAIRS = tuple((i, j) for i in range(FEATURES) for j in range(i + 1))
 # moments of a cell: number of pixels, features, their products, hidden share, with features, its square
 _COUNT, _FEATURE, _PAIR = 0, 1, 1 + FEATURES
@@ -59,41 +60,18 @@ MOMENTS = _SQUARE + 1
 Planes = NDArray[np.float64]  # (planes, rows, columns)
 
 
-class ObjectPixels(Record):
-    """What G pairs of a pixel and an object in it know of w: means over the samples of the pair.
+def reconstructed_obscurance(
+    tile: Tile, object_pixels: SampledPixels, surrounding_pixels: ObjectPixels, raw_obscurance: Floats
+) -> Floats:
+    """(M,) float32 w of every sample: that of its object in its pixel.
 
-    An object's edge runs through pixels; each object there has a pair of its own.
+    Parameters
+    ----------
+    surrounding_pixels : ObjectPixels
+        Of the tile and `MARGIN` pixels around it.
     """
-
-    x: NDArray[np.int32]  # (G,) column of the film
-    y: NDArray[np.int32]  # (G,) row
-    object: NDArray[np.int32]  # (G,)
-    share: NDArray[np.float32]  # (G,) of the pixel's samples, in (0, 1]
-    hidden: NDArray[np.float32]  # (G,) 1 - w
-    features: NDArray[np.float32]  # (6, G) the normal that w is taken about, the position [radii]
-
-    def take(self, index: NDArray[np.intp]) -> ObjectPixels:
-        """These pairs, in this order."""
-        return ObjectPixels(
-            self.x.take(index),
-            self.y.take(index),
-            self.object.take(index),
-            self.share.take(index),
-            self.hidden.take(index),
-            self.features.take(index, axis=1),
-        )
-
-
-def joined(parts: Sequence[ObjectPixels]) -> ObjectPixels:
-    """The pairs of several tiles."""
-    return ObjectPixels(
-        np.concatenate([part.x for part in parts]),
-        np.concatenate([part.y for part in parts]),
-        np.concatenate([part.object for part in parts]),
-        np.concatenate([part.share for part in parts]),
-        np.concatenate([part.hidden for part in parts]),
-        np.concatenate([part.features for part in parts], axis=1),
-    )
+    w = reconstructed(surrounding_pixels, is_within(surrounding_pixels, tile))
+    return object_pixels.to_samples(raw_obscurance, w)
 
 
 def reconstructed(around: ObjectPixels, wanted: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -1,0 +1,120 @@
+"""Pictures with reconstructed obscurance: the same for any tiles, threads and caches, with less error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from illumcli.cache.memory import MemoryCache
+from illumcli.cache.recorder import Cache
+from illumcli.errors import InputError
+from illumcli.render_graph.execute import Run, at_pixels, bands, run_once
+from illumcli.render_graph.explain import expected_rays
+from illumcli.scene.load import load
+from planned import planned
+
+SCENE = """
+version: 1
+camera: {position: [1.5, 1.6, 3], target: [0, 0.4, 0], fov: 40}
+film: {width: 101, height: 77, samples: 1}
+ambient: [0.3, 0.4, 0.5]
+obscurance: {samples: 4, reconstruct: true}
+meshes: {ball: {shape: sphere, radius: 0.5, segments: 20, rings: 10}}
+objects:
+  - {mesh: {shape: plane, size: [6, 6]}}
+  - {mesh: ball, transform: {translate: [0, 0.5, 0]}}
+  - {mesh: ball, transform: {translate: [1, 0.5, 0]}}
+"""
+LAYERS = ("beauty", "obscurance", "depth")
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def picture(path, *overrides, only=LAYERS, threads=1, side=None, cache=None):
+    run = Run(threads=threads) if cache is None else Run(cache=cache, threads=threads)
+    steps = planned(load(path, overrides), only, cache)
+    made = list(bands(steps, run_once(steps, run), run, side=side))
+    return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+@pytest.mark.parametrize(("threads", "side"), [(1, 8), (2, 13), (3, 128), (2, 40)])
+def test_threads_and_tiles_change_no_bit(path, samples, threads, side):
+    count = f"film.samples={samples}"
+    whole, again = picture(path, count), picture(path, count, threads=threads, side=side)
+    for name, values in whole.items():
+        assert values.tobytes() == again[name].tobytes(), name
+
+
+def test_cached_obscurance_changes_no_bit(path):
+    memory = MemoryCache()
+    first = picture(path, cache=Cache(None, memory))
+    memory.wanted = frozenset(planned(load(path), LAYERS, Cache(None, memory)).lookup.keeps.values())
+    again = picture(path, cache=Cache(None, memory))
+    steps = planned(load(path), LAYERS, Cache(None, memory))
+    assert "obscurance" in steps.lookup.reused
+    assert steps.before == 0
+    third = picture(path, cache=Cache(None, memory))
+    for name, values in picture(path).items():
+        assert all(values.tobytes() == each[name].tobytes() for each in (first, again, third)), name
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_error_falls_to_less_than_a_third(path, samples):
+    count = f"film.samples={samples}"
+    truth = picture(path, count, "obscurance.samples=2048", "obscurance.reconstruct=false")
+    raw, after = (picture(path, count, f"obscurance.reconstruct={on}") for on in ("false", "true"))
+    errors = [float(np.sqrt(np.mean(np.square(p["obscurance"] - truth["obscurance"])))) for p in (raw, after)]
+    assert errors[1] < errors[0] / 3
+    np.testing.assert_array_equal(raw["depth"], after["depth"])
+
+
+def test_an_open_scene_stays_exactly_open(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(SCENE.split("  - {mesh: ball")[0])
+    made = picture(scene, "film.samples=3", only=("obscurance", "alpha"))
+    assert 0 < made["alpha"].mean() < 1
+    np.testing.assert_array_equal(made["obscurance"], made["alpha"])
+
+
+def test_baked_objects_keep_their_values(path, tmp_path, illum):
+    scene = tmp_path / "scene.yaml"
+    (tmp_path / "ball.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    illum("ao-bake", "ball.obj", "-o", "ball.npz", "--samples", "8", cwd=tmp_path)
+    scene.write_text(
+        SCENE + "  - {mesh: {file: ball.obj, obscurance: ball.npz}, transform: {translate: [-1, 0, 0]}}\n"
+    )
+    raw, after = (
+        picture(scene, f"obscurance.reconstruct={on}", only=("obscurance", "object_id"))
+        for on in ("false", "true")
+    )
+    baked = after["object_id"] == 4
+    assert baked.any()
+    np.testing.assert_array_equal(raw["obscurance"][baked], after["obscurance"][baked])
+    assert (raw["obscurance"] != after["obscurance"])[~baked].any()
+
+
+def test_what_has_no_reconstruction_is_refused(path):
+    with pytest.raises(InputError, match=r"film\.adaptive"):
+        planned(load(path, ["film.samples=4", "film.adaptive=2"]))
+    with pytest.raises(InputError, match="layer error"):
+        planned(load(path), ["error"])
+    steps = planned(load(path))
+    x = np.arange(3)
+    with pytest.raises(ValueError, match="alone"):
+        at_pixels(steps, run_once(steps, Run()), Run(), x, x)
+
+
+def test_expected_rays_are_those_of_the_raw_values(path):
+    steps = planned(load(path))
+    names = [node.output for node in steps.tile]
+    assert names.index("object_pixels") < steps.before <= names.index("obscurance")
+    rays = expected_rays(steps.graph.scene, [steps.view], steps.computed)
+    assert rays == {"primary": 101 * 77, "raw_obscurance": 4 * 101 * 77}

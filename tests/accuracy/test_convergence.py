@@ -16,15 +16,9 @@ from illumcli.accuracy.reference import reference_image
 from illumcli.accuracy.sampled import Sampling, sampled_layer
 from illumcli.errors import InputError
 from illumcli.scene.load import load
+from ring import RING
 
-SCENE = """
-version: 1
-film: {width: 64, height: 36, samples: 2}
-ambient: 1
-obscurance: {samples: 4}
-objects: [{mesh: {shape: torus}}, {mesh: {shape: disc, radius: 4}}]
-lights: [{light: point, position: [3, 4, 5], intensity: 30}]
-"""
+SCENE = RING.format(samples=2, ambient=1)
 
 
 @pytest.fixture

@@ -13,15 +13,9 @@ from illumcli.accuracy.sampled import Sampling, sampled_layer
 from illumcli.accuracy.target import VarianceLaw, choose_sampling, paired_error
 from illumcli.errors import InputError, LimitError
 from illumcli.scene.load import load
+from ring import RING
 
-SCENE = """
-version: 1
-film: {width: 64, height: 36, samples: 1}
-ambient: 0.8
-obscurance: {samples: 4}
-objects: [{mesh: {shape: torus}}, {mesh: {shape: disc, radius: 4}}]
-lights: [{light: point, position: [3, 4, 5], intensity: 30}]
-"""
+SCENE = RING.format(samples=1, ambient=0.8)
 
 
 @pytest.fixture

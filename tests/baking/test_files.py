@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from plyfile import PlyData
 
+from baked_values import ABOUT, SQUARE, baked
 from illumcli.baking.files import add_baked_to_glb, baked_contents, write_baked_glb, write_baked_ply
 from illumcli.errors import InputError
 from illumcli.mesh_files import read_mesh
@@ -16,15 +17,6 @@ from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import _Buffer
 from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.visibility.baked import Baked, write_npz
-
-SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
-ABOUT = {"content": "abc", "vertices": {"a": 4, "b": 4}, "meshes": {"a": "hash a", "b": "hash b"}}
-
-
-def baked(count=4, bent=False, **about):
-    w = np.linspace(0, 1, count, dtype=np.float32)
-    normals = np.tile(np.float32([0, 0, 1]), (count, 1)) if bent else None
-    return Baked(w, w / 100, normals, about)
 
 
 def shape(name="a", shift=0.0, **attributes):

@@ -98,3 +98,24 @@ def agree() -> Callable[[Any, Case], None]:
         )
 
     return check
+
+
+@pytest.fixture
+def agree_under_lights(cases, respond, agree) -> Callable[..., None]:
+    """Compares a model with published sums over several lights, of colours or of one channel."""
+
+    def check(name: str, Model: type[Any], lobe: str | None = None) -> None:
+        for case in cases(name):
+            i = case["inputs"]
+            if lobe is not None and i["lobe"] != lobe:
+                continue
+            diffuse = tuple(np.broadcast_to(i["kd"], 3).tolist())
+            model = Model(diffuse=diffuse, specular=(i["ks"],) * 3, exponent=float(i["exponent"]))
+            direct = sum(
+                respond(model, i | light) * np.array(light["intensity"]) * light["f_d"]
+                for light in i["lights"]
+            )
+            total = np.array(i["Ie"]) + np.array(i["Ia"]) * i["ka"] + direct
+            agree(total if np.ndim(i["kd"]) else total[0], case)
+
+    return check

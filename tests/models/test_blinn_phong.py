@@ -10,26 +10,12 @@ from illumcli.models.blinn_phong import BlinnPhong
 from illumcli.shading.terms import evaluate
 
 
-def test_published_values(cases, respond, agree):
-    for case in cases("blinn_phong"):
-        i = case["inputs"]
-        model = BlinnPhong(diffuse=(i["kd"],) * 3, specular=(i["ks"],) * 3, exponent=float(i["exponent"]))
-        direct = sum(
-            respond(model, i | light)[0] * light["intensity"] * light["f_d"] for light in i["lights"]
-        )
-        agree(i["Ie"] + i["Ia"] * i["ka"] + direct, case)
+def test_published_values(agree_under_lights):
+    agree_under_lights("blinn_phong", BlinnPhong)
 
 
-def test_published_colors(cases, respond, agree):
-    for case in cases("phong_rgb"):
-        i = case["inputs"]
-        if i["lobe"] != "h":
-            continue
-        model = BlinnPhong(diffuse=tuple(i["kd"]), specular=(i["ks"],) * 3, exponent=float(i["exponent"]))
-        direct = sum(
-            respond(model, i | light) * np.array(light["intensity"]) * light["f_d"] for light in i["lights"]
-        )
-        agree(np.array(i["Ie"]) + np.array(i["Ia"]) * i["ka"] + direct, case)
+def test_published_colors(agree_under_lights):
+    agree_under_lights("phong_rgb", BlinnPhong, lobe="h")
 
 
 def test_the_half_vector_opens_half_as_fast_in_the_plane_of_incidence(respond):

@@ -10,26 +10,12 @@ from illumcli.models.phong import Phong
 from illumcli.shading.terms import evaluate
 
 
-def test_published_values(cases, respond, agree):
-    for case in cases("phong"):
-        i = case["inputs"]
-        model = Phong(diffuse=(i["kd"],) * 3, specular=(i["ks"],) * 3, exponent=float(i["exponent"]))
-        direct = sum(
-            respond(model, i | light)[0] * light["intensity"] * light["f_d"] for light in i["lights"]
-        )
-        agree(i["Ie"] + i["Ia"] * i["ka"] + direct, case)
+def test_published_values(agree_under_lights):
+    agree_under_lights("phong", Phong)
 
 
-def test_published_colors(cases, respond, agree):
-    for case in cases("phong_rgb"):
-        i = case["inputs"]
-        if i["lobe"] != "r":
-            continue
-        model = Phong(diffuse=tuple(i["kd"]), specular=(i["ks"],) * 3, exponent=float(i["exponent"]))
-        direct = sum(
-            respond(model, i | light) * np.array(light["intensity"]) * light["f_d"] for light in i["lights"]
-        )
-        agree(np.array(i["Ie"]) + np.array(i["Ia"]) * i["ka"] + direct, case)
+def test_published_colors(agree_under_lights):
+    agree_under_lights("phong_rgb", Phong, lobe="r")
 
 
 @pytest.mark.parametrize("exponent", [1e-6, 2.0, 2.5])

@@ -5,17 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from baked_values import ABOUT, SQUARE, baked
 from illumcli.errors import InputError
 from illumcli.visibility.baked import Baked, mesh_hash, read_npz, write_npz
-
-SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
-ABOUT = {"content": "abc", "vertices": {"a": 4, "b": 4}, "meshes": {"a": "hash a", "b": "hash b"}}
-
-
-def baked(count=4, bent=False, **about):
-    w = np.linspace(0, 1, count, dtype=np.float32)
-    normals = np.tile(np.float32([0, 0, 1]), (count, 1)) if bent else None
-    return Baked(w, w / 100, normals, about)
 
 
 @pytest.mark.parametrize("bent", [False, True])

@@ -51,15 +51,8 @@ def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, chan
 def add_baked_to_glb(
     path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], baked: Baked
 ) -> None:
-    """A GLB with the same attributes added to each primitive, all else as it is.
-
-    Parameters
-    ----------
-    source : (dict, bytes)
-        The JSON of the input, which is changed, and its binary chunk.
-    counts : sequence of (mesh, primitive, vertices)
-        The primitives in the order of the baked vertices, each once.
-    """
+    """A GLB with the same attributes added to each primitive, all else as it is; `source` and `counts` are
+    those of `gltf.add_to_glb`."""
     gltf.add_to_glb(path, source, counts, _vertex_data(baked.columns(), baked, None))
 
 

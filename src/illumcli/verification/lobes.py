@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -112,26 +113,6 @@ def geometry_of_strauss(inputs: Inputs) -> Floats:
     return strauss_geometry(1 - inputs.scalars("x"), inputs.scalars("kg"))
 
 
-def ward(inputs: Inputs) -> Floats:
-    model = Ward(
-        diffuse=inputs.color("rho_d"),
-        specular=inputs.color("rho_s"),
-        alpha_x=inputs.number("ax"),
-        alpha_y=inputs.number("ay"),
-    )
-    return brdf(model, inputs, t=inputs.tangent())
-
-
-def ashikhmin_shirley(inputs: Inputs) -> Floats:
-    model = AshikhminShirley(
-        diffuse=inputs.color("Rd"),
-        specular=inputs.color("Rs"),
-        exponent_u=inputs.number("nu"),
-        exponent_v=inputs.number("nv"),
-    )
-    return brdf(model, inputs, t=inputs.tangent())
-
-
 def kajiya_kay(inputs: Inputs) -> Floats:
     """A strand of hair: no surface hides the light, so the lobes are evaluated directly."""
     model = KajiyaKay(
@@ -141,14 +122,23 @@ def kajiya_kay(inputs: Inputs) -> Floats:
     return np.asarray(sum(values.values(), np.zeros((1, 3), inputs.dtype)))[:, 0]
 
 
-def aniso_cylinder(inputs: Inputs) -> Floats:
-    model = PoulinFournier(
-        diffuse=inputs.color("kd"),
-        specular=inputs.color("ks"),
-        exponent=inputs.number("exponent"),
-        slope=inputs.number("theta_s"),
-    )
-    return brdf(model, inputs, t=inputs.tangent())
+def grained(Model: type[IlluminationModel], **keys: str) -> Callable[[Inputs], Floats]:
+    """Evaluator of f_r of a model whose grain is the case's tangent.
+
+    Parameters
+    ----------
+    keys
+        The key in the cases of each parameter: colours of `diffuse` and `specular`, numbers of others.
+    """
+
+    def evaluate_case(inputs: Inputs) -> Floats:
+        parameters: dict[str, float | tuple[float, float, float]] = {
+            name: inputs.color(key) if name in ("diffuse", "specular") else inputs.number(key)
+            for name, key in keys.items()
+        }
+        return brdf(Model.model_validate(parameters), inputs, t=inputs.tangent())
+
+    return evaluate_case
 
 
 CASES = {
@@ -159,8 +149,12 @@ CASES = {
     "strauss_terms": strauss_terms,
     "strauss_fresnel": fresnel_of_strauss,
     "strauss_geometry": geometry_of_strauss,
-    "ward": ward,
-    "ashikhmin_shirley": ashikhmin_shirley,
+    "ward": grained(Ward, diffuse="rho_d", specular="rho_s", alpha_x="ax", alpha_y="ay"),
+    "ashikhmin_shirley": grained(
+        AshikhminShirley, diffuse="Rd", specular="Rs", exponent_u="nu", exponent_v="nv"
+    ),
     "kajiya_kay": kajiya_kay,
-    "aniso_cylinder": aniso_cylinder,
+    "aniso_cylinder": grained(
+        PoulinFournier, diffuse="kd", specular="ks", exponent="exponent", slope="theta_s"
+    ),
 }

@@ -23,11 +23,11 @@ class Directional(Light):
 
     def sample_at(self, position: Vectors, render_space: RenderSpace) -> LightSample:
         """Light at `position`: the same everywhere, scale 1, distance inf."""
-        lanes = len(position)
+        count = len(position)
         direction = -np.asarray(self.direction) / np.abs(self.direction).max()
         l = (direction / np.linalg.norm(direction)).astype(position.dtype)
         return LightSample(
-            np.broadcast_to(l, (lanes, 3)),
-            np.broadcast_to(position.dtype.type(np.inf), lanes),
-            np.broadcast_to(position.dtype.type(1), lanes),
+            np.broadcast_to(l, (count, 3)),
+            np.broadcast_to(position.dtype.type(np.inf), count),
+            np.broadcast_to(position.dtype.type(1), count),
         )

@@ -1,4 +1,4 @@
-"""What every illumination model is: frozen parameters, lobes as functions of named terms, claims."""
+"""Base of all illumination models: frozen parameters, lobes as functions of named terms, tested claims."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ D = TypeVar("D", bound=Description)
 class IlluminationModel(Description):
     """Parameters of a local illumination model and its response to one light.
 
-    A model has up to two lobes, the methods `diffuse_lobe` and `specular_lobe`. Their parameter names are
-    the terms they need (`shading.terms`); each returns the light leaving towards the eye per unit of
-    irradiance facing the light, the cosine included, as (N, 3) in the precision of the lanes. Lanes that
-    face away from the light never reach a model. A field read inside a lobe is a number or a colour, or,
-    where the parameter varies over the surface, one value per lane: (N,) or (N, 3), put there by `at`.
+    A model has up to two lobes, the methods `diffuse_lobe` and `specular_lobe`. Their parameter names are the
+    terms that they need (`shading.terms`), arrays over N points. Each returns the radiance towards the eye
+    per unit of irradiance on a surface that faces the light, the cosine included, (N, 3) in the precision of
+    the terms. Models are never evaluated at points that face away from the light. A field that a lobe reads
+    is a number or a colour, or, if the parameter varies over the surface, one value per point, (N,) or (N,
+    3), which `at` puts there.
 
-    Claims hold for every value of the numbers, at the default of each choice (a word, a flag, an option
-    left out); the shared tests check every claim.
+    Claims hold for all values of the numeric parameters, with each choice (a word, a flag, an optional
+    parameter) at its default; the shared tests check every claim.
     """
 
     emission: Varying[Color] = (0.0, 0.0, 0.0)
-    """L_e, light the surface emits by itself [W/(m^2 sr)]."""
+    """L_e, radiance that the surface emits [W/(m^2 sr)]."""
     ambient: Varying[Color] | None = None
-    """k_a, the share of ambient light that leaves towards the eye; by default what the model reflects
-    diffusely."""
+    """k_a, the share of ambient light that is reflected towards the eye; by default the diffuse albedo."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {
         "diffuse_lobe": ("diffuse",),
         "specular_lobe": ("specular",),
     }
-    """Per lobe, the parameters of which a single zero makes the lobe vanish: it is skipped then."""
+    """For each lobe, the parameters that are its factors: if one is 0, the lobe is not evaluated."""
     reciprocal: ClassVar[bool] = False
-    """Claim: response / n_l keeps its value when light and eye change places."""
+    """Claim: response / n_l does not change if light and eye are exchanged."""
     conserving: ClassVar[bool] = False
-    """Claim: with every parameter in range, no more light leaves than arrives."""
+    """Claim: with all parameters in range, no more light is reflected than is incident."""
     isotropic: ClassVar[bool] = True
-    """Claim: turning the surface about its normal changes nothing."""
+    """Claim: rotating the surface about its normal changes nothing."""
     physical: ClassVar[bool] = False
-    """True where the response is a BRDF times the cosine; False for the intensity models of the
-    texts, whose numbers have no radiometric unit."""
+    """True if the response is a BRDF times the cosine; False for intensity models, which have no
+    radiometric units."""
 
     def lobes(self) -> dict[str, Lobe]:
-        """The lobes that are not black by their parameters, by name (`diffuse`, `specular`)."""
+        """The lobes by name (`diffuse`, `specular`), without those that a parameter makes black."""
         return {
             method.removesuffix("_lobe"): getattr(self, method)
             for method in ("diffuse_lobe", "specular_lobe")
@@ -62,11 +62,11 @@ class IlluminationModel(Description):
         return self.diffuse_color() if self.ambient is None else self.ambient
 
     def has_grain(self) -> bool:
-        """Does turning the surface about its normal change anything, with these parameters?"""
+        """True if, with these parameters, rotating the surface about its normal changes its look."""
         return not self.isotropic
 
     def diffuse_color(self) -> Any:
-        """The diffuse albedo; a model whose parameter is not called `diffuse` says what it is."""
+        """The diffuse albedo: the parameter `diffuse`, unless a model defines it otherwise."""
         return getattr(self, "diffuse", (0.0, 0.0, 0.0))
 
     def varying(self) -> dict[str, Texture | VertexValues]:
@@ -74,12 +74,12 @@ class IlluminationModel(Description):
         return dict(_varying(self))
 
     def at(self, values: Mapping[str, Any]) -> Self:
-        """This model with arrays in place of parameters, by path; nothing is validated again.
+        """This model with arrays in place of parameters, by path, without validation.
 
         Parameters
         ----------
         values : mapping
-            Path, as `varying` names it -> (N,) numbers or (N, 3) colours, one per lane.
+            Path, as in `varying` -> (N,) numbers or (N, 3) colours, one per point.
         """
         return _replace_parameters(self, values)
 

@@ -1,7 +1,7 @@
-"""Fresnel reflectance: formulas that several models share, and the choices a scene has.
+"""Fresnel reflectance: formulas that several models share, and their descriptions in scenes.
 
 c is the cosine between the light and the *facet's* normal, l.h = v.h; texts that print n.l mean a mirror.
-Every function works element by element on arrays that broadcast, and keeps their precision.
+Every function works element by element on arrays that broadcast, in their precision.
 
 References
 ----------
@@ -27,11 +27,11 @@ Array: TypeAlias = NDArray[np.floating[Any]]
 
 
 def dielectric(c: Array, eta: Array) -> Array:
-    """Reflectance of a clear boundary for unpolarised light, 0..1; 1 where all is reflected inside.
+    """Reflectance of a dielectric boundary for unpolarised light, 0..1; 1 at total internal reflection.
 
     g^2 = eta^2 + c^2 - 1; Cook and Torrance's fraction, with (g - c) / (g + c) = (eta^2 - 1) / (g + c)^2 and
-    c (g -+ c) +- 1 = c g +- (1 - c^2), so that eta near 1 and c near 0 keep their digits. Where g^2 < 0 both
-    quotients stop at -1: total reflection.
+    c (g -+ c) +- 1 = c g +- (1 - c^2), which are accurate for eta near 1 and c near 0. If g^2 < 0, both
+    quotients are clamped to -1: total reflection.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def eta_from_f0(f0: Array) -> Array:
 def color_shift(c: Array, eta: Array, color0: Array, color90: Array) -> Array:
     """Cook and Torrance's colour between `color0` at normal incidence and `color90` at grazing.
 
-    It stands in place of F; texts that multiply it by F again count Fresnel twice, and one swaps the colours.
+    It replaces F; texts that multiply it by F again apply Fresnel twice, and one text swaps the colours.
     """
     t = (dielectric(c, eta) - f0_from_eta(eta)) * (np.square(1 + eta) / (4 * eta))
     return color0 + (color90 - color0) * np.clip(t, 0, 1)
@@ -114,11 +114,11 @@ MATERIALS: dict[str, tuple[float, float, float]] = {
 
 
 class Dielectric(Description):
-    """A clear boundary: glass, water, plastic, lacquer."""
+    """A dielectric boundary: glass, water, plastic, lacquer."""
 
     F: Literal["dielectric"] = "dielectric"
     ior: Varying[Index] = 1.5
-    """eta, index of refraction behind the surface over the one before it; below 1 it may reflect all."""
+    """eta, index of refraction behind the surface over the one before it; below 1, reflection may be total."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(N,) at the cosine c."""
@@ -157,11 +157,11 @@ class Material(Description):
 
     F: Literal["material"] = "material"
     name: Literal["water", "plastic", "glass", "diamond", "copper", "aluminium"] = "plastic"
-    """Row of the table, by its F0. `water`: 0.02. `plastic`: 0.05. `glass`: 0.08, dense flint. `diamond`:
-    0.17. `copper`: 0.95, 0.64, 0.54. `aluminium`: 0.91, 0.92, 0.92."""
+    """Name of the material, with its F0. `water`: 0.02. `plastic`: 0.05. `glass`: 0.08, dense flint.
+    `diamond`: 0.17. `copper`: 0.95, 0.64, 0.54. `aluminium`: 0.91, 0.92, 0.92."""
     curve: Literal["dielectric", "schlick"] = "dielectric"
-    """How the table's F0 goes on to grazing. `dielectric`: by the index it implies with k = 0, which for
-    metals is fictitious. `schlick`: by Schlick's curve."""
+    """Reflectance between normal incidence and grazing. `dielectric`: by the index that F0 implies with k =
+    0, which for metals is fictitious. `schlick`: by Schlick's curve."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c."""
@@ -170,16 +170,16 @@ class Material(Description):
 
 
 class Shifted(Description):
-    """Cook and Torrance's shift of colour, from the material's at the normal to the light's at grazing."""
+    """Cook and Torrance's colour shift, from the material's colour at the normal to white or the light's."""
 
     F: Literal["shifted"] = "shifted"
     color: Varying[Albedo] = (0.95, 0.64, 0.54)
     """Colour of the reflection at normal incidence under white light; replaces F0."""
     ior: Varying[Index] = 10.0
-    """eta, the average index that tells how fast the colour shifts."""
+    """eta, the average index; it determines how fast the colour shifts."""
     grazing: Literal["white", "light"] = "white"
-    """Colour at grazing. `white`: the light keeps its colour. `light`: the text's wording taken literally,
-    which applies the colour of the light twice."""
+    """Colour at grazing. `white`: the reflection has the light's colour. `light`: the wording of the text
+    taken literally, which applies the light's colour twice."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(3, N) at the cosine c; `light` is the light's colour, largest component 1."""

@@ -1,4 +1,4 @@
-"""Lobe shapes and weights that several models share, in forms that keep their digits."""
+"""Lobe shapes and weights that several models share, in numerically stable forms."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from illumcli.schema.description import Description
 def lobe(gap: Floats, exponent: Floats | float) -> Floats:
     """(N,) max(0, cos(angle))^exponent from gap = 1 - cos(angle); an exponent of 0 gives 1 at any angle.
 
-    A power of a rounded cosine loses exponent * 2^-53 of its value; with the gap formed as half the squared
-    distance of two unit vectors, exp(e log1p(-gap)) keeps its digits for exponents of 10^6 and more.
+    A power of a rounded cosine has a relative error of exponent * 2^-53. With the gap computed as half the
+    squared distance of two unit vectors, exp(e log1p(-gap)) is accurate for exponents of 10^6 and more.
     """
     below_one = 1 - float(np.finfo(gap.dtype).epsneg)
     return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * ((gap < 1) | (exponent == 0))
 
 
 def log_cos(cosine: Floats, sin2: Floats) -> Floats:
-    """(N,) logarithm of a cosine above 0: from sin^2 near 0 degrees, where the cosine has lost its digits."""
+    """(N,) logarithm of a cosine above 0; near 0 degrees from sin^2, where the cosine is inaccurate."""
     near = sin2 < 0.5
     return np.log1p(-np.minimum(sin2, 0.5)) / 2 * near + np.log(cosine) * ~near
 
 
-def channels(lanes: Floats, color: object) -> Floats:
-    """A colour in the precision of `lanes`, channel by channel: (3, 1), or (3, N) where it varies.
+def channels(like: Floats, color: object) -> Floats:
+    """A colour in the precision of `like`, (N,), with the channels first: (3, 1), or (3, N) if it varies.
 
-    Its product with (N,) lanes is (3, N), whose transpose is (N, 3) column by column in memory.
+    Its product with (N,) values is (3, N), whose transpose is (N, 3) in column-major order.
     """
-    values = np.asarray(color, lanes.dtype)
+    values = np.asarray(color, like.dtype)
     return values[:, None] if values.ndim == 1 else values.T
 
 
-def tint(color: object, lanes: Floats) -> Vectors:
-    """(N, 3) the lanes weighted by a colour, or by one colour per lane."""
-    return (channels(lanes, color) * lanes).T
+def tint(color: object, values: Floats) -> Vectors:
+    """(N, 3) product of values, (N,), and a colour, or one colour per value."""
+    return (channels(values, color) * values).T
 
 
-def weighed(color: object, weight: object) -> Any:
-    """A colour times a number, or (N, 3) where either varies; unchanged while either is still a texture."""
+def weighted(color: object, weight: object) -> Any:
+    """A colour times a number, (N, 3) if either varies; `color` itself if either is still a texture."""
     if isinstance(color, Description) or isinstance(weight, Description):
         return color
     product = np.asarray(color) * np.asarray(weight)[..., None]

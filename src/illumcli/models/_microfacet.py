@@ -1,8 +1,8 @@
-"""Facet distributions D and the V-groove term G: formulas, and the choices a scene has.
+"""Facet distributions D and the V-groove term G: formulas, and their descriptions in scenes.
 
 theta is the angle between the normal and the half vector. Distributions take its cosine `n_h` (above 0) and
-`sin2_h` = sin^2, so that sharp lobes keep their digits near the normal and wide ones at grazing; no angle
-is formed except where the formula itself is of the angle. Every function works element by element.
+`sin2_h` = sin^2, so that narrow lobes are accurate near the normal and wide ones at grazing. The angle itself
+is computed only if a formula has it. Every function works element by element.
 
 A *normalised* D satisfies: the integral of D cos(theta) over the hemisphere is 1. [1/sr]
 
@@ -53,7 +53,7 @@ def gaussian_constant(m: Floats) -> Floats:
 def beckmann(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
     """exp(-tan^2 / m^2) / (pi m^2 cos^4), normalised; m is the RMS slope.
 
-    The exponential meets 1 / cos^4 = (1 + tan^2)^2 only where it is not yet 0.
+    1 / cos^4 is computed as (1 + tan^2)^2, which is finite wherever the exponential is not 0.
     """
     tan2 = sin2_h / np.square(n_h)
     return np.exp(-tan2 / np.square(m)) * np.square((1 + tan2) / m) / np.pi
@@ -62,7 +62,7 @@ def beckmann(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
 def beckmann_slope1d(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
     """exp(-tan^2 / m^2) / (sqrt(pi) m cos^2): density of one profile's slope angle.
 
-    One text prints m^2 in place of m; its integral is 1 / m then.
+    One text prints m^2 in place of m; the integral of that is 1 / m.
     """
     tan2 = sin2_h / np.square(n_h)
     return np.exp(-tan2 / np.square(m)) * (1 + tan2) / (np.sqrt(np.pi) * m)
@@ -95,10 +95,10 @@ def alpha_of_half_height(beta: Floats) -> Floats:
 
 
 def vgroove(n_l: Floats, n_v: Floats, s_s: Floats) -> Floats:
-    """Torrance and Sparrow's share of a V-groove that is lit and seen, 0..1.
+    """Torrance and Sparrow's fraction of a V-groove that is lit and visible, 0..1.
 
     min(1, 2 n_h n_v / v_h, 2 n_h n_l / v_h) with n_h = (n_l + n_v) / |s|, v_h = |s| / 2. Texts print it
-    without the 1, or as the share that is blocked.
+    without the 1, or as the fraction that is blocked.
     """
     tiny = np.finfo(np.result_type(s_s)).tiny
     return np.minimum(1, 4 * np.minimum(n_l, n_v) * (n_l + n_v) / np.maximum(s_s, tiny))
@@ -118,7 +118,7 @@ class Gaussian(Description):
     m: Varying[Roughness] = 0.3
     """m, angle in radians at which D has fallen to 1/e."""
     c: Varying[Positive] | None = None
-    """c, height at the normal [1/sr]; left out, the c that normalises D."""
+    """c, height at the normal [1/sr]; by default the c that normalises D."""
 
     def density(self, theta: Angle, printed: bool = False) -> Floats:
         """(N,) c exp(-(theta / m)^2)."""

@@ -1,4 +1,4 @@
-"""Parameters of materials: their ranges, and what may stand for one that varies over the surface."""
+"""Parameters of materials: their ranges, and the textures and vertex values that may replace a constant."""
 
 from __future__ import annotations
 
@@ -16,22 +16,21 @@ class Texture(Description):
     texture: str
     """Path of the image, from the scene's folder."""
     space: Literal["srgb", "linear"] | None = None
-    """How the file's numbers code light; by default linear where they are floats, as in EXR and HDR, and sRGB
-    where they are integers. `srgb`: by the sRGB curve, as pictures do. `linear`: as they are, for integers
-    that are data, as most scalars."""
+    """Colour space of the file's numbers; by default linear for floats, as in EXR and HDR, and sRGB for
+    integers. `srgb`: the sRGB curve. `linear`: no curve, for integers that are data, such as most scalars."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
-    """`bilinear`: between the four texels around. `nearest`: the texel itself."""
+    """`bilinear`: interpolate between the four nearest texels. `nearest`: take the nearest texel."""
     wrap: Literal["repeat", "clamp", "mirror"] = "repeat"
-    """What lies outside of uv 0..1. `repeat`: the image again. `clamp`: its border. `mirror`: the image
-    again, every second time mirrored."""
+    """How uv outside of 0..1 are treated. `repeat`: the image is repeated. `clamp`: its border is extended.
+    `mirror`: it is repeated, every second time mirrored."""
     channel: Literal["r", "g", "b", "a"] = "r"
-    """The channel a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
+    """The channel that a scalar parameter reads. `r`: red, or grey. `g`: green. `b`: blue. `a`: alpha."""
     factor: Color = (1.0, 1.0, 1.0)
-    """What each value is multiplied by; a scalar parameter takes the first number."""
+    """Factor on each value; a scalar parameter takes the first number."""
     vertex: str | None = None
-    """Name of a per-vertex attribute that each value is multiplied by as well, as vertex colours are."""
+    """Name of a per-vertex attribute that multiplies each value, too, such as vertex colours."""
     uv: str | None = None
-    """Name of a per-vertex attribute of two numbers to look the image up by; by default the mesh's own uv."""
+    """Name of a per-vertex attribute of two numbers, the texture coordinates; by default the mesh's uv."""
 
 
 class VertexValues(Description):
@@ -40,7 +39,7 @@ class VertexValues(Description):
     vertex: str
     """Name of the attribute: `color` for vertex colours, or a scalar property of the file."""
     factor: Color = (1.0, 1.0, 1.0)
-    """What each value is multiplied by; a scalar parameter takes the first number."""
+    """Factor on each value; a scalar parameter takes the first number."""
 
 
 def _kind(value: Any) -> str:
@@ -52,13 +51,13 @@ def _kind(value: Any) -> str:
 
 
 T = TypeVar("T")
-# a value, or what varies over the surface
+# a constant, a texture or vertex values
 Varying: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
     Discriminator(_kind),
 ]
 
-# a slope; below 1e-4 single precision holds no lobe
+# a slope; a lobe narrower than 1e-4 cannot be resolved in single precision
 Roughness: TypeAlias = Annotated[float, Field(ge=1e-4, le=10)]
 # an angle in radians, less than a quarter turn
 HalfHeight: TypeAlias = Annotated[float, Field(ge=1e-4, le=1.57)]

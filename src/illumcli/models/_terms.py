@@ -1,4 +1,4 @@
-"""Terms that belong together: quantities of one vector or angle that a formula takes as one."""
+"""Records of terms that belong together: quantities of one vector or angle."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from illumcli.arrays import Floats
 
 
 class Angle(NamedTuple):
-    """An angle below pi / 2 by two functions of it, each exact where the other has lost its digits."""
+    """An angle below pi / 2 as cosine and squared sine; each is accurate where the other is not."""
 
     cosine: Floats  # (N,) above 0
     sin2: Floats  # (N,) squared sine
 
 
 class Components(NamedTuple):
-    """A vector along the tangent (the grain), across it, and along the normal."""
+    """The components of a vector along the tangent (the grain), along the bitangent and along the normal."""
 
     t: Floats  # (N,)
     b: Floats  # (N,)

@@ -1,4 +1,4 @@
-"""Ashikhmin-Shirley: an anisotropic Phong-like highlight with Fresnel, to which the diffuse part gives way.
+"""Ashikhmin-Shirley: an anisotropic highlight with Fresnel, and a diffuse part that conserves energy.
 
 response = n_l * (specular + diffuse)
 specular = sqrt((nu + 1) (nv + 1)) / (8 pi) * (n.h)^p / (c max(n_l, n_v)) * (Rs + (1 - Rs) (1 - c)^5)
@@ -37,7 +37,7 @@ class AshikhminShirley(IlluminationModel):
     exponent_u: Varying[NonNegative] = 100.0
     """nu, exponent along the grain; 0 to 10^6 and beyond."""
     exponent_v: Varying[NonNegative] = 10.0
-    """nv, exponent across the grain; equal to nu, the surface is isotropic."""
+    """nv, exponent across the grain; if equal to nu, the surface is isotropic."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {"diffuse_lobe": ("diffuse",)}
     reciprocal: ClassVar[bool] = True
@@ -46,14 +46,14 @@ class AshikhminShirley(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def has_grain(self) -> bool:
-        """Unless the exponents are equal along and across it."""
+        """True unless the exponents along and across the grain are equal."""
         return self.exponent_u != self.exponent_v
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats) -> Vectors:
         """(N, 3) n_l * diffuse."""
         Rd, Rs = channels(n_l, self.diffuse), channels(n_l, self.specular)
-        seen = n_l * _rise(n_l) * _rise(n_v) * (28 / (23 * np.pi))
-        return (Rd * (1 - Rs) * seen).T
+        shape = n_l * _rise(n_l) * _rise(n_v) * (28 / (23 * np.pi))
+        return (Rd * (1 - Rs) * shape).T
 
     def specular_lobe(
         self, n_l: Floats, n_v: Floats, s_s: Floats, v_h: Floats, n_h: Floats, s_local: Components
@@ -70,6 +70,6 @@ class AshikhminShirley(IlluminationModel):
 
 
 def _rise(cosine: Floats) -> Floats:
-    """1 - (1 - cosine / 2)^5, 0 at the horizon with all its digits."""
+    """1 - (1 - cosine / 2)^5, expanded so that it is accurate near the horizon."""
     x = cosine / 2
     return x * (5 - x * (10 - x * (10 - x * (5 - x))))

@@ -9,7 +9,7 @@ highlight; not reciprocal. The normalised form is reciprocal, and its highlight 
 incidence. Near the plane of incidence an exponent of about 4 e matches Phong's e; the angle between n and h
 is at least half the one between r and v, equal only where n, l and v share a plane.
 
-The half vector is made unit; texts that print (l + v) / 2 make n.h too small.
+The half vector is normalized; with the (l + v) / 2 of some texts n.h is too small.
 
 References
 ----------
@@ -39,10 +39,10 @@ class BlinnPhong(IlluminationModel):
     exponent: Varying[NonNegative] = 32.0
     """e, 0 to 10^6 and beyond: the larger, the smaller the highlight."""
     normalised: bool = False
-    """Divide each lobe by its integral at normal incidence and weigh it by the cosine."""
+    """Divide each lobe by its integral at normal incidence and multiply it by the cosine."""
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
-        """(N, 3) kd * n_l; over pi where normalised."""
+        """(N, 3) kd * n_l; divided by pi if normalised."""
         return tint(self.diffuse, n_l / np.pi if self.normalised else n_l)
 
     def specular_lobe(self, n_l: Floats, gap_nh: Floats) -> Vectors:

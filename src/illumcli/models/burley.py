@@ -3,9 +3,9 @@
 response = n_l * rho / pi * (1 + (f - 1) (1 - n_l)^5) * (1 + (f - 1) (1 - n_v)^5)
 f = 1/2 + 2 r (l.h)^2
 
-A fit to the measured materials of the MERL database, as a BRDF times the cosine; reciprocal. Smooth, it loses
-up to three quarters at grazing, as Fresnel's law takes light away from below a coat; rough, it gains up to
-6.25 times, and a white surface reflects more than arrives. Only the diffuse part of the paper's model.
+A fit to the measured materials of the MERL database, as a BRDF times the cosine; reciprocal. At grazing a
+smooth surface loses up to three quarters, since less light enters it by Fresnel's law. A rough surface gains
+up to 6.25 times, and a white one reflects more light than is incident. Only the paper's diffuse part.
 
 References
 ----------
@@ -28,7 +28,7 @@ from illumcli.schema.fields import Albedo, Share
 class Burley(IlluminationModel):
     model: Literal["burley"] = "burley"
     diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
-    """rho, the albedo seen and lit from the normal."""
+    """rho, the albedo for light and eye along the normal."""
     roughness: Varying[Share] = 0.5
     """r: 0 smooth, edges dark; 1 rough, edges bright towards the light."""
 
@@ -36,7 +36,7 @@ class Burley(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats, s_s: Floats) -> Vectors:
-        """(N, 3) n_l * rho / pi and both factors, of which (l.h)^2 = |l + v|^2 / 4."""
+        """(N, 3) n_l * rho / pi times both factors, with (l.h)^2 = |l + v|^2 / 4."""
         (r,) = as_dtype_of(n_l, self.roughness)
         edge = 0.5 + r * s_s / 2
         fall = (1 + (edge - 1) * _fifth(1 - n_l)) * (1 + (edge - 1) * _fifth(1 - n_v))

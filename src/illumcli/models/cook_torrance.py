@@ -1,4 +1,4 @@
-"""Cook-Torrance: a rough surface of V-shaped grooves whose facets mirror by Fresnel's law.
+"""Cook-Torrance: a rough surface of V-shaped grooves whose facets are mirrors with Fresnel reflectance.
 
 response = n_l * (kd * rho / pi + ks * D G F / (4 n_l n_v))          convention: microfacet, D normalised
 response = n_l * (kd * rho / pi + ks * D G F / (pi n_l n_v))         convention: printed, D as printed
@@ -9,7 +9,7 @@ times as bright and does not conserve energy; the 1 / (4 m^2 cos^4) of other tex
 microfacet form.
 
 Not followed: G without min(1, ...); Fresnel's g as sqrt(n^2 + c^2) - 1 or with + 1, and with n.l for c; the
-colour shift multiplied by F once more; a factor n_l n_v that has slipped from the denominator.
+colour shift multiplied by F once more; n_l n_v outside of the denominator.
 
 References
 ----------
@@ -27,7 +27,7 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Fresnel, Shifted
-from illumcli.models._lobes import tint, weighed
+from illumcli.models._lobes import tint, weighted
 from illumcli.models._microfacet import Distribution, vgroove_over_4ab
 from illumcli.models._parameters import Varying
 from illumcli.models._terms import Angle
@@ -42,16 +42,16 @@ class CookTorrance(IlluminationModel):
     diffuse: Varying[Albedo] = (0.8, 0.8, 0.8)
     """rho, the albedo of the diffuse part."""
     diffuse_weight: Varying[Share] | None = None
-    """kd, the share of diffuse reflection; left out, 1 - ks."""
+    """kd, the share of diffuse reflection; by default 1 - ks."""
     specular_weight: Varying[Share] = 0.5
     """ks, the share of specular reflection."""
     distribution: Distribution = default_of({"D": "beckmann"})
-    """D, how facets are spread about the normal."""
+    """D, the distribution of facet normals."""
     fresnel: Fresnel = default_of({"F": "dielectric"})
-    """F, what a facet reflects at each angle."""
+    """F, the reflectance of a facet."""
     convention: Literal["microfacet", "printed"] = "microfacet"
-    """Constants. `microfacet`: a normalised D over 4 n_l n_v. `printed`: those of the texts over pi n_l
-    n_v."""
+    """Constants. `microfacet`: a normalised D over 4 n_l n_v. `printed`: D as printed in texts over
+    pi n_l n_v."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {
         "diffuse_lobe": ("diffuse", "diffuse_weight"),
@@ -62,7 +62,7 @@ class CookTorrance(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def lobes(self) -> dict[str, Lobe]:
-        """The lobes that are not black; the specular one asks for the light's colour only where F does."""
+        """The lobes that are not black; the specular one needs the light's colour only if F does."""
         lobes = super().lobes()
         if "specular" in lobes and isinstance(self.fresnel, Shifted) and self.fresnel.grazing == "light":
             lobes["specular"] = self.colored_lobe
@@ -70,7 +70,7 @@ class CookTorrance(IlluminationModel):
 
     def diffuse_color(self) -> Any:
         """kd * rho."""
-        return weighed(self.diffuse, self._diffuse_weight())
+        return weighted(self.diffuse, self._diffuse_weight())
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) kd * rho / pi * n_l."""
@@ -90,7 +90,7 @@ class CookTorrance(IlluminationModel):
         theta_h: Angle,
         light: Vectors | None,
     ) -> Vectors:
-        """(N, 3) the specular lobe of a facet whose colour goes over to the light's at grazing."""
+        """(N, 3) the specular lobe with a colour that shifts to the light's at grazing."""
         printed = self.convention == "printed"
         (ks,) = as_dtype_of(n_l, self.specular_weight)
         shape = self.distribution.density(theta_h, printed) * (n_l * vgroove_over_4ab(n_l, n_v, s_s))

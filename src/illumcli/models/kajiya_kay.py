@@ -2,11 +2,12 @@
 
 response = kd * |t x l| + ks * max(0, |t x l| |t x v| - (t.l) (t.v))^e
 
-The light falls on a strand at the sine of its angle to the tangent t, and the highlight lies on the cone that
-mirrors the light about the strand: with l and v both leaving it, where t.v = -t.l. Some texts print
-cos(theta_l - theta_v) with v arriving. An intensity model: cosine (here: sine) included, no 1/pi.
+The irradiance of a strand is proportional to the sine of the light's angle to the tangent t. The highlight
+lies on the cone that mirrors the light about the strand: t.v = -t.l, with l and v both leaving the strand.
+Some texts print cos(theta_l - theta_v) with v towards the strand. An intensity model: cosine (here: sine)
+included, no 1/pi.
 
-Where the strand lies on a surface, that surface still hides the light behind its horizon.
+If the strand lies on a surface, the surface still blocks light from below its horizon.
 
 References
 ----------
@@ -43,7 +44,7 @@ class KajiyaKay(IlluminationModel):
         return tint(self.diffuse, sin_tl)
 
     def specular_lobe(self, sin_tl: Floats, sin_tv: Floats, t_l: Floats, t_v: Floats) -> Vectors:
-        """(N, 3) ks * cos(angle to the cone)^e, the gap as half a squared distance in the strand's plane."""
+        """(N, 3) ks * cos(angle to the cone)^e, with 1 - cos as half a squared distance."""
         (e,) = as_dtype_of(t_l, self.exponent)
         gap = (np.square(sin_tl - sin_tv) + np.square(t_l + t_v)) / 2
         return tint(self.specular, lobe(gap, e))

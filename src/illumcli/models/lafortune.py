@@ -1,11 +1,11 @@
-"""Lafortune: a lobe of the weighed product of light and eye, one weight per axis of the surface.
+"""Lafortune: a power of a weighted dot product of light and eye, with one weight per axis of the surface.
 
 response = n_l * (rho_d / pi + rho_s * max(0, Cx lx vx + Cy ly vy + Cz lz vz)^e)
 
 x runs along the tangent, y = n x t, z along the normal. A BRDF times the cosine, reciprocal. Cx = Cy = -1 and
-Cz = 1 is Phong's lobe about the mirrored light, 1 for all three sends light back where it came from; Cz below
--Cx tilts the lobe towards the horizon; Cx and Cy apart make it anisotropic. For fits published with weights
-above 1, divide them by the largest and multiply rho_s by its e-th power.
+Cz = 1 is Phong's lobe about the mirrored light; 1 for all three is retro-reflection; Cz below -Cx tilts the
+lobe towards the horizon; different Cx and Cy make it anisotropic. For fits published with weights above 1, divide
+them by the largest and multiply rho_s by its e-th power.
 
 References
 ----------
@@ -38,9 +38,9 @@ class Lafortune(IlluminationModel):
     cx: Weight = -0.95
     """Cx, weight along the grain; -1 mirrors, 1 retro-reflects."""
     cy: Weight = -0.85
-    """Cy, weight across the grain; equal to Cx, the surface is isotropic."""
+    """Cy, weight across the grain; if equal to Cx, the surface is isotropic."""
     cz: Weight = 0.9
-    """Cz, weight along the normal; smaller, the highlight grows towards grazing."""
+    """Cz, weight along the normal; the smaller, the more the highlight grows towards grazing."""
     exponent: Varying[NonNegative] = 20.0
     """e, exponent of the lobe; 0 to 10^6 and beyond."""
 
@@ -49,7 +49,7 @@ class Lafortune(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def has_grain(self) -> bool:
-        """Unless Cx and Cy are equal."""
+        """True unless Cx and Cy are equal."""
         return self.cx != self.cy
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
@@ -59,7 +59,7 @@ class Lafortune(IlluminationModel):
     def specular_lobe(
         self, n_l: Floats, n_v: Floats, t_l: Floats, t_v: Floats, b_l: Floats, b_v: Floats
     ) -> Vectors:
-        """(N, 3) the lobe, its gap as half of |C l - v|^2 plus what C shortens l by."""
+        """(N, 3) n_l times the lobe, with 1 - (C l).v = (|C l - v|^2 + |l|^2 - |C l|^2) / 2."""
         cx, cy, cz, e = as_dtype_of(n_l, self.cx, self.cy, self.cz, self.exponent)
         gap = np.zeros_like(n_l)
         for c, l, v in ((cx, t_l, t_v), (cy, b_l, b_v), (cz, n_l, n_v)):

@@ -1,4 +1,4 @@
-"""Lambert: an ideally diffuse surface, the same radiance in every direction.
+"""Lambert: an ideally diffuse surface, with the same radiance in all directions.
 
 response = diffuse / pi * n_l
 

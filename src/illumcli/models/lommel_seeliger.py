@@ -2,9 +2,10 @@
 
 response = n_l * w / (4 pi (n_l + n_v))
 
-A BRDF times the cosine, reciprocal, for particles that scatter evenly in all directions; nothing is scattered
-twice, so at most half the light returns. Lit from behind the eye, the disc of a sphere is evenly bright, as
-the full Moon's is. Ambient light is reflected by w * 2/3 (1 - ln 2), the share under an even sky.
+A BRDF times the cosine, reciprocal, for particles that scatter equally in all directions. Multiple scattering
+is neglected, so at most half of the light is reflected. If the light is behind the eye, the disc of a sphere
+is uniformly bright, like the full Moon's. The albedo for ambient light is w * 2/3 (1 - ln 2), that under a
+uniform sky.
 
 References
 ----------
@@ -20,7 +21,7 @@ import numpy as np
 
 from illumcli.arrays import Floats, Vectors
 from illumcli.models._base import IlluminationModel
-from illumcli.models._lobes import tint, weighed
+from illumcli.models._lobes import tint, weighted
 from illumcli.models._parameters import Varying
 from illumcli.schema.fields import Albedo
 
@@ -35,8 +36,8 @@ class LommelSeeliger(IlluminationModel):
     physical: ClassVar[bool] = True
 
     def diffuse_color(self) -> Any:
-        """The albedo under light from everywhere."""
-        return weighed(self.diffuse, 2 / 3 * (1 - np.log(2)))
+        """The albedo under a uniform sky."""
+        return weighted(self.diffuse, 2 / 3 * (1 - np.log(2)))
 
     def diffuse_lobe(self, n_l: Floats, n_v: Floats) -> Vectors:
         """(N, 3) w n_l / (4 pi (n_l + n_v))."""

@@ -2,13 +2,13 @@
 
 response = n_l * f_r(theta_h, theta_d, phi_d)
 
-The angles are Rusinkiewicz's: theta_h between normal and half vector, theta_d and phi_d those of the light
-seen from the half vector. Swapping light and eye turns phi_d by pi, and the table keeps only half a turn:
+The angles are Rusinkiewicz's: theta_h between normal and half vector; theta_d and phi_d of the light in the
+half vector's frame. Exchanging light and eye rotates phi_d by pi, and the table covers only half a turn:
 reciprocal. It has 90 x 90 x 180 cells, finer in theta_h near the highlight, in three planes R, G, B of 64-bit
-numbers to be scaled by 1, 1.15 and 1.66 over 1500. A negative number means no measurement; there is no light
-there. As measured, a BRDF times the cosine; whether it conserves energy is up to the measurement.
+numbers, to be scaled by 1, 1.15 and 1.66 over 1500. A negative number means no measurement and counts as 0.
+The response is the measured BRDF times the cosine; whether it conserves energy depends on the measurement.
 
-The file is opened on first evaluation, mapped and not read whole, and shared by all threads.
+The file is memory-mapped at the first evaluation and shared by all threads.
 
 References
 ----------
@@ -40,8 +40,8 @@ def rusinkiewicz(
 ) -> tuple[Floats, Floats, Floats]:
     """theta_h, theta_d and phi_d in radians, phi_d within -pi..pi and 0 where it is undefined.
 
-    With d = l - v and the frame whose X and Y point from the half vector away from the normal and across,
-    l.Y = (n x s).d / (2 |n x s|) and l.X = -(n.d) |s| / (2 |n x s|): no azimuth of h is formed.
+    With d = l - v, and X and Y of the half vector's frame pointing away from the normal and across,
+    l.Y = (n x s).d / (2 |n x s|) and l.X = -(n.d) |s| / (2 |n x s|): the azimuth of h is not needed.
     """
     size = np.sqrt(s_s)
     theta_h = np.arctan2(np.sqrt(dot(nxs, nxs)), n_s)
@@ -50,7 +50,7 @@ def rusinkiewicz(
 
 
 def merl_coordinates(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where in the table, in cells: 0..90 by the root of theta_h, 0..90 by theta_d and 0..180 by phi_d."""
+    """Table coordinates in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d."""
     return (
         np.sqrt(theta_h * (2 / np.pi)) * 90,
         theta_d * (2 / np.pi) * 90,
@@ -72,8 +72,8 @@ class Merl(IlluminationModel):
     file: str
     """Path of the measurement, from the scene's folder."""
     lookup: Literal["linear", "nearest"] = "linear"
-    """`linear`: the eight cells around, weighed by distance, without those that hold no measurement.
-    `nearest`: the cell itself, with a step at every border between cells."""
+    """`linear`: interpolate between the eight nearest cells, without those that have no measurement.
+    `nearest`: take the nearest cell, with a step at every border between cells."""
 
     scales: ClassVar[dict[str, tuple[str, ...]]] = {}
     reciprocal: ClassVar[bool] = True
@@ -95,10 +95,10 @@ class Merl(IlluminationModel):
 
 
 def measurement(path: str) -> NDArray[np.uint32]:
-    """(3, 1458000, 2) the planes of a MERL file, mapped read-only, each number as its two halves.
+    """(3, 1458000, 2) the planes of a MERL file, mapped read-only, each number as two 32-bit halves.
 
-    The numbers stand 12 bytes into the file, where a 64-bit number is not aligned: numpy would copy all of
-    them for every look-up.
+    The numbers begin 12 bytes into the file, where 64-bit numbers are not aligned: numpy would copy all of
+    them at every look-up.
 
     Raises
     ------
@@ -128,36 +128,39 @@ def _mapped(path: str, modified: int, size: int) -> NDArray[np.uint32]:
 
 
 def _cells(table: NDArray[np.uint32], flat: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(3, N) the numbers of these cells."""
+    """(3, N) the values of these cells."""
     halves = np.asarray(table).take(flat, axis=1)
     return halves.view("<f8")[..., 0].astype(np.float64, copy=False)
 
 
 def _nearest(table: NDArray[np.uint32], *angles: Floats) -> Floats:
-    """(3, N) the cells that the angles fall in; 0 without measurement."""
+    """(3, N) values of the cells that contain the angles; 0 without measurement."""
     flat = merl_index(*angles)[3]
     return _scaled(np.maximum(_cells(table, flat), 0), angles[0].dtype)
 
 
 def _linear(table: NDArray[np.uint32], *angles: Floats) -> Floats:
-    """(3, N) between the centres of cells, phi_d going round; 0 without any measurement nearby."""
-    low, part = [], []
+    """(3, N) trilinear interpolation between cell centres, periodic in phi_d; 0 without any measurement."""
+    # The lower of the two nearest cells along each axis, and the position between both.
+    low, fractions = [], []
     for x in merl_coordinates(*angles):
         below = np.floor(x - 0.5)
         low.append(below.astype(np.int64))
-        part.append(x - 0.5 - below)
+        fractions.append(x - 0.5 - below)
+
+    # The weighted mean of those of the eight cells that have a measurement.
     total = np.zeros((3, len(low[0])))
     weights = np.zeros_like(total)
     for corner in np.ndindex(2, 2, 2):
         i, j, k = (each + step for each, step in zip(low, corner, strict=True))
         flat = (np.clip(i, 0, 89) * 90 + np.clip(j, 0, 89)) * 180 + k % 180
         weight = np.ones(len(flat))
-        for fraction, step in zip(part, corner, strict=True):
+        for fraction, step in zip(fractions, corner, strict=True):
             weight = weight * (fraction if step else 1 - fraction)
         values = _cells(table, flat)
-        known = weight * (values >= 0)
-        total += known * values
-        weights += known
+        measured = weight * (values >= 0)
+        total += measured * values
+        weights += measured
     return _scaled(total / np.maximum(weights, np.finfo(np.float64).tiny), angles[0].dtype)
 
 

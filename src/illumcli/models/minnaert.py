@@ -1,9 +1,9 @@
-"""Minnaert: diffuse reflection that darkens or brightens towards the limb, made for the Moon.
+"""Minnaert: diffuse reflection with limb darkening or brightening, devised for the Moon.
 
 response = n_l * rho * (k + 1) / (2 pi) * (n_l n_v)^(k - 1)
 
 A BRDF times the cosine, reciprocal. k = 1 is Lambert; below 1 the limb is brighter and the model unbounded at
-grazing, above 1 darker. The constant makes the albedo rho exactly for an eye on the normal, not elsewhere.
+grazing, above 1 it is darker. The albedo is exactly rho for an eye on the normal, and differs elsewhere.
 
 References
 ----------

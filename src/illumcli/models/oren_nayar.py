@@ -1,4 +1,4 @@
-"""Oren-Nayar: a rough surface of Lambertian facets, brighter towards the light than Lambert's law has it.
+"""Oren-Nayar: a rough surface of Lambertian facets, brighter towards the light than a Lambertian surface.
 
 response = n_l * max(0, f1 + f2)                                                 form: full
 f1 = rho / pi * (C1 + C C2 tan(beta) + (1 - |C|) C3 tan((alpha + beta) / 2))     one bounce
@@ -13,9 +13,9 @@ C2 = B * sin(alpha), or B * (sin(alpha) - (2 beta / pi)^3) where C < 0;  B = 0.4
 C3 = 0.125 s2 / (s2 + 0.09) * (4 alpha beta / pi^2)^2
 
 A BRDF times the cosine, reciprocal. It is a fit: a white surface reflects up to 5 % (qualitative: 1.5 %) more
-than arrives, and f1 turns negative for opposite azimuths near grazing at large sigma, hence the clamp.
+light than is incident, and f1 is negative for opposite azimuths near grazing at large sigma, hence the clamp.
 
-Not followed: 0.3 for 0.33 in C1; rho / pi for rho^2 / pi in f2, which is of two bounces.
+Not followed: 0.3 for 0.33 in C1; rho / pi for rho^2 / pi in f2, which is for two bounces.
 
 References
 ----------
@@ -40,7 +40,7 @@ def oren_nayar_terms(
 ) -> tuple[Floats, Floats]:
     """f1 in units of rho / pi and f2 in units of rho^2 / pi, before the clamp.
 
-    Angles enter as 1 - 2 alpha / pi and 1 - 2 beta / pi, which keep their digits at grazing, where
+    Angles are computed as 1 - 2 alpha / pi and 1 - 2 beta / pi, which are accurate at grazing, where
     sin(alpha) - (2 beta / pi)^3 would cancel.
 
     Parameters
@@ -52,12 +52,15 @@ def oren_nayar_terms(
     sigma : float or array
         Standard deviation of the facets' slope angle, radians.
     """
+    # alpha is the larger angle, beta the smaller.
     s2 = np.square(sigma)
     cos_alpha, cos_beta = np.minimum(n_l, n_v), np.maximum(n_l, n_v)
     sin_alpha, sin_beta = np.maximum(sin_l, sin_v), np.minimum(sin_l, sin_v)
     rise = np.arctan2(cos_alpha, sin_alpha) * (2 / np.pi)  # 1 - 2 alpha / pi
     y = np.arctan2(cos_beta, sin_beta) * (2 / np.pi)  # 1 - 2 beta / pi
     x = 1 - y
+
+    # The three terms of f1, and f2.
     opposite = cos_phi < 0
     bulge = y * (3 - 3 * y + y * y) - np.square(cos_alpha) / (1 + sin_alpha)
     C1 = 1 - s2 / (s2 + 0.33) / 2
@@ -70,7 +73,8 @@ def oren_nayar_terms(
 
 
 def oren_nayar_ab(n_l: Floats, n_v: Floats, l_v: Floats, sigma: Floats) -> Floats:
-    """A + B max(0, C) sin(alpha) tan(beta), of which C sin(alpha) tan(beta) = (l.v - a b) / max(a, b)."""
+    """A + B max(0, C) sin(alpha) tan(beta), with C sin(alpha) tan(beta) = (l.v - a b) / max(a, b) for the
+    cosines a = n_l, b = n_v."""
     s2 = np.square(sigma)
     A, B = 1 - s2 / (s2 + 0.33) / 2, 0.45 * s2 / (s2 + 0.09)
     return A + B * np.maximum(l_v - n_l * n_v, 0) / np.maximum(n_l, n_v)
@@ -83,13 +87,13 @@ class OrenNayar(IlluminationModel):
     sigma: Varying[Spread] = 0.3
     """sigma, standard deviation of the facets' slope angle [rad]: 0 is Lambert, 0.5 clay or plaster."""
     form: Literal["full", "qualitative"] = "full"
-    """`full`: all terms with the second bounce. `qualitative`: the authors' simple A and B."""
+    """`full`: all terms, with the second bounce. `qualitative`: the authors' simplified form with A, B."""
 
     reciprocal: ClassVar[bool] = True
     physical: ClassVar[bool] = True
 
     def lobes(self) -> dict[str, Lobe]:
-        """The diffuse lobe in the form chosen: the simple one asks for no angles."""
+        """The diffuse lobe in the chosen form; the qualitative one needs no angles."""
         lobes = super().lobes()
         if "diffuse" in lobes and self.form == "qualitative":
             lobes["diffuse"] = self.qualitative_lobe

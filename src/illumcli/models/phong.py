@@ -37,10 +37,10 @@ class Phong(IlluminationModel):
     exponent: Varying[NonNegative] = 32.0
     """e, 0 to 10^6 and beyond: the larger, the smaller the highlight."""
     normalised: bool = False
-    """Divide each lobe by its integral and weigh it by the cosine (Lewis 1994)."""
+    """Divide each lobe by its integral and multiply it by the cosine (Lewis 1994)."""
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
-        """(N, 3) kd * n_l; over pi where normalised."""
+        """(N, 3) kd * n_l; divided by pi if normalised."""
         return tint(self.diffuse, n_l / np.pi if self.normalised else n_l)
 
     def specular_lobe(self, n_l: Floats, gap_rv: Floats) -> Vectors:

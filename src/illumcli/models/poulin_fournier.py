@@ -4,13 +4,13 @@ response = n_l / (2 sin(theta_s) n_l n_v) * integral over -theta_s..theta_s of f
 n_psi = n cos(psi) + b sin(psi)
 f_m = kd / pi + ks (e + 2) / (2 pi) <n_psi.h>^e
 
-t runs along the grooves and b = n x t across them; theta_s is the steepest slope, where facets are spread
-evenly in psi. A BRDF times the cosine, reciprocal; theta_s -> 0 gives the isotropic f_m. No facet hides
-another, so steep grooves reflect more than arrives at grazing across them.
+t is along the grooves and b = n x t across them; theta_s is the steepest slope, and facets are distributed
+uniformly in psi. A BRDF times the cosine, reciprocal; theta_s -> 0 gives the isotropic f_m. Facets do not
+shadow each other, so at grazing across steep grooves more light is reflected than is incident.
 
-The paper's idea in one concrete form: its cylinders stand side by side, and the sum over the facets that are
-lit and seen is taken exactly. The diffuse part is in closed form, the specular one by Gauss-Legendre
-quadrature on the part of the arc where the highlight is not negligible.
+One concrete form of the paper's model: its cylinders are side by side, and the sum over the facets that are
+lit and visible is exact. The diffuse part is in closed form, the specular part by Gauss-Legendre quadrature
+over the part of the arc where the highlight is not negligible.
 
 References
 ----------
@@ -34,7 +34,7 @@ from illumcli.schema.fields import Albedo, NonNegative
 Slope = Annotated[float, Field(ge=1e-3, le=1.57)]
 
 NODES = {np.dtype(np.float32): (14, 12.0), np.dtype(np.float64): (64, 40.0)}
-"""Per precision: quadrature nodes, and the fall, as an exponent, at which a highlight is negligible."""
+"""By precision: the number of quadrature nodes, and f such that a highlight below exp(-f) is negligible."""
 
 
 class PoulinFournier(IlluminationModel):
@@ -70,7 +70,7 @@ class PoulinFournier(IlluminationModel):
 
 
 class Across(NamedTuple):
-    """A direction in the plane across the grooves."""
+    """The components of a direction in the plane across the grooves."""
 
     n: Floats
     """(N,) along the normal."""
@@ -78,7 +78,7 @@ class Across(NamedTuple):
     """(N,) along b."""
 
     def turned(self, cosine: Floats, sine: Floats) -> Across:
-        """The same direction by the normal n_psi of the slope psi of this cosine and sine, and across it."""
+        """The same direction by its components along n_psi and across it; `cosine` and `sine` are of psi."""
         return Across(self.n * cosine + self.b * sine, self.b * cosine - self.n * sine)
 
 
@@ -88,11 +88,11 @@ class Arc(NamedTuple):
     low: Floats
     """(N,)."""
     high: Floats
-    """(N,); equal to `low` where there are none."""
+    """(N,); equal to `low` if there are none."""
 
 
 def lit_and_seen(l: Across, v: Across, steepest: Floats) -> Arc:
-    """The slopes of the facets that face light and eye."""
+    """The slopes of the facets that face both light and eye."""
     from_light, from_eye = -np.arctan2(l.n, l.b), -np.arctan2(v.n, v.b)
     low = np.maximum(np.maximum(from_light, from_eye), -steepest)
     high = np.minimum(np.minimum(from_light, from_eye) + np.pi, steepest)
@@ -102,7 +102,7 @@ def lit_and_seen(l: Across, v: Across, steepest: Floats) -> Arc:
 def facing(l: Across, v: Across, arc: Arc) -> Floats:
     """The integral of (n_psi.l) (n_psi.v) over the arc.
 
-    About the middle of the arc the odd part vanishes, and what is left has no cancellation on narrow arcs.
+    Expanded about the middle of the arc, where odd terms vanish; so narrow arcs have no cancellation.
     """
     low, high = arc
     width, middle = high - low, (high + low) / 2
@@ -126,15 +126,15 @@ def _excess(x: Floats, sine: Floats) -> Floats:
 def highlight(l: Across, v: Across, s_s: Floats, s: Components, e: Floats, arc: Arc) -> Floats:
     """The integral of <n_psi.h>^e (n_psi.l) (n_psi.v) over the arc.
 
-    With u = psi - psi_h, n_psi.h is cos(u) times the length of h across the grooves. Nodes are spread over
-    the slopes where cos(u)^e is above its greatest value times exp(-fall).
+    With u = psi - psi_h, n_psi.h is cos(u) times the length of h across the grooves. The quadrature covers
+    the slopes where cos(u)^e is above its greatest value times exp(-f), f of `NODES`.
     """
     t_s, b_s, n_s = s
     nodes, fall = NODES[l.n.dtype]
     limits = np.finfo(l.n.dtype)
     below_one = 1 - 8 * float(limits.eps)
 
-    # the part of the arc where the highlight is not negligible, as slopes from that of h
+    # The part of the arc where the highlight is not negligible, as slopes relative to that of h.
     psi_h = np.arctan2(b_s, n_s)
     low, high = arc
     nearest = np.sin(np.clip(np.clip(psi_h, low, high) - psi_h, -np.pi / 2, np.pi / 2))
@@ -143,12 +143,12 @@ def highlight(l: Across, v: Across, s_s: Floats, s: Components, e: Floats, arc: 
     first, last = np.clip(low - psi_h, -reach, reach), np.clip(high - psi_h, -reach, reach)
     half, middle = (last - first) / 2, (last + first) / 2
 
-    # light and eye by the facet that h stands on, and what the part of h along the grooves takes away
+    # Light and eye in the frame of the facet that faces h, and the logarithm of h's squared length across.
     cos_h, sin_h = np.cos(psi_h), np.sin(psi_h)
     l_h, v_h = l.turned(cos_h, sin_h), v.turned(cos_h, sin_h)
     along = np.log1p(-np.minimum(t_s * t_s / np.maximum(s_s, limits.tiny), below_one))
 
-    # Gauss-Legendre over that part
+    # Gauss-Legendre quadrature over that part.
     total, half_e = np.zeros_like(l.n), e / 2
     for node, weight in gauss_legendre(nodes):
         sine = np.sin(middle + half * node)

@@ -1,21 +1,20 @@
-"""Strauss: a model for users, of colour, smoothness, metalness and transparency.
+"""Strauss: a model with intuitive parameters: colour, smoothness, metalness and transparency.
 
 response = n_l * r_d * d * c + r_s * c_s
 r_d = (1 - s^3) (1 - t),  d = 1 - m s,  r_n = (1 - t) s^3
 r_s = max(0, r.v)^(3 / (1 - s)) * min(1, r_n + (r_n + k_j) F(x_i) G(x_i) G(x_r))
 c_s = 1 + m (1 - F(x_i)) (c - 1)
 
-x_i and x_r are the angles of light and eye to the normal over pi / 2; in radians F has its pole at 1.12,
-inside the range. F stands for Fresnel, G for masking:
+x_i and x_r are the angles of light and eye to the normal over pi / 2; with angles in radians the pole of F,
+at 1.12, would be inside the range. F approximates Fresnel's law, G masking:
 
 F(x) = (1 / (x - k_f)^2 - 1 / k_f^2) / (1 / (1 - k_f)^2 - 1 / k_f^2)
 G(x) = (1 / (1 - k_g)^2 - 1 / (x - k_g)^2) / (1 / (1 - k_g)^2 - 1 / k_g^2)
 
 An intensity model: cosine included, not reciprocal. Ambient light is reflected by r_d * c. At s = 1 the
-highlight is a mirror image and shows only where r and v agree to rounding.
+highlight is a perfect mirror reflection, visible only where r equals v within rounding.
 
-Not followed: the exponent 3 / (1.0001 - s), F of the mean of both angles, the unclamped base, all of them
-from one text's shader.
+Not followed: one text's exponent 3 / (1.0001 - s), F of the mean of both angles and unclamped base.
 
 References
 ----------
@@ -31,7 +30,7 @@ from pydantic import Field
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
-from illumcli.models._lobes import channels, lobe, tint, weighed
+from illumcli.models._lobes import channels, lobe, tint, weighted
 from illumcli.models._parameters import Varying
 from illumcli.schema.fields import Albedo, Share
 
@@ -50,7 +49,7 @@ def strauss_geometry(rise: Floats, kg: Floats | float) -> Floats:
 
 
 class Surface(NamedTuple):
-    """Parameters of the highlight, in the precision of the lanes."""
+    """Parameters of the highlight, in the precision of the terms."""
 
     s: Floats
     """Smoothness."""
@@ -73,9 +72,9 @@ class Strauss(IlluminationModel):
     metalness: Varying[Share] = 0.0
     """m: 0 highlights of the light's colour, 1 of the surface's."""
     transparency: Varying[Share] = 0.0
-    """t: 0 opaque, 1 nothing reflected but the highlight at grazing."""
+    """t: 0 opaque, 1 only the highlight at grazing is reflected."""
     kj: Annotated[float, Field(ge=0, le=1)] = 0.1
-    """k_j, how much rough surfaces shine off the mirror direction."""
+    """k_j, strength of the off-specular peak of rough surfaces at grazing."""
     kf: Offset = 1.12
     """k_f, pole of F; the nearer to 1, the later F rises."""
     kg: Offset = 1.01
@@ -90,7 +89,7 @@ class Strauss(IlluminationModel):
         ):
             return self.color
         s, t = np.asarray(self.smoothness), np.asarray(self.transparency)
-        return weighed(self.color, _diffuse_share(s, t))
+        return weighted(self.color, _diffuse_share(s, t))
 
     def diffuse_lobe(self, n_l: Floats) -> Vectors:
         """(N, 3) n_l * r_d * d * c."""
@@ -109,7 +108,7 @@ class Strauss(IlluminationModel):
 
 
 class Highlight(NamedTuple):
-    """The highlight's share of the light and its factors, (N,) each."""
+    """The reflectance of the highlight and its factors, (N,) each."""
 
     F: Floats
     """F(x_i)."""
@@ -118,17 +117,17 @@ class Highlight(NamedTuple):
     G_v: Floats
     """G(x_r)."""
     r_j: Floats
-    """The share that does not depend on the angle to the mirror direction."""
+    """The factor that does not depend on the angle to the mirror direction."""
     r_s: Floats
-    """All of it."""
+    """The reflectance."""
 
 
 def strauss_specular(
     n_l: Floats, n_v: Floats, sin_l: Floats, sin_v: Floats, gap_rv: Floats, surface: Surface
 ) -> Highlight:
-    """The highlight's share r_s of the light, and its factors.
+    """The reflectance r_s of the highlight, and its factors.
 
-    Near s = 1 the exponent stops where |r - v|^2 is at rounding level: a mirror.
+    Near s = 1 the exponent is bounded by the rounding of |r - v|^2: a mirror.
     """
     s, t, kj, kf, kg = surface
     rise_l = np.arctan2(n_l, sin_l) * (2 / np.pi)

@@ -118,7 +118,7 @@ class Dielectric(Description):
 
     F: Literal["dielectric"] = "dielectric"
     ior: Varying[Index] = 1.5
-    """eta, index of refraction behind the surface over the one before it; below 1, reflection may be total."""
+    """eta, index of refraction behind the surface over that before it; below 1, reflection may be total."""
 
     def reflectance(self, c: Floats, light: Vectors | None = None) -> Array:
         """(N,) at the cosine c."""

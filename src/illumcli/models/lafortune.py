@@ -4,8 +4,8 @@ response = n_l * (rho_d / pi + rho_s * max(0, Cx lx vx + Cy ly vy + Cz lz vz)^e)
 
 x runs along the tangent, y = n x t, z along the normal. A BRDF times the cosine, reciprocal. Cx = Cy = -1 and
 Cz = 1 is Phong's lobe about the mirrored light; 1 for all three is retro-reflection; Cz below -Cx tilts the
-lobe towards the horizon; different Cx and Cy make it anisotropic. For fits published with weights above 1, divide
-them by the largest and multiply rho_s by its e-th power.
+lobe towards the horizon; different Cx and Cy make it anisotropic. For fits published with weights above 1,
+divide them by the largest and multiply rho_s by its e-th power.
 
 References
 ----------

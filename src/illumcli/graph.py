@@ -6,9 +6,12 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, fields
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 from illumcli.records import Value
+
+Buffers: TypeAlias = Mapping[str, Any]
+"""Buffers by name, each of the type that its node's function returns."""
 
 
 class Node(Value):
@@ -36,7 +39,7 @@ class Node(Value):
         the function's short name. It does not say in which module the function lives."""
         return f"{self.kind or self.output.partition(':')[0]}={short_name(self.function)}"
 
-    def run(self, buffers: Mapping[str, Any]) -> Any:
+    def run(self, buffers: Buffers) -> Any:
         """Call the function with the buffers of its inputs."""
         return self.function(**{parameter: buffers[name] for parameter, name in self.inputs.items()})
 

@@ -17,6 +17,7 @@ from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import MeshRepairs, Repair
 from illumcli.geometry.scene_geometry import CornerVectors, PlacedMesh, SceneGeometry
+from illumcli.graph import Buffers
 from illumcli.rays.interaction import Hits
 from illumcli.records import Record, Value
 from illumcli.render_space import RenderSpace
@@ -52,14 +53,14 @@ class Misfit(Exception):
 class BufferCodec(Value):
     """How one value per sample, or several, are stored for a whole view."""
 
-    dtype: Any
+    dtype: type[np.generic]
     planes: int
-    pack: Callable[[Any, Mapping[str, Any]], NDArray[Any] | None]
+    pack: Callable[[Any, Buffers], NDArray[Any] | None]
     """Buffer, all buffers of the tile -> (planes, M) at the hits; None where it cannot be kept."""
     unpack: Callable[[NDArray[Any], Hits], Any]
     """(planes, M) and the hits -> buffer."""
 
-    def layout(self, view: View) -> tuple[tuple[int, ...], Any]:
+    def layout(self, view: View) -> tuple[tuple[int, ...], type[np.generic]]:
         """Shape and type of what is stored for a view; truth values take a bit."""
         row = view.width * view.samples
         if self.dtype is np.bool_:
@@ -67,11 +68,11 @@ class BufferCodec(Value):
         return (view.height, self.planes, row), self.dtype
 
 
-def _pack_hits(hits: Hits, buffers: Mapping[str, Any]) -> NDArray[np.int32]:
+def _pack_hits(hits: Hits, buffers: Buffers) -> NDArray[np.int32]:
     return np.stack([hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
 
 
-def _pack_points(points: ShadingPoints, buffers: Mapping[str, Any]) -> NDArray[np.float32] | None:
+def _pack_points(points: ShadingPoints, buffers: Buffers) -> NDArray[np.float32] | None:
     if not points.are_samples:
         return None
     return np.concatenate([points.position.T, points.n.T])
@@ -81,7 +82,7 @@ def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> ShadingPoints:
     return ShadingPoints(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, Identity())
 
 
-def _pack_material(material: NDArray[np.int32], buffers: Mapping[str, Any]) -> NDArray[np.uint16] | None:
+def _pack_material(material: NDArray[np.int32], buffers: Buffers) -> NDArray[np.uint16] | None:
     if not buffers["points"].are_samples or material.max(initial=0) >= 1 << 16:
         return None
     return material[None].astype(np.uint16)
@@ -145,7 +146,7 @@ def load_tile(stored: StoredBuffer, tile: Tile, hits: Hits) -> Any:
     return stored.codec.unpack(take_or_all(stored.tile(tile).T, hits.sample).T, hits)
 
 
-def pack_tile(name: str, buffers: Mapping[str, Any], tile: Tile, per_pixel: int) -> NDArray[Any] | None:
+def pack_tile(name: str, buffers: Buffers, tile: Tile, per_pixel: int) -> NDArray[Any] | None:
     """(height, planes, samples of a row) of a tile's buffer, -1 or 0 where there is no hit; None where it
     cannot be kept."""
     codec = codec_of(name)
@@ -212,7 +213,7 @@ def decode(data: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
     return cls(**parts)
 
 
-def _fits(part: Any, declared: str) -> bool:
+def _fits(part: object, declared: str) -> bool:
     """Is the part of a record, as decoded, what its declaration says, as far as arrays and None go?"""
     if part is None:
         return "None" in declared

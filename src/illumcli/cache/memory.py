@@ -36,7 +36,7 @@ class MemoryCache:
         """The buffer of this key by tile; None where not every tile has it."""
         return self._tiles[key] if key in self._complete else None
 
-    def add(self, key: str, tile: Tile, buffer: Any) -> None:
+    def add(self, key: str, tile: Tile, buffer: object) -> None:
         """Keep a tile's buffer; beyond the limit the key is given up with all its tiles."""
         size = sum(array.nbytes for array in arrays_in(buffer))
         with self._lock:
@@ -65,7 +65,7 @@ class MemoryCache:
         self._bytes -= sum(array.nbytes for buffer in dropped.values() for array in arrays_in(buffer))
 
 
-def arrays_in(value: Any) -> Iterator[NDArray[Any]]:
+def arrays_in(value: object) -> Iterator[NDArray[Any]]:
     """Every array in a buffer."""
     if isinstance(value, np.ndarray):
         yield value

@@ -14,6 +14,7 @@ from illumcli.cache.memory import MemoryCache
 from illumcli.cache.store import Store, Writer
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
+from illumcli.graph import Buffers
 from illumcli.records import Value
 
 
@@ -27,7 +28,7 @@ class Cache(Value):
         """May a buffer of this name be kept?"""
         return self.memory is not None or (self.store is not None and policy.is_kept(name))
 
-    def keep(self, name: str, key: str, value: Any, seconds: float) -> None:
+    def keep(self, name: str, key: str, value: object, seconds: float) -> None:
         """Keep a buffer of the whole scene that took `seconds` with all its inputs, if it is worth it."""
         if self.memory is not None:
             self.memory.once[key] = value
@@ -61,7 +62,7 @@ class BufferRecorder:
         )
         """The buffers that every tile hands over."""
 
-    def take(self, name: str, buffers: Mapping[str, Any], tile: Tile) -> NDArray[Any] | None:
+    def take(self, name: str, buffers: Buffers, tile: Tile) -> NDArray[Any] | None:
         """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread."""
         if self._memory is not None:
             self._memory.add(self._keys[name], tile, buffers[name])

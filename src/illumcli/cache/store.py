@@ -25,7 +25,7 @@ import re
 import stat
 import struct
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -339,7 +339,7 @@ class Writer:
         atomic.forget(self._part)
         self._store.saved(self._target.stem, self.bytes)
 
-    def _try(self, action: Any) -> None:
+    def _try(self, action: Callable[[], object]) -> None:
         if self._failed:
             return
         try:

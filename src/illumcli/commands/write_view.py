@@ -13,6 +13,7 @@ from illumcli import __version__
 from illumcli.commands.work import Work
 from illumcli.film.develop import ErrorSums, Target, how_to_read
 from illumcli.film.tiles import Tile
+from illumcli.graph import Buffers
 from illumcli.progress import Progress
 from illumcli.render_graph.execute import Planes, Run, bands
 from illumcli.render_graph.needs import reconstructs
@@ -24,7 +25,7 @@ from illumcli.scene.spec import Scene
 def write_view(
     work: Work,
     plan: Plan,
-    shared: Mapping[str, Any],
+    shared: Buffers,
     targets: Sequence[Target],
     run: Run,
     progress: Progress,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -14,19 +14,29 @@ from illumcli.lights._incident import Placed
 from illumcli.rays import sampling
 from illumcli.rays.camera import Rays, axes, camera_rays, film_points
 from illumcli.rays.interaction import SurfaceInteraction
+from illumcli.rays.viewpoints import Camera, PixelFilter
 from illumcli.records import Value
 from illumcli.render_space import RenderSpace
+
+
+class Adaptive(Protocol):
+    """How few samples every pixel has at first, and what makes it need all."""
+
+    @property
+    def first(self) -> int: ...
+    @property
+    def difference(self) -> float: ...
 
 
 class View(Value):
     """One picture: a camera and the size and sampling of its film."""
 
     name: str
-    camera: Any
+    camera: Camera
     width: int
     height: int
     samples: int
-    adaptive: Any = None
+    adaptive: Adaptive | None = None
     first: int | None = None
     """Number of the first sample, where these are part of a pixel's samples."""
 
@@ -37,10 +47,12 @@ class View(Value):
 
     def coarse(self) -> View:
         """The view with the samples that every pixel gets."""
+        assert self.adaptive is not None
         return replace(self, samples=self.adaptive.first, adaptive=None, first=0)
 
     def rest(self) -> View:
         """The view with all the other samples."""
+        assert self.adaptive is not None
         few = self.adaptive.first
         return replace(self, samples=self.samples - few, adaptive=None, first=few)
 
@@ -53,7 +65,7 @@ def samples(seed: int, view: View, tile: Tile) -> Samples:
     return Samples(x, y, points, view.samples, view.first)
 
 
-def rays(film_filter: Any, render_space: RenderSpace, view: View, samples: Samples) -> Rays:
+def rays(film_filter: PixelFilter, render_space: RenderSpace, view: View, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
     several = samples.per_pixel > 1 or samples.first is not None
     points = film_points(samples.x, samples.y, samples.points, film_filter if several else None)

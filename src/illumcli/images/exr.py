@@ -59,7 +59,7 @@ class ExrFile:
         self._path = path
         self._names = tuple(channels)
         self._hash = hashlib.blake2b(digest_size=32)
-        self._dtype: Any = np.float32
+        self._dtype: type[np.generic] = np.float32
         output = oiio.ImageOutput.create("openexr")
         if output is None:
             reason = oiio.geterror()

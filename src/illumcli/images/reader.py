@@ -228,7 +228,7 @@ class ImageSource:
             raise self._refusal(f"it holds the channels {self.names}")
         return None if names == self.names else [self.names.index(name) for name in names]
 
-    def bands(self, dtype: Any) -> Iterator[NDArray[Any]]:
+    def bands(self, dtype: type[Any]) -> Iterator[NDArray[Any]]:
         """(h, W, C) `dtype`, the whole image from the top; whole numbers of an EXR as bits of float32."""
         spec = self._spec
         kind = {np.float16: oiio.HALF, np.uint8: oiio.UINT8, np.uint16: oiio.UINT16}.get(dtype, oiio.FLOAT)
@@ -240,7 +240,7 @@ class ImageSource:
                 band[..., c] = bits_of(self._rows(y0, y1, (c, c + 1), oiio.UINT))[..., 0]
             yield band
 
-    def _rows(self, y0: int, y1: int, channels: tuple[int, int], kind: Any) -> NDArray[Any]:
+    def _rows(self, y0: int, y1: int, channels: tuple[int, int], kind: oiio.BASETYPE) -> NDArray[Any]:
         """(h, W, channels) rows of some channels, from the first to before the last."""
         spec = self._spec
         if spec.tile_height:

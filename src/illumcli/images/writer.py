@@ -85,7 +85,7 @@ class ImageWriter:
 
         # the type in which bands are written and read back
         kinds = set(self._channels.values())
-        self._dtype: Any = _DTYPES.get(kinds.pop(), np.float32) if len(kinds) == 1 else np.float32
+        self._dtype: type[Any] = _DTYPES.get(kinds.pop(), np.float32) if len(kinds) == 1 else np.float32
 
         self._rows = 0
         self._clamped = 0

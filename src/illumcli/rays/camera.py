@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors, column_major
 from illumcli.geometry.bounds import ObjectBounds, take_used, transformed_vertices
 from illumcli.geometry.mesh import Mesh
+from illumcli.rays.viewpoints import Camera, PixelFilter, Point
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
@@ -18,7 +19,7 @@ PARALLEL = 1e-9
 """Sine of the angle below which `up` is taken to point along the line of sight."""
 
 
-def axes(camera: Any) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def axes(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors right, up and forward, (3,) each; `up` along the line of sight is replaced."""
     forward = np.asarray(camera.target, np.float64) - camera.position
     forward /= np.abs(forward).max()
@@ -36,7 +37,7 @@ MARGIN = 0.1
 """Share of the image's width and height that stays empty around a framed object, half on either side."""
 
 
-def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
+def framing(camera: Camera, aspect: float, points: NDArray[np.float64]) -> Camera:
     """The camera, moved without turning so that all points lie inside the image and fill it.
 
     A pinhole at e sees p between the left and right edges of the image if |r.(p - e)| <= s f.(p - e), with
@@ -63,7 +64,7 @@ def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
         bounds = _depth_bound(x, z, slope * aspect), _depth_bound(y, z, slope)
         eye_z = min(*bounds, nearest - CLOSEST * size)
         eye_x, eye_y = (_centred(part, z - eye_z) for part in (x, y))
-        changes = {}
+        changes: dict[str, object] = {}
     else:
         # Parallel rays: the size of the image decides, not the distance.
         eye_x, eye_y = ((float(part.min()) + float(part.max())) / 2 for part in (x, y))
@@ -78,12 +79,12 @@ def framing(camera: Any, aspect: float, points: NDArray[np.float64]) -> Any:
     )
 
 
-Placement: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float], float | None]
+Placement: TypeAlias = tuple[Point, Point, float | None]
 """Position, target and, for orthographic cameras, extent."""
 
 
 def framed(
-    camera: Any, aspect: float, number: int, meshes: Sequence[Mesh], object_bounds: ObjectBounds
+    camera: Camera, aspect: float, number: int, meshes: Sequence[Mesh], object_bounds: ObjectBounds
 ) -> Placement:
     """Placement of the camera at which object `number` fills the image."""
     mesh = meshes[number]
@@ -127,7 +128,7 @@ class Rays(Record):
 
 
 def camera_rays(
-    camera: Any, render_space: RenderSpace, width: int, height: int, points: NDArray[np.float64]
+    camera: Camera, render_space: RenderSpace, width: int, height: int, points: NDArray[np.float64]
 ) -> Rays:
     """Rays through film positions, in radii from the scene's centre.
 
@@ -193,7 +194,7 @@ def _weighted_sum(*terms: tuple[Floats, NDArray[np.float64]]) -> Vectors:
 
 
 def film_points(
-    x: NDArray[np.int64], y: NDArray[np.int64], spread: NDArray[np.float64], film_filter: Any | None
+    x: NDArray[np.int64], y: NDArray[np.int64], spread: NDArray[np.float64], film_filter: PixelFilter | None
 ) -> NDArray[np.float64]:
     """(N, 2) film positions [pixels]: each pixel's centre plus an offset drawn from the pixel filter.
 
@@ -214,7 +215,7 @@ def film_points(
     return out
 
 
-def offsets(u: Floats, v: Floats, film_filter: Any | None) -> tuple[Floats, Floats]:
+def offsets(u: Floats, v: Floats, film_filter: PixelFilter | None) -> tuple[Floats, Floats]:
     """Distances from the pixel's centre [pixels] of points drawn from the filter by inversion."""
     if film_filter is None:
         return np.zeros_like(u), np.zeros_like(v)

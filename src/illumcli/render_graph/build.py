@@ -208,12 +208,14 @@ def _camera_nodes(scene: Scene) -> list[Node]:
     """Nodes of the placements of cameras that fit an object."""
     numbers = {name: number for number, name in enumerate(scene.object_names())}
 
-    def node(view: View) -> Node:
-        aspect, number = view.width / view.height, numbers[view.camera.fit]
-        function = partial(framed, view.camera, aspect, number)
-        return Node.of(function, f"camera:{view.name}")
-
-    return [node(view) for view in needs.views(scene) if view.camera.fit is not None]
+    return [
+        Node.of(
+            partial(framed, view.camera, view.width / view.height, numbers[view.camera.fit]),
+            f"camera:{view.name}",
+        )
+        for view in needs.views(scene)
+        if view.camera.fit is not None
+    ]
 
 
 def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
 from illumcli.film.view import View
-from illumcli.graph import Node
+from illumcli.graph import Buffers, Node
 from illumcli.lights._incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
@@ -81,7 +81,7 @@ class _Common(Record):
     """What all tiles of a view share."""
 
     plan: Plan
-    shared: Mapping[str, Any]
+    shared: Buffers
     stats: RenderStats
     stop: threading.Event
     recorder: BufferRecorder
@@ -128,7 +128,7 @@ def _cost(plan: Plan, name: str, stats: RenderStats) -> float:
 
 def bands(
     plan: Plan,
-    shared: Mapping[str, Any],
+    shared: Buffers,
     run: Run,
     done: Callable[[int], None] = lambda pixels: None,
     side: int | None = None,
@@ -267,9 +267,7 @@ def _last_nodes(
     return _developed(common, started.tile, started.buffers), started.kept
 
 
-def at_pixels(
-    plan: Plan, shared: Mapping[str, Any], run: Run, x: NDArray[np.int64], y: NDArray[np.int64]
-) -> Planes:
+def at_pixels(plan: Plan, shared: Buffers, run: Run, x: NDArray[np.int64], y: NDArray[np.int64]) -> Planes:
     """Layer -> (K, channels) at K pixels of a view, equal to what `bands` computes there.
 
     Raises
@@ -299,7 +297,7 @@ def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept
     return _developed(common, tile, buffers), kept
 
 
-def _developed(common: _Common, tile: Tile, buffers: Mapping[str, Any]) -> Mapping[str, NDArray[Any]]:
+def _developed(common: _Common, tile: Tile, buffers: Buffers) -> Mapping[str, NDArray[Any]]:
     """One tile's developed layers."""
     start = time.perf_counter()
     out = common.develop(tile, _pixels(common.plan, buffers, common.plan.view, tile))
@@ -369,6 +367,7 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     )
     coarse_pixels = _pixels(plan, buffers, coarse, bordered)
     out = {name: np.array(values[inside]) for name, values in coarse_pixels.items()}
+    assert view.adaptive is not None
     differing = _differing(plan, buffers, coarse, bordered, view.adaptive.difference)
     to_refine = {name: mask[inside] for name, mask in differing.items()}
     down, across = np.nonzero(np.logical_or.reduce([*to_refine.values()]))
@@ -402,9 +401,7 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     return developed, {}
 
 
-def _joined(
-    plan: Plan, coarse: Mapping[str, Any], others: Mapping[str, Any], pixel: NDArray[np.int64]
-) -> dict[str, Any]:
+def _joined(plan: Plan, coarse: Buffers, others: Buffers, pixel: NDArray[np.int64]) -> dict[str, Any]:
     """The buffers that the film reads, for some pixels: their first samples, followed by the others.
 
     Parameters
@@ -450,7 +447,7 @@ def _joined(
 
 
 def _differing(
-    plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile, difference: float
+    plan: Plan, buffers: Buffers, view: View, tile: Tile, difference: float
 ) -> dict[str, NDArray[np.bool_]]:
     """(rows, columns) by layer: the pixels that need more samples than the view has."""
     sample, shape = buffers["hits"].sample, (tile.height, tile.width)
@@ -467,7 +464,7 @@ def _differing(
     return out
 
 
-def _pixels(plan: Plan, buffers: Mapping[str, Any], view: View, tile: Tile) -> Planes:
+def _pixels(plan: Plan, buffers: Buffers, view: View, tile: Tile) -> Planes:
     """The layers of a tile, reconstructed from the buffers of its samples."""
     sample = buffers["hits"].sample
     pixels = tile.width * tile.height

@@ -103,10 +103,11 @@ def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
     """A plan for JSON output; `expected` is the memory of shapes, mesh files and textures [bytes]."""
     view, graph = plan.view, plan.graph
     size = {"camera": view.name, "width": view.width, "height": view.height, "samples": view.samples}
+    first = {"first_samples": view.adaptive.first} if view.adaptive and view.is_adaptive else {}
     whole = graph.without_loaders()
     rays = expected_rays(graph.scene, (view,), plan.computed)
     return {
-        "views": [size | ({"first_samples": view.adaptive.first} if view.is_adaptive else {})],
+        "views": [size | first],
         "layers": [layer.name for layer in plan.outputs],
         "objects": which_objects(whole, plan.outputs),
         "once": [node.output for node in plan.once],

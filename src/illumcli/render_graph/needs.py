@@ -7,10 +7,11 @@ from typing import Any
 
 from illumcli.errors import InputError
 from illumcli.film.view import View
+from illumcli.geometry.shapes import Shape
 from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
-from illumcli.scene.spec import MeshFile, Scene, default_material
+from illumcli.scene.spec import MeshFile, NameOrMesh, Object, Scene, default_material
 from illumcli.schema.messages import suggestion
 from illumcli.shading.rates import RATES, Rate
 from illumcli.shading.terms import given_terms
@@ -64,7 +65,7 @@ def candidates(scene: Scene) -> list[IlluminationModel] | None:
     return models
 
 
-def imports(scene: Scene, thing: Any) -> bool:
+def imports(scene: Scene, thing: Object) -> bool:
     """True if an object has the materials of its mesh file."""
     enabled = thing.fallback is not None or getattr(source_of(scene, thing.mesh), "materials", False)
     return thing.material is None and bool(enabled)
@@ -138,14 +139,14 @@ def all_baked(scene: Scene) -> bool:
     return bool(scene.objects) and all(is_baked(scene))
 
 
-def source_of(scene: Scene, mesh: Any) -> Any:
+def source_of(scene: Scene, mesh: NameOrMesh) -> MeshFile | Shape:
     """The description of an object's mesh."""
     if isinstance(mesh, str):
         return scene.meshes[mesh] if mesh in scene.meshes else MeshFile(file=mesh)
     return mesh
 
 
-def mesh_name(scene: Scene, mesh: Any) -> str:
+def mesh_name(scene: Scene, mesh: NameOrMesh) -> str:
     """Name of an object's mesh: its file, otherwise its name in the scene, otherwise its description."""
     source = source_of(scene, mesh)
     if isinstance(source, MeshFile):

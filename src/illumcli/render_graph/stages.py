@@ -18,6 +18,7 @@ from illumcli.film.view import View, distance
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.mesh_checks import faults
+from illumcli.geometry.shapes import Shape
 from illumcli.rays import sampling
 from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.render_space import RenderSpace
@@ -27,7 +28,7 @@ from illumcli.shading.materials import Materials, Numbering, Token, materials, t
 # --- once: contents of files -----------------------------------------------------------------------------
 
 
-def mesh(source: Any) -> Mesh:
+def mesh(source: FileFingerprint | Shape) -> Mesh:
     """The mesh of a file, given by its `FileFingerprint`, or of a shape.
 
     Raises
@@ -36,7 +37,7 @@ def mesh(source: Any) -> Mesh:
         The file changed while it was read.
     """
     if not isinstance(source, FileFingerprint):
-        shape: Mesh = source.mesh()
+        shape = source.mesh()
         return replace(shape, repairs=faults(shape))
     from illumcli.mesh_files import read_mesh
 

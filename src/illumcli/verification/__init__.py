@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from illumcli.errors import InputError, ThresholdError
 from illumcli.verification import (
@@ -96,10 +97,12 @@ def verify_single(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[Singl
     ]
 
 
-def evaluate(file: Path, case: Case, **precision: Any) -> Result:
-    """The renderer's result for a case; `precision` sets fields of `Inputs`."""
+def evaluate(
+    file: Path, case: Case, dtype: DTypeLike = np.float64, rounded: frozenset[str] = frozenset()
+) -> Result:
+    """The renderer's result for a case, in a precision; the inputs `rounded` pass through float32 first."""
     place = f"{file}: {case.id}"
-    inputs = Inputs(place, case.id, case.inputs, **precision)
+    inputs = Inputs(place, case.id, case.inputs, dtype, rounded)
     try:
         with np.errstate(all="ignore"):  # what is not finite shows as an error of inf
             return EVALUATORS[case.type](inputs)

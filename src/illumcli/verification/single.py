@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from illumcli.records import Record
 from illumcli.verification.outcome import Outcome, Result, judge
@@ -16,7 +17,7 @@ FINE = 1e-5
 DIRECTIONS = ("l", "v", "h", "t")
 """Inputs that are shown by their cosine to the normal."""
 
-Evaluate: TypeAlias = Callable[..., Result]
+Evaluate: TypeAlias = Callable[[Case, DTypeLike, frozenset[str]], Result]
 """From a case and the fields `dtype` and `rounded` of `Inputs`."""
 
 
@@ -49,8 +50,10 @@ def single_result(type_: str, cases: Sequence[Case], evaluate: Evaluate) -> Sing
     return SingleResult(type_, outcomes, [_loss(o, evaluate) for o in outcomes if o.error > FINE])
 
 
-def _outcome(case: Case, evaluate: Evaluate, **precision: Any) -> Outcome:
-    return judge(case, evaluate(case, **precision))
+def _outcome(
+    case: Case, evaluate: Evaluate, dtype: DTypeLike = np.float64, rounded: frozenset[str] = frozenset()
+) -> Outcome:
+    return judge(case, evaluate(case, dtype, rounded))
 
 
 def _loss(outcome: Outcome, evaluate: Evaluate) -> Loss:

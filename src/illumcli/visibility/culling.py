@@ -24,6 +24,7 @@ from illumcli.arrays import column_major
 from illumcli.geometry.spatial_order import compact
 from illumcli.lights._base import Light
 from illumcli.rays.camera import axes, offsets
+from illumcli.rays.viewpoints import Camera, PixelFilter
 from illumcli.render_space import RenderSpace
 from illumcli.visibility.shadows import NEARBY, TERMINATOR_SHARE
 
@@ -75,7 +76,7 @@ class SecondaryRays(NamedTuple):
 
 
 def frustum(
-    camera: Any, render_space: RenderSpace, width: int, height: int, film_filter: Any | None
+    camera: Camera, render_space: RenderSpace, width: int, height: int, film_filter: PixelFilter | None
 ) -> Planes:
     """Five planes around all camera rays of a view, in radii: the four sides, and the plane through the eye.
 

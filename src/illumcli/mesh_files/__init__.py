@@ -1,6 +1,6 @@
-"""Mesh files: one module per format, its name the suffix it reads.
+"""Mesh files: one module per format, named after the suffix that it reads.
 
-A format is a module with `read(path) -> Mesh`, and `companions(path)` where its files name others.
+A format is a module with `read(path) -> Mesh`, and `companions(path)` if its files name other files.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from illumcli.schema.modules import modules
 
 NO_FORMATS = frozenset({"mtl", "output_mesh"})
 """Modules beside the formats."""
-OTHER_SUFFIXES = {".glb": "gltf"}  # read by the module of another name
-UNREAD_SUFFIXES = (".off",)  # known to be meshes, so that they are not taken for scenes
+OTHER_SUFFIXES = {".glb": "gltf"}  # suffix -> module of another name
+UNREAD_SUFFIXES = (".off",)  # meshes that cannot be read, listed so that they are not read as scenes
 
 
 def is_mesh_file(path: Path) -> bool:
-    """Does the suffix say that the file is a mesh?"""
+    """True if the suffix is that of a mesh file."""
     return path.suffix.lower() in (*_formats(), *UNREAD_SUFFIXES)
 
 
 def read_mesh(path: Path) -> Mesh:
-    """The mesh in the file `path`; the format is picked by suffix and its module imported only now.
+    """The mesh in a file; the suffix selects the format, whose module is imported on demand.
 
     Raises
     ------
     InputError
-        An unknown suffix, a file that cannot be read, or one whose content is wrong.
+        An unknown suffix, a file that cannot be read, or faulty content.
     LimitError
         A file too large to be read.
     """
@@ -51,8 +51,10 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def companions(path: Path) -> list[Path]:
-    """The files that a mesh file may name, whether they are there or not: material libraries with their
-    textures, buffers; more of them than are read, never fewer, and none outside the folder of the mesh."""
+    """The files that a mesh file may name, existing or not: material libraries with their textures, buffers.
+
+    All files that are read are among them, possibly others, but none outside of the mesh's folder.
+    """
     name = _formats().get(path.suffix.lower())
     named = getattr(_module(name), "companions", None) if name else None
     files: list[Path] = named(path) if named else []
@@ -69,19 +71,18 @@ def _module(name: str) -> ModuleType:
 
 
 def image_within(texture: str) -> tuple[str, int] | None:
-    """The mesh file and the number of the image in it, where that is what a mesh's own library names as a
-    texture (`a.glb#images[2]`)."""
+    """The mesh file and the number of the image in it, if a texture is embedded (`a.glb#images[2]`)."""
     match = re.fullmatch(r"(.*)#images\[(\d+)\]", texture, re.DOTALL)
     return (match[1], int(match[2])) if match else None
 
 
 def embedded_image(path: Path, number: int) -> bytes:
-    """An image as the mesh file `path` holds it, encoded.
+    """The encoded image of this number in a mesh file.
 
     Raises
     ------
     InputError
-        An image that is not there.
+        No such image.
     """
     from illumcli.mesh_files.gltf.document import open_document
     from illumcli.mesh_files.gltf.materials import image_bytes

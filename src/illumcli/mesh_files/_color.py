@@ -1,4 +1,4 @@
-"""The range of vertex colours as files hold them."""
+"""The range of vertex colours in files: 0..1 or 0..255."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 
 def unit_range(colors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Colours of full 1, NaN where there is none; `colors` itself where they are.
+    """Colours scaled to a range of 0..1; `colors` itself, not copied, if they are in that range already.
 
-    Of full 255 are those that are whole numbers, or most of which lie far beyond 1. A few that lie beyond 1,
-    by rounding or being very bright, do not make bytes of the others.
+    Colours are in 0..255 if some are above 1 and all are whole numbers, or their median is above 2. A few
+    values above 1, by rounding or because they are very bright, do not count. NaN means no colour.
     """
     bright = colors[colors > 0]
     if not (bright > 1).any():

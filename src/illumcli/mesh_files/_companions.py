@@ -1,4 +1,4 @@
-"""Names of other files in the text of a mesh file, found without reading the mesh."""
+"""Names of other files in the text of a mesh file, extracted without reading the mesh."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from illumcli.errors import IllumError, InputError
 from illumcli.mesh_files._files import LONGEST_NAME, beside, content
 from illumcli.mesh_files._text import decoded, without_comment
 
-MOST_WORDS = 128  # of a line that names files, with the blanks between them
+MOST_WORDS = 128  # words considered in a line that names files, blanks between them included
 
 
 def files_named(
@@ -21,19 +21,19 @@ def files_named(
     folder: Path | None = None,
     most: int | None = None,
 ) -> list[Path]:
-    """The paths inside `folder` that the text of a file may mean.
+    """The paths inside `folder` that a file may refer to.
 
     Parameters
     ----------
     find
-        From the file's bytes, its first `most`, to the texts that name files.
+        Function of the file's bytes, or the first `most`: the texts that name files.
     folder
-        That of `path` by default.
+        By default that of `path`.
     """
     folder = folder or path.parent
     try:
         data = content(path, most)
-    except IllumError:  # whoever reads the file says what is wrong with it
+    except IllumError:  # reported when the file is read
         return []
     names = dict.fromkeys(name for text in find(data) for name in _meanings(text))
     files: dict[Path, None] = {}
@@ -45,7 +45,8 @@ def files_named(
 
 
 def _meanings(text: bytes) -> Iterator[str]:
-    """The names that may be meant: all of it, what follows any word, each word; with folders and without."""
+    """All possible file names in a text: the whole, the rest after each word, each word; also without
+    folders."""
     line = decoded(text[:LONGEST_NAME]).strip()
     if line.startswith("data:"):
         return

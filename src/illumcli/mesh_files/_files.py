@@ -1,4 +1,4 @@
-"""Files of a mesh: what may be opened, and how much of it."""
+"""Access to the files of a mesh: which may be opened, and size limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LONGEST_NAME = 4096  # letters of a path
 
 
 def content(path: Path, most: int | None = None) -> bytes:
-    """The bytes of a regular file that is not empty and not larger than `LARGEST_FILE`; the first `most`."""
+    """The bytes of a regular file, or the first `most`; refused if it is empty or beyond `LARGEST_FILE`."""
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
@@ -36,10 +36,20 @@ def content(path: Path, most: int | None = None) -> bytes:
 
 
 def beside(path: Path, name: str, place: str, folder: Path | None = None) -> Path:
-    """The file that `path` calls `name`; it lies in `folder` or below, or `InputError` is raised.
+    """The file that a file names; `InputError` if it is not in `folder` or below, after following links.
 
-    Links are followed first. `place` begins the message, as ``path:line``; `folder` is that of `path` by
-    default. The file need not exist.
+    The file need not exist.
+
+    Parameters
+    ----------
+    path : Path
+        The file that has the name.
+    name : str
+        Relative to the folder of `path`.
+    place : str
+        Where it has the name, ``path:line``; begins the message.
+    folder : Path, optional
+        By default that of `path`.
     """
     advice = "copy the file beside the mesh and name it alone"
     if Path(name).is_absolute() or PureWindowsPath(name).drive:
@@ -59,32 +69,34 @@ TAKEN = "replaced by those of the same name in it"
 
 
 def nearby(path: Path, name: str, folder: Path) -> tuple[Path | None, str]:
-    """The file that `path` calls `name` and, where that is none inside `folder`, what is the matter with it.
+    """The file that a mesh or its library names, and what is wrong with the name.
 
-    A name that leads out of the folder, or to what is not there, stands for the file of that name in the
-    folder of `path` or in `folder`, if there is one. Nothing outside is opened or looked at.
+    If the name leads out of the folder or to no file, a file of the same name in the folder of `path` or in
+    `folder` replaces it, if there is one. Nothing outside of `folder` is accessed.
 
     Parameters
     ----------
     path : Path
         A file in `folder` or below it: the mesh or its library.
     name : str
-        With slashes of either kind.
+        With slashes or backslashes.
 
     Returns
     -------
-    Path or None, {"", OUTSIDE, MISSING}
+    file : Path or None
+    fault : {"", OUTSIDE, MISSING}
+        Not empty if the name itself leads to no file inside `folder`.
     """
     if not 0 < len(name) <= LONGEST_NAME:
         return None, MISSING
-    matter = MISSING
+    fault = MISSING
     last = PureWindowsPath(name).name
     for start, candidate in ((path, name), (path, last), (folder / path.name, last)):
         try:
             file = beside(start, candidate, "", folder)
         except InputError:
-            matter = OUTSIDE
+            fault = OUTSIDE
             continue
         if candidate and os.path.isfile(file):
-            return file, "" if candidate == name and start == path else matter
-    return None, matter
+            return file, "" if candidate == name and start == path else fault
+    return None, fault

@@ -1,8 +1,8 @@
-"""The tables of a PLY file, whatever they mean: its header, rows of text, rows of bytes.
+"""Parses a PLY file into tables without interpreting them: its header, rows of text, binary rows.
 
-One pass in Python finds the rows of lists that differ in length, everything else is a few numpy calls on
-whole columns, and nothing is allocated for rows that the file cannot hold. `plyfile` walks every row and
-trusts the header. 501,264 vertices, processor seconds, best of three (Python 3.11, numpy 2.4)::
+Only binary rows with lists of different lengths need a loop in Python; everything else is a few numpy calls
+on whole columns. No memory is allocated for rows that the file cannot contain. `plyfile` loops over every row
+and trusts the header. 501,264 vertices, processor seconds, best of three (Python 3.11, numpy 2.4)::
 
                                                        here    plyfile 1.1.5
     text, 999,698 triangles                            2.1     22
@@ -46,7 +46,7 @@ _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)")
 
 
 class Lists(Value):
-    """A list property: the values of all rows one after the other, and how many each row has."""
+    """A list property: the values of all rows one after the other, and their number in each row."""
 
     values: NDArray[Any]
     counts: Ints
@@ -66,7 +66,7 @@ class Property(Value):
 
 
 class Element(Value):
-    """What the header says of the rows of one kind."""
+    """The header's declaration of an element: name, number of rows and properties."""
 
     name: str
     count: int
@@ -75,7 +75,7 @@ class Element(Value):
 
 
 class Header(Value):
-    """What a file says of its rows."""
+    """The header of a file."""
 
     elements: list[Element]
     is_text: bool
@@ -84,13 +84,16 @@ class Header(Value):
 
 
 def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
-    """The header; lines that say nothing of the rows are left out."""
+    """Parse the header; lines that do not concern the rows are left out."""
+    # Its extent.
     begin = _START.match(data)
     end = _END.search(data, 0, LONGEST_HEADER)
     if begin is None or end is None:
         raise InputError(f"{path}: has no PLY header; give the file the suffix of its format")
     if data.startswith(BYTE_ORDER_MARK):
         note(repairs, "byte order marks left out", ":1")
+
+    # Its lines.
     order = None
     elements: list[Element] = []
     textures = []
@@ -123,12 +126,13 @@ def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
                 raise InputError(f"{place}: {text} is no line of a PLY header; export the mesh again")
             case _:
                 note(repairs, "unknown lines of the header left out", f":{number}")
+
     if order is None:
         raise InputError(f"{path}: its header has no format line; export the mesh again")
     for element in elements:
         if element.count and not element.properties:
             raise InputError(f"{path}: element '{element.name}' has no properties; export the mesh again")
-    # where lines end with a carriage return alone, a line feed behind it is the first byte of the rows
+    # if lines end with a carriage return alone, a line feed after it is the first byte of the rows
     start = end.end(1) if begin[1] != b"\r" else end.start(1) + 1
     return Header([_ordered(each, order) for each in elements], order == "ascii", start, textures)
 
@@ -168,10 +172,10 @@ def _unused(name: str, known: list[str]) -> str:
 def tables(
     path: Path, data: bytes, head: Header, repairs: dict[str, Repair]
 ) -> tuple[dict[str, Table], Text | None]:
-    """Element -> property -> values, and the text they stand in.
+    """Element -> property -> values, and the text that contains them; None for binary files.
 
-    Numbers of text are float64 whatever their type. A row of text is a line, what stands behind its end is
-    left out; where lines do not hold their rows, rows may go on in the next, as values alone are counted.
+    Numbers in text are float64, whatever their type. A row of text is a line, and surplus words are left out.
+    If lines do not fit the rows, the text is read as a sequence of values, and None is returned for it.
     """
     if not head.is_text:
         columns, end = _binary_tables(path, data, head.elements, head.start)
@@ -192,7 +196,7 @@ def tables(
 
 
 def _by_values(path: Path, values: NDArray[np.float64], elements: list[Element]) -> dict[str, Table] | None:
-    """The tables where rows are no lines and the values are as many as announced; else None."""
+    """The tables if rows are not lines but the number of values is as declared; otherwise None."""
     data = values.tobytes()
     try:
         columns, end = _binary_tables(path, data, [_of_doubles(each) for each in elements], 0)
@@ -234,7 +238,7 @@ def _by_lines(
 
 
 def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Table:
-    """The table of one element, a row per line; NaN where a word is no number."""
+    """The table of one element with a row per line; NaN where a word is not a number."""
     values, ends = block.floats(needed=0), np.cumsum(block.counts)
     at = ends - block.counts
 
@@ -266,7 +270,7 @@ def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Tab
 def _binary_tables(
     path: Path, data: bytes, elements: list[Element], start: int
 ) -> tuple[dict[str, Table], int]:
-    """Element -> property -> values of a binary body, and where it ends."""
+    """Element -> property -> values of binary rows, and the offset of their end."""
     columns = {}
     for element in elements:
         columns[element.name], start = _binary_table(path, data, element, start)
@@ -274,7 +278,7 @@ def _binary_tables(
 
 
 def _binary_table(path: Path, data: bytes, element: Element, start: int) -> tuple[Table, int]:
-    """Property -> values of the element whose rows begin at `start`, and where they end."""
+    """Property -> values of the element whose rows begin at `start`, and the offset of their end."""
     least = sum((each.count_type or each.type).itemsize for each in element.properties)
     if element.count * least > len(data) - start:
         raise _cut_off(path, element, (len(data) - start) // max(least, 1))
@@ -290,7 +294,8 @@ def _binary_table(path: Path, data: bytes, element: Element, start: int) -> tupl
 
 
 def _equal_rows(data: bytes, element: Element, start: int) -> tuple[Table, int] | None:
-    """The table if the lists of every row are as long as those of the first, else None."""
+    """The table if the lists of all rows have the lengths of those in the first row, otherwise None."""
+    # The layout of the first row.
     fields: list[Any] = []
     at = start
     for i, each in enumerate(element.properties):
@@ -305,6 +310,8 @@ def _equal_rows(data: bytes, element: Element, start: int) -> tuple[Table, int] 
         if size < 0 or at > len(data):
             return None
         fields += [(f"count {i}", each.count_type), (f"value {i}", each.type, (size,))]
+
+    # All rows by this layout; give up if a length differs.
     end = start + element.count * (at - start)
     if end > len(data):
         return None
@@ -323,12 +330,12 @@ def _equal_rows(data: bytes, element: Element, start: int) -> tuple[Table, int] 
 
 
 def _whole(number: Any) -> int:
-    """A list's length; -1 where it is none."""
+    """The length of a list; -1 if the number is not a valid length."""
     return int(number) if 0 <= number < 2**53 and number == int(number) else -1
 
 
 def _ragged_rows(path: Path, data: bytes, element: Element, start: int) -> tuple[Table, int]:
-    """The table of rows that differ in length."""
+    """The table of rows of different lengths."""
     at, end = _row_starts(path, data, element, start)
     raw = np.frombuffer(data, np.uint8)
     table: Table = {}
@@ -345,7 +352,7 @@ def _ragged_rows(path: Path, data: bytes, element: Element, start: int) -> tuple
 
 
 def _row_starts(path: Path, data: bytes, element: Element, start: int) -> tuple[Ints, int]:
-    """(count,) where each row begins, and where the last ends: the one walk from row to row."""
+    """(count,) offset of each row, and of the end of the last; the only loop over rows."""
     steps: list[tuple[int, struct.Struct, int]] = []  # bytes before a list, its length, bytes of an item
     gap = 0
     for each in element.properties:

@@ -1,4 +1,4 @@
-"""From what a file holds to a checked `Mesh`: the last step of every reader."""
+"""The last step of every reader: checks the content of a file, removes unusable parts, makes a `Mesh`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Indices: TypeAlias = NDArray[np.integer[Any]]
 
 
 class RawMesh(Record):
-    """A mesh as its file has it, before anything is checked; the fields are those of `Mesh`."""
+    """A mesh as in its file, before any check; the fields are those of `Mesh`."""
 
     vertices: NDArray[np.float64]  # (V, 3)
     corners: Ints  # (C,) vertex of each corner, in range
@@ -42,21 +42,22 @@ class RawMesh(Record):
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
     material_repairs: Repairs = field(default_factory=dict)
-    repairs: Repairs = field(default_factory=dict)  # what the reader itself put right
+    repairs: Repairs = field(default_factory=dict)  # repairs of the reader
 
 
 def checked_mesh(path: Path, raw: RawMesh, place: Place = numbered) -> Mesh:
-    """The mesh, without what cannot be used; `InputError` where it has no faces or a corner is not finite.
+    """The mesh without unusable parts; `InputError` if it has no faces or a used vertex is not finite.
 
-    Polygons of fewer than three corners are dropped. Normals and uv that are not finite, and normals of
-    no length, are taken from the corners that use them. Attributes that are not finite become 0, and so do
-    vertices that no polygon uses. All of it is counted in the mesh's `repairs`.
+    Polygons with fewer than three corners are dropped. Corners lose normals and uv that are not finite, and
+    normals of length 0. Attributes and unused vertices that are not finite become 0. Everything is counted in
+    the mesh's `repairs`.
 
     Parameters
     ----------
     place
-        Where a part of the file stands.
+        Function of the kind and number of an element: its place in the file, for messages.
     """
+    # Drop degenerate polygons.
     noted = dict(raw.repairs)
     kept = raw.counts >= 3
     if not kept.all():
@@ -68,6 +69,8 @@ def checked_mesh(path: Path, raw: RawMesh, place: Place = numbered) -> Mesh:
         raise LimitError(
             f"{path}: has {len(raw.corners)} corners, the limit is {MOST_CORNERS}; use a smaller mesh"
         )
+
+    # Detach unusable normals and uv from the corners.
     vertices = _finite_vertices(path, raw, noted, place)
     corner_normals, corner_uvs = raw.corner_normals, raw.corner_uvs
     if raw.normals is not None and corner_normals is not None:
@@ -119,18 +122,18 @@ def _with_polygons(raw: RawMesh, kept: NDArray[np.bool_]) -> RawMesh:
 
 
 def starts_of(counts: Indices) -> Ints:
-    """(P + 1,) where each of consecutive runs of `counts` entries starts, and the end."""
+    """(P + 1,) starts of consecutive runs of `counts` entries, and the end of the last."""
     return np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
 
 
 def runs(starts: Indices, counts: Indices, step: int = 1) -> Ints:
-    """start, start + step, ... for `counts` entries of each start, one run after the other."""
+    """start, start + step, ... with `counts` entries for each start, one run after the other."""
     within = np.arange(counts.sum(), dtype=np.int64) - np.repeat(starts_of(counts)[:-1], counts)
     return np.repeat(starts, counts) + step * within
 
 
 def _finite_vertices(path: Path, raw: RawMesh, noted: dict[str, Repair], place: Place) -> NDArray[np.float64]:
-    """The vertices, 0 where one is NaN, infinite or beyond `LARGEST`; refused where a corner uses it."""
+    """The vertices; those that are NaN, infinite or beyond `LARGEST` become 0, or are refused if in use."""
     vertices = raw.vertices
     usable = _within(vertices)
     if usable.all():
@@ -147,18 +150,18 @@ def _finite_vertices(path: Path, raw: RawMesh, noted: dict[str, Repair], place: 
 
 
 def check_range(indices: Ints, size: int, refuse: Callable[[int], InputError]) -> None:
-    """Refuse indices outside 0..size - 1; `refuse` makes the error from the position of the first."""
+    """Refuse indices outside of 0..size - 1; `refuse` gives the error for the position of the first."""
     if len(indices) and (indices.min() < 0 or indices.max() >= size):
         raise refuse(int(np.argmax((indices < 0) | (indices >= size))))
 
 
 def strip(indices: Indices) -> tuple[Ints, int]:
-    """Triangles of strips, and how many were left out because they only join two strips.
+    """The triangles of strips, and the number of degenerate ones, which only join two strips.
 
     Parameters
     ----------
     indices : (S,) int
-        Vertices; -1 ends a strip. Every second triangle of a strip is turned, so all wind alike.
+        Vertices; -1 ends a strip. Every second triangle is reversed, so that all have the same winding.
 
     Returns
     -------
@@ -166,14 +169,18 @@ def strip(indices: Indices) -> tuple[Ints, int]:
     """
     ids = np.asarray(indices, np.int64)
     triples = np.stack([ids[:-2], ids[1:-1], ids[2:]], axis=1) if len(ids) > 2 else np.empty((0, 3), np.int64)
-    place = np.arange(len(ids))
-    first = np.maximum.accumulate(np.where(ids == -1, place + 1, 0))[: len(triples)]
-    turned = (place[: len(triples)] - first) % 2 == 1
-    triples[turned, 0], triples[turned, 1] = triples[turned, 1], triples[turned, 0]
+
+    # Reverse every second triangle, counted from the start of its strip.
+    position = np.arange(len(ids))
+    first = np.maximum.accumulate(np.where(ids == -1, position + 1, 0))[: len(triples)]
+    reverse = (position[: len(triples)] - first) % 2 == 1
+    triples[reverse, 0], triples[reverse, 1] = triples[reverse, 1], triples[reverse, 0]
+
+    # Drop triples across the end of a strip, and triangles that repeat a vertex.
     triangles = triples[(triples != -1).all(axis=1)]
     a, b, c = triangles.T
-    proper = (a != b) & (b != c) & (c != a)
-    return triangles[proper], int(np.count_nonzero(~proper))
+    distinct = (a != b) & (b != c) & (c != a)
+    return triangles[distinct], int(np.count_nonzero(~distinct))
 
 
 def _within(values: NDArray[np.float64]) -> NDArray[np.bool_]:

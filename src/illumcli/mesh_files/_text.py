@@ -1,4 +1,4 @@
-"""Text files of numbers, cut into lines and read in bulk: a few passes over all bytes, none over lines."""
+"""Text files of numbers, parsed in bulk: a few numpy passes over all bytes instead of a loop over lines."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _BLANKS = re.compile(rb"[ \t\r\v\f]*")
 
 
 class Text(Value):
-    """The lines of a file that hold something: comments are left out, continued lines are joined.
+    """The lines of a file that are not empty, without comments and with continued lines joined.
 
-    What is taken out is replaced by as many blanks, so an offset here is an offset in the file.
+    Removed text is replaced by equally many blanks, so offsets in `data` are offsets in `raw`.
     """
 
     path: Path
@@ -85,7 +85,7 @@ class Text(Value):
         return starts[self.bytes[starts] != 10]
 
     def keywords(self, width: int) -> NDArray[np.uint64]:
-        """(L,) the first word of each line, or its first `width` letters, small, as `keyword` codes it."""
+        """(L,) the first word of each line, at most `width` letters in lower case, coded as by `keyword`."""
         code = np.zeros(len(self.starts), np.uint64)
         inside = np.ones(len(self.starts), bool)
         for i in range(width):
@@ -96,7 +96,7 @@ class Text(Value):
         return code
 
     def line(self, index: int) -> str:
-        """The content of a line, without blanks around it."""
+        """The content of a line, without surrounding blanks."""
         start = self.starts[index]
         return decoded(self.data[start : self.data.index(b"\n", start)]).strip()
 
@@ -109,7 +109,7 @@ class Text(Value):
         return f"{self.path}:{self.number(index)}"
 
     def block(self, lines: NDArray[np.intp], keyword: int = 0) -> Block:
-        """The lines of these ascending indices, the `keyword` letters at the start of each blanked."""
+        """The lines of these ascending indices; the first `keyword` letters of each become blanks."""
         if not len(lines):
             return Block(self, lines, np.empty(0, np.uint8), np.empty(0, np.int64))
         ends = np.append(self.starts[1:], len(self.data))
@@ -125,7 +125,7 @@ class Text(Value):
 
 
 def decoded(line: bytes) -> str:
-    """A line as text: UTF-8, else Latin-1."""
+    """A line as text: UTF-8, otherwise Latin-1."""
     try:
         return line.decode("utf-8")
     except UnicodeDecodeError:
@@ -138,7 +138,7 @@ def without_comment(text: str) -> str:
 
 
 def keyword(word: bytes) -> int:
-    """The code that `Text.keywords` has for a word of at most eight letters."""
+    """The code of a word of at most eight letters in `Text.keywords`."""
     return int.from_bytes(word, "little")
 
 
@@ -146,9 +146,9 @@ class Block(Value):
     """Some lines of a text, one after the other."""
 
     text: Text
-    lines: NDArray[np.intp]  # (B,) their index in `text`
+    lines: NDArray[np.intp]  # (B,) their indices in `text`
     data: NDArray[np.uint8]
-    starts: Ints  # (B,) where each begins in `data`
+    starts: Ints  # (B,) offset of each in `data`
 
     @cached_property
     def heads(self) -> NDArray[np.bool_]:
@@ -165,9 +165,10 @@ class Block(Value):
         return np.add.reduceat(self.heads, self.starts, dtype=np.int32).astype(np.int64)
 
     def floats(self, needed: int | None = None) -> NDArray[np.float64]:
-        """Every word as a number in full precision, line after line.
+        """All words as numbers in full precision, line after line.
 
-        NaN stands for what is no number, refused among the first `needed` words of a line, or among all.
+        Words that are not numbers are refused, or only if they are among the first `needed` of a line; the
+        others become NaN.
         """
         words = chain.from_iterable(map(bytes.split, self._pieces()))
         try:
@@ -178,23 +179,23 @@ class Block(Value):
             return self._floats_among_words(needed)
 
     def _floats_among_words(self, needed: int | None) -> NDArray[np.float64]:
-        """`floats` of lines that hold other words, too."""
+        """`floats` for lines that have other words, too."""
         edges = pairwise([*self.starts.tolist(), len(self.data)])
         values = []
         for line, (start, end) in enumerate(edges):
             words = self.data[start:end].tobytes().split()
             for column, word in enumerate(words):
                 number = _is_number(word, float)
-                # control characters part words here, and elsewhere they do not
+                # control characters separate words here, but not in `counts`
                 if not number and (needed is None or column < needed or len(words) != self.counts[line]):
                     raise self._bad_word(line, word, "number")
                 values.append(float(word) if number else np.nan)
         return np.array(values, np.float64)
 
     def integers(self) -> Ints:
-        """Every word as an integer, line after line; one too large for int64 becomes its largest."""
+        """All words as integers, line after line; those too large for int64 become its largest."""
         total = int(self.counts.sum())
-        try:  # older numpy stops at a bad word with a warning alone: the 0 behind all is missing then
+        try:  # older numpy only warns and stops at a bad word: then the appended 0 is missing
             return np.fromstring(self.data.tobytes() + b" 0", np.int64, sep=" ")[:-1].reshape(total)
         except (ValueError, DeprecationWarning):
             raise self._bad_integer() from None
@@ -211,7 +212,7 @@ class Block(Value):
             yield self.data[start:end].tobytes()
 
     def _bad_integer(self) -> InputError:
-        """The error that names the first word that is no whole number."""
+        """The error for the first word that is not a whole number."""
         edges = pairwise([*self.starts.tolist(), len(self.data)])
         lines = (self.data[start:end].tobytes().split() for start, end in edges)
         i, bad = next(
@@ -220,7 +221,7 @@ class Block(Value):
         return self._bad_word(i, bad, "whole number")
 
     def refuse_words(self, line: int, needed: int) -> None:
-        """Refuse a line of fewer than `needed` numbers by the first of its words that is none."""
+        """Refuse a line that has fewer than `needed` numbers; the message names its first other word."""
         edges = [*self.starts.tolist(), len(self.data)]
         words = self.data[edges[line] : edges[line + 1]].tobytes().split()[:needed]
         for word in words:

@@ -4,13 +4,13 @@ illum 0             the colour Kd, whatever the light
 illum 1             Ka ambient + Kd n.l
 illum 2 and above   Ka ambient + Kd n.l + Ks (n.h)^Ns, h half way between light and eye
 
-Those are `blinn_phong` as it stands: intensities, without 1/pi. What it has no word for (transparency,
-reflection, refraction, factors and placement of textures) is counted, not guessed, and so is what makes no
-sense: no statement of a library refuses the mesh.
+This is `blinn_phong` as published: intensities, without 1/pi. Features without a counterpart (transparency,
+reflection, refraction, factors and placement of textures) are counted, not approximated, and so are malformed
+statements: a faulty library never refuses the mesh.
 
 References
 ----------
-Wavefront Technologies (1995). MTL material format, version 4.2. Ke is a later custom, meant as emission.
+Wavefront Technologies (1995). MTL material format, version 4.2. Ke, emission, is a later convention.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _NOTHING = {
     "ni",
     "tf",
     "sharpness",
-}  # of transparent and mirroring materials alone, which are counted as such
+}  # only for transparent and mirroring materials, which are counted as such
 
-# what may stand before the name of an image: a word, two numbers, or one to three
+# options before the name of an image, with a word, two numbers, or one to three numbers
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?=\s)"
 _OPTION = re.compile(
     rf"-(?:(?P<name>blendu|blendv|boost|bm|cc|clamp|imfchan|texres|type)\s+(?P<word>\S+)"
@@ -53,24 +53,24 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 class Library(Value):
-    """What a library holds, by material name: keys of a scene's material, what stands in for textures."""
+    """The content of a library, by material name: keys of a scene's material, substitutes of textures."""
 
     materials: dict[str, dict[str, Any]] = field(default_factory=dict)
     substitutes: dict[str, dict[str, Substitute]] = field(default_factory=dict)
     repairs: dict[str, Repair] = field(default_factory=dict)
     looks: dict[str, Repair] = field(default_factory=dict)
-    """What has no counterpart here and changes how a material looks; told where the library is used."""
+    """Features that change the look of a material and are not supported; reported if the library is used."""
 
 
 def read(path: Path, folder: Path) -> Library:
-    """The materials of a library, and what was left out of it.
+    """The materials of a library, and what was repaired or left out.
 
     Parameters
     ----------
     path : Path
         The library, inside `folder`.
     folder : Path
-        The folder of the mesh, in which the textures lie. The path of a texture begins as it does.
+        The folder of the mesh, which contains the textures. Paths of textures begin with it.
     """
     library = Library()
     name = path.relative_to(folder).as_posix()
@@ -84,10 +84,10 @@ def read(path: Path, folder: Path) -> Library:
     for number, word, rest in lines:
         place = f"{name}:{number}"
         if word == "newmtl":
-            called = without_comment(rest).rstrip()
-            if called in materials:
+            material_name = without_comment(rest).rstrip()
+            if material_name in materials:
                 note(library.repairs, "materials that are defined twice, joined", place)
-            current = materials.setdefault(called, _Material(path, folder, library))
+            current = materials.setdefault(material_name, _Material(path, folder, library))
         elif current is None:
             note(library.repairs, "statements before any material left out", place)
         else:
@@ -98,7 +98,7 @@ def read(path: Path, folder: Path) -> Library:
 
 
 def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
-    """Number, keyword in small letters and the rest of each line that says something."""
+    """Line number, keyword in lower case and the rest of each statement."""
     lines = data.removeprefix(b"\xef\xbb\xbf").rstrip(b"\0\x1a").splitlines()
     for number, line in enumerate(lines, start=1):
         word, *rest = decoded(line).split(None, 1)[:2] or ("",)
@@ -107,7 +107,7 @@ def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
 
 
 class _Material:
-    """The statements of one material."""
+    """Collects the statements of one material."""
 
     def __init__(self, path: Path, folder: Path, library: Library) -> None:
         self._path, self._folder = path, folder
@@ -116,7 +116,7 @@ class _Material:
         self._places: dict[str, str] = {}
 
     def take(self, word: str, rest: str, place: str) -> None:
-        """One more statement; one that makes no sense is left out."""
+        """Take a statement; a malformed one is left out and counted."""
         words = rest.partition("#")[0].split()
         if word in _COLORS:
             self._set(_COLORS[word], self._color(words, place), place)
@@ -143,7 +143,7 @@ class _Material:
         return (values if len(values) == 3 else values[:1] * 3) or None
 
     def _numbers(self, words: list[str], place: str) -> Color:
-        """The numbers; none where one is no number or out of range."""
+        """The numbers; none if one is malformed or out of range."""
         try:
             values = tuple(map(float, words))
         except ValueError:
@@ -154,8 +154,8 @@ class _Material:
         return ()
 
     def _texture(self, text: str, place: str) -> dict[str, str] | None:
-        """The texture that a map statement names, without its options; None where there is none."""
-        # options stand before the name, which may hold blanks
+        """The texture of a map statement; None if there is no such file."""
+        # Options precede the name, which may contain blanks.
         texture: dict[str, str] = {}
         at, options = 0, False
         while option := _OPTION.match(text, at):
@@ -167,17 +167,18 @@ class _Material:
         if options:
             note(self._looks, "texture options left out", place)
 
-        # as it stands, else without a comment, else without quotes
+        # The name as it is, otherwise without a comment, otherwise without quotes.
         name = text[at:]
         names = dict.fromkeys((name, without_comment(name).rstrip(), name.strip("\"'")))
         files = [nearby(self._path, each, self._folder) for each in names]
-        file, matter = next((each for each in files if each[0]), files[0])
-        if matter:
-            note(self._repairs, f"textures {matter} {TAKEN if file else 'left out'}", place)
+        file, fault = next((each for each in files if each[0]), files[0])
+        if fault:
+            note(self._repairs, f"textures {fault} {TAKEN if file else 'left out'}", place)
         return None if file is None else {"texture": str(file), **texture}
 
     def keys(self) -> tuple[dict[str, Any], dict[str, Substitute]]:
-        """The keys of a scene's material, and what stands in for textures among them."""
+        """The keys of a scene's material, and the substitutes of its textures."""
+        # Count unsupported features.
         values, places = self._values, self._places
         diffuse = values.get("map_Kd", values.get("Kd"))
         if "map_Kd" in values and values.get("Kd", WHITE) != WHITE:
@@ -187,6 +188,8 @@ class _Material:
         illum = values.get("illum", 2.0)
         if illum > 2:
             note(self._looks, "reflection of materials left out", places["illum"])
+
+        # The parameters, by the lighting mode.
         if illum == 0:
             light = WHITE if diffuse is None else diffuse
             keys = {"diffuse": BLACK, "specular": BLACK, "ambient": BLACK, "emission": light}

@@ -1,8 +1,8 @@
 """Wavefront OBJ: polygons with normals, uv, groups, materials and vertex colours.
 
-A reader of our own because no library keeps polygons at speed: `trimesh` cuts quadrangles in triangles and
-checks no index (0 becomes the last vertex), `meshio` is slower still, `tinyobjloader` has no wheel and does
-not build from its source package. Best of five, one core, seconds (Python 3.11, numpy 2.4)::
+This reader exists because no library keeps polygons and is fast: `trimesh` splits quadrilaterals into
+triangles and checks no index (0 becomes the last vertex), `meshio` is slower still, `tinyobjloader` has no
+wheel and does not build from its source package. Best of five, one core, seconds (Python 3.11, numpy 2.4)::
 
                                         here    trimesh 5.2    meshio 5.3
     Stanford bunny, 69,451 faces        0.046   0.15           0.30
@@ -36,7 +36,7 @@ from illumcli.records import Value
 
 _LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
 
-# statements that hold no polygons and change none
+# statements that define no polygons and affect none
 _STATE = (
     "mg lod bevel c_interp d_interp shadow_obj trace_obj ctech stech maplib usemap vp cstype deg step bmat "
     "parm trim hole scrv sp end con"
@@ -50,24 +50,27 @@ _LEFT_OUT = {
     "call": "other files and commands left out",
     "csh": "other files and commands left out",
 }
-NOWHERE = 2**62  # a row that no file has
+NOWHERE = 2**62  # a reference that is out of range in any file
 _UNKNOWN = "unknown statements left out"
 
 
 def read(path: Path) -> Mesh:
     """The polygons of an OBJ file, and the materials of its libraries.
 
-    Vertex colours (three or four more numbers behind a position) are taken for sRGB, in 0..1 or 0..255. `o`
-    and `g` both begin a group. Display attributes are left out; lines, points, free-form geometry and
-    unknown statements are counted in `repairs`, and so is whatever is mended: only what no face could be
-    known from is refused.
+    Vertex colours (three or four more numbers after a position) are sRGB, in 0..1 or 0..255. `o` and `g` both
+    begin a group. Display attributes are ignored. Lines, points, free-form geometry and unknown statements
+    are left out and counted in `repairs`, as are all repairs. Only a file whose faces cannot be determined is
+    refused.
     """
+    # The lines by keyword.
     text = Text.of(path, content(path), comments=True, continued=True)
     words = text.keywords(3)
     lines = {word: np.flatnonzero(words == keyword(word)) for word in (b"v", b"vn", b"vt", b"f")}
     known = sum((words == keyword(word) for word in lines), np.zeros(len(words), bool))
     rest = _Statements.of(text, np.flatnonzero(~known))
     repairs = {**text.repairs, **rest.repairs}
+
+    # Tables of vertices, uv and normals; references of the faces to their rows.
     positions = text.block(lines[b"v"], keyword=1)
     vertices, attributes = _vertices(positions, repairs)
     uvs = _uvs(text.block(lines[b"vt"], keyword=2))
@@ -84,6 +87,8 @@ def read(path: Path) -> Mesh:
         positions.refuse_words(vertex, 3)
     corner_uvs = rows(1, b"vt", len(uvs), "texture coordinates") if 1 in references else None
     corner_normals = rows(2, b"vn", len(normals), "normals") if 2 in references else None
+
+    # Materials, groups and smoothing groups of the faces.
     library = _libraries(path, text, rest.libraries)
     repairs |= joined([repairs, library.repairs, _undefined(text, rest.materials, library)])
     material_names, polygon_materials = _selected(rest.materials, lines[b"f"])
@@ -114,7 +119,7 @@ _PARTS = {"vertex": b"v", "uv": b"vt", "normal": b"vn", "face": b"f"}
 
 
 class _Statements(Value):
-    """What the lines say that are neither vertices nor faces: (line, name) each, in order."""
+    """The statements other than vertices and faces: pairs (line, name), in order."""
 
     materials: list[tuple[int, str]] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
@@ -148,14 +153,17 @@ class _Statements(Value):
 def _vertices(
     block: Block, repairs: dict[str, Repair]
 ) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float32]]]:
-    """(V, 3) positions, NaN where a line has none; `color` (V, 3), linear, and `alpha` (V,), where any vertex
-    has them."""
+    """(V, 3) positions, NaN if a line has none; attributes `color`, (V, 3), linear, and `alpha`, (V,), if any
+    vertex has them."""
+    # Four or more numbers: a weight, or a colour with or without alpha.
     counts, values = block.counts, _table(block, 7)
     _note_lines(repairs, "numbers behind a vertex left out", (counts == 5) | (counts > 7), block)
     _note_lines(repairs, "weights of vertices left out", (counts == 4) & (values[:, 3] != 1), block)
     colored = (counts == 6) | (counts == 7)
     if not colored.any():
         return np.ascontiguousarray(values[:, :3]), {}
+
+    # Colours in 0..1, white if missing, to linear.
     colors = unit_range(np.where(colored[:, None], values[:, 3:], np.nan))
     bare: NDArray[np.bool_] = np.any(np.isnan(colors[:, :3]), axis=1)
     _note_lines(repairs, "vertices without a colour, made white", bare, block)
@@ -177,7 +185,7 @@ def _note_lines(repairs: dict[str, Repair], what: str, wrong: NDArray[np.bool_],
 
 
 def _uvs(block: Block) -> NDArray[np.float64]:
-    """(U, 2); a missing v is 0, a third coordinate is left out; NaN where there is no number."""
+    """(U, 2); a missing v is 0, a third coordinate is ignored; NaN where a word is not a number."""
     values = _table(block, 2)
     values[block.counts == 1, 1] = 0
     return values
@@ -189,7 +197,7 @@ def _normals(block: Block) -> NDArray[np.float64]:
 
 
 def _table(block: Block, size: int) -> NDArray[np.float64]:
-    """(B, `size`) the first numbers of each line; NaN where it has fewer, or a word that is no number."""
+    """(B, `size`) the first numbers of each line; NaN where a number is missing or a word is not a number."""
     values, counts = block.floats(needed=0), block.counts
     width = int(counts[0]) if len(counts) else size
     if (counts == width).all() and width >= size:
@@ -205,27 +213,38 @@ def _table(block: Block, size: int) -> NDArray[np.float64]:
 
 
 def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
-    """Per slot (0 vertex, 1 uv, 2 normal) that any face uses, (C,) the number written, 0 for none.
+    """The references of the corners of faces.
 
-    Second, (P,) corners of each face.
+    Returns
+    -------
+    references : dict
+        Slot (0 vertex, 1 uv, 2 normal) -> (C,) the numbers as written, 0 for none; only slots in use.
+    counts : (P,)
+        Corners of each face.
     """
+    # Without slashes there are only vertices.
     counts = faces.counts
     slash = faces.data == ord("/")
     if not slash.any():
         return {0: faces.integers()}, counts
     numbers = Block(faces.text, faces.lines, np.where(slash, np.uint8(32), faces.data), faces.starts)
     values, starts = numbers.integers(), np.flatnonzero(numbers.heads)
-    first = faces.heads[starts]  # of its corner
+
+    # Slot of each number: that of the number before it plus the slashes between, 0 at the start of a corner.
+    first = faces.heads[starts]  # True for the first number of a corner
     slots = np.where(first, 0, 1 + slash[starts - 2].view(np.int8))
     passed = int(slots.sum())
     slots[1:] += np.where(first[1:], 0, slots[:-1])
+
+    # Check that all words are corners.
     corner = np.cumsum(first) - 1
     corner_count = int(counts.sum())
     four = ~(first[1:-2] | first[2:-1] | first[3:])
     explained = passed + _trailing(faces.data, slash) == np.count_nonzero(slash)
     if four.any() or slots.max(initial=0) > 2 or np.count_nonzero(first) != corner_count or not explained:
         raise _bad_corner(faces)
-    values[(values == 0) & (slots > 0)] = NOWHERE
+
+    values[(values == 0) & (slots > 0)] = NOWHERE  # 0 is written, so it is out of range
     references = {}
     for slot in range(3):
         used = slots == slot
@@ -236,7 +255,7 @@ def _references(faces: Block) -> tuple[dict[int, Ints], Ints]:
 
 
 def _trailing(data: NDArray[np.uint8], slash: NDArray[np.bool_]) -> int:
-    """Slashes that nothing follows: v/ and v// name a vertex alone, v/vt/ has no normal."""
+    """Number of slashes at the end of words: v/ and v// have only a vertex, v/vt/ has no normal."""
     last = np.flatnonzero(slash[:-1] & (data[1:] <= 32))
     return len(last) + int(np.count_nonzero(slash[last - 1]))
 
@@ -259,7 +278,7 @@ def _place(faces: Block, corner: int) -> str:
 
 
 class _Rows(Value):
-    """What a face refers to: the lines that define the rows, how many, and what they are called."""
+    """A table that faces refer to: the lines that define its rows, their number, and its name."""
 
     lines: NDArray[np.intp]
     size: int
@@ -267,15 +286,18 @@ class _Rows(Value):
 
 
 def _resolved(faces: Block, references: Ints, counts: Ints, rows: _Rows, repairs: dict[str, Repair]) -> Ints:
-    """(C,) rows counted from 0; references below 0 count back from the face, 0 gives -1.
+    """(C,) rows from 0; negative references count backwards from the face, and 0 gives -1.
 
-    One to a vertex that is not there is refused; to another row it is dropped, and counted.
+    References to vertices that do not exist are refused; others are dropped and counted.
     """
+    # Absolute rows.
     below = references < 0
     index = references - 1
     if below.any():
         before = np.repeat(np.searchsorted(rows.lines, faces.lines), counts)
         index = np.where(below, before + references, index)
+
+    # Out of range; 0 is allowed except for vertices.
     wrong = (index < 0) | (index >= rows.size)
     if rows.name != "vertices":
         wrong &= references != 0
@@ -298,7 +320,7 @@ def _resolved(faces: Block, references: Ints, counts: Ints, rows: _Rows, repairs
 def _selected(
     statements: list[tuple[int, str]], faces: NDArray[np.intp]
 ) -> tuple[tuple[str, ...], NDArray[np.int64] | None]:
-    """The distinct names in order, and (P,) the one in force at each face, -1 before the first."""
+    """The distinct names in order, and (P,) the number of the name at each face, -1 before the first."""
     if not statements:
         return (), None
     names = {name: i for i, name in enumerate(dict.fromkeys(name for _, name in statements))}
@@ -308,7 +330,7 @@ def _selected(
 
 
 def companions(path: Path) -> list[Path]:
-    """The material libraries that an OBJ may name, and the images that these may."""
+    """The material libraries that an OBJ may name, and the images that the libraries may name."""
     libraries = files_named(path, _library_names)
     images = [
         image
@@ -320,15 +342,15 @@ def companions(path: Path) -> list[Path]:
 
 
 def _library_names(data: bytes) -> list[bytes]:
-    if b"mtllib" not in data.lower():  # four times faster than the expression
+    if b"mtllib" not in data.lower():  # four times as fast as the regular expression
         return []
-    if b"\\" in data:  # a line that goes on in the next
+    if b"\\" in data:  # join continued lines
         data = re.sub(rb"\\[ \t]*\r?\n", b" ", data)
     return _LIBRARY.findall(data)
 
 
 def _undefined(text: Text, statements: list[tuple[int, str]], library: mtl.Library) -> dict[str, Repair]:
-    """The materials that faces select and the libraries do not have, where the file has libraries."""
+    """Repairs for materials that faces select and no library has, if the file has libraries."""
     missing = {name: line for line, name in reversed(statements) if name not in library.materials}
     if not library.materials or not missing:
         return {}
@@ -337,7 +359,7 @@ def _undefined(text: Text, statements: list[tuple[int, str]], library: mtl.Libra
 
 
 def _smoothing(statements: list[tuple[int, str]], faces: NDArray[np.intp]) -> NDArray[np.int64] | None:
-    """(P,) smoothing group of each face: 0 off, -1 where none is said, the others numbered from 1."""
+    """(P,) smoothing group of each face: 0 for off, -1 before the first statement, others from 1."""
     names, chosen = _selected(statements, faces)
     if chosen is None:
         return None
@@ -350,13 +372,13 @@ def _is_off(group: str) -> bool:
 
 
 def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> mtl.Library:
-    """Every material of the libraries, the first of a name, and what was left out of them."""
+    """The materials of all libraries, the first of each name, and what was left out of them."""
     library = mtl.Library()
     for names, line in {names: line for line, names in reversed(statements)}.items():
         place = f":{text.number(line)}"
-        for file, matter in _library_files(path, names):
-            if matter:
-                note(library.repairs, f"material libraries {matter} {TAKEN if file else 'left out'}", place)
+        for file, fault in _library_files(path, names):
+            if fault:
+                note(library.repairs, f"material libraries {fault} {TAKEN if file else 'left out'}", place)
             if file is None:
                 continue
             part = mtl.read(file, path.parent)
@@ -368,7 +390,7 @@ def _libraries(path: Path, text: Text, statements: list[tuple[int, str]]) -> mtl
 
 
 def _library_files(path: Path, names: str) -> list[tuple[Path | None, str]]:
-    """The file of the one name with blanks, or those of several names, and what is the matter with each."""
+    """The file of one name that contains blanks, or the files of several names, each with its fault."""
     one = nearby(path, names.strip("\"'"), path.parent)
     several = [nearby(path, name, path.parent) for name in names.split()]
     return several if one[0] is None and any(file for file, _ in several) else [one]

@@ -1,4 +1,4 @@
-"""Meshes as they are handed to the writers, and what is written of their vertices beside."""
+"""The input of writers: meshes, and values at their vertices."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from illumcli.files.seal import BLANK
 from illumcli.records import Record
 
 STANDARD = ("normal", "uv", "color")
-"""Attributes that every format has a form of its own for; all others keep their name as far as it can."""
+"""Attributes that every format has its own form for; others keep their name where the format allows."""
 
 
 class OutputMesh(Record):
-    """One object as it is written: polygons over vertices that keep their order and count."""
+    """One object to write: polygons over vertices in the order of the input file."""
 
     name: str
     vertices: NDArray[np.float64]  # (V, 3)
@@ -27,26 +27,26 @@ class OutputMesh(Record):
 
 
 class VertexData(Record):
-    """Values added to the V vertices of a file, those of all its meshes one after the other."""
+    """Values to add at the V vertices of a file, those of all its meshes one after the other."""
 
     columns: Mapping[str, NDArray[np.float32]]  # (V,) or (V, k) by name
-    about: Mapping[str, Any]  # JSON that the file says of them
+    about: Mapping[str, Any]  # JSON metadata
     color: NDArray[np.uint8] | None = None  # (V,) linear, written into the colour channels `channels`
     channels: tuple[int, ...] = ()  # of 0 red, 1 green, 2 blue, 3 alpha
 
     def sealed_about(self) -> dict[str, Any]:
-        """`about`, with a place for the file's own hash."""
+        """`about`, with a placeholder for the file's own hash."""
         return {**self.about, "body": BLANK}
 
 
 def fits_single(vertices: NDArray[np.float64]) -> bool:
-    """Does rounding to single precision move no vertex by more than 10^-6 of the mesh's size?"""
+    """True if rounding to single precision moves no vertex by more than 10^-6 of the mesh's size."""
     size = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
     return bool(np.abs(vertices - vertices.astype(np.float32)).max(initial=0) <= 1e-6 * size)
 
 
 def free_name(name: str, taken: Container[str]) -> str:
-    """`name`, with underscores behind it until it is not taken."""
+    """`name` with as many underscores appended as needed to be unused."""
     while name in taken:
         name += "_"
     return name

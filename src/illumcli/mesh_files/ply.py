@@ -1,7 +1,7 @@
 """Stanford PLY, in text and both byte orders: polygons, triangle strips, normals, uv, any vertex property.
 
-`read` says what the rows mean; `_ply` reads them. It refuses only files whose faces cannot be known; all else
-that is mended or left out is counted. `write` uses plyfile.
+`_ply` parses the rows, `read` interprets them. Only files whose faces cannot be determined are refused; other
+faults are repaired or left out, and counted. `write` uses plyfile.
 
 References
 ----------
@@ -44,7 +44,7 @@ _CORNERS = ("vertex_indices", "vertex_index")
 
 
 class _File(Value):
-    """What a file holds while it is read."""
+    """A file while it is read: its header, tables and text."""
 
     path: Path
     head: _ply.Header
@@ -60,23 +60,23 @@ class _File(Value):
         return sum(each.count for each in self.head.elements if each.name == name)
 
     def line(self, element: str, name: str) -> str:
-        """Where the header announces a property."""
+        """The line of the header that declares a property."""
         prop = next(each for each in self.element(element).properties if each.name == name)
         return f":{prop.line}"
 
     def place(self, part: str, index: int) -> str:
-        """Where a vertex, with its normal, or a face stands."""
+        """The place of a vertex (or its normal) or a face in the file."""
         element = {"vertex": "vertex", "normal": "vertex", "face": "face"}.get(part)
         line = None if element is None else self.row_line(element, index)
         return f": {part} {index + 1}" if line is None else f":{line}"
 
     def row_line(self, name: str, row: int) -> int | None:
-        """The number of the line of a row; None where rows are no lines."""
+        """The line number of a row; None if rows are not lines."""
         index = self.row_index(name, row)
         return None if index is None or self.text is None else self.text.number(index)
 
     def row_index(self, name: str, row: int) -> int | None:
-        """Which of the text's lines a row is."""
+        """The index of a row's line in the text; None if rows are not lines."""
         if self.text is None or row >= self.count(name):
             return None
         names = [element.name for element in self.head.elements]
@@ -85,24 +85,29 @@ class _File(Value):
 
 
 def read(path: Path) -> Mesh:
-    """The faces and strips of a PLY file, and every property of its vertices.
+    """The faces and strips of a PLY file, and all properties of its vertices.
 
-    `nx ny nz` become normals, `s t`, `u v` or `texture_u texture_v` become uv (a face's `texcoord` list
-    goes first), `red green blue` become the attribute `color`: integers are taken for sRGB, floats for
-    linear. Every other property of a vertex is an attribute of its name. Images named in comments as
-    `TextureFile` become materials, chosen by a face's `texnumber`. Numbers in text keep all digits.
+    `nx ny nz` become normals, and `s t`, `u v` or `texture_u texture_v` become uv, unless faces have
+    `texcoord` lists. `red green blue` become the attribute `color`: integers are sRGB, floats linear. All
+    other properties of vertices become attributes of the same name. Images in `TextureFile` comments become
+    materials, selected by a face's `texnumber`. Numbers in text are read in full precision.
     """
+    # Parse.
     data = content(path)
     repairs: dict[str, Repair] = {}
     head = _ply.header(path, data, repairs)
     columns, text = _ply.tables(path, data, head, repairs)
     file = _File(path, head, columns, text, repairs)
+
+    # Interpret vertices and faces.
     vertex = file.tables.get("vertex", {})
     if any(isinstance(vertex.get(name, None), Lists | None) for name in "xyz"):
         raise InputError(f"{path}: has no vertices with x, y and z; export the mesh again")
     vertices = _stacked(vertex, ("x", "y", "z"))
     corners, counts, wedges = _polygons(file, len(vertices))
     _refuse_words(file, vertices, corners)
+
+    # Normals and uv, of corners if faces have them.
     raw = RawMesh(vertices, corners, counts)
     if _has(vertex, _NORMAL):
         raw = replace(raw, normals=_stacked(vertex, _NORMAL), corner_normals=corners)
@@ -121,7 +126,7 @@ def companions(path: Path) -> list[Path]:
 
 
 def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> None:
-    """Refuse the first line of a vertex in use that holds words in place of coordinates."""
+    """Refuse the first used vertex whose coordinates are not numbers."""
     unknown: NDArray[np.bool_] = np.any(np.isnan(vertices), axis=1)
     for vertex in corners[unknown[corners]][:1].tolist():
         index = file.row_index("vertex", vertex)
@@ -131,7 +136,7 @@ def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> 
 
 
 def _has(table: Table, names: tuple[str, ...]) -> bool:
-    """Are these single properties of a table?"""
+    """True if a table has all these properties, as single values."""
     return all(isinstance(table.get(name), np.ndarray) for name in names)
 
 
@@ -141,7 +146,7 @@ def _stacked(table: Table, names: tuple[str, ...]) -> NDArray[np.float64]:
 
 
 def _polygons(file: _File, size: int) -> tuple[Ints, Ints, NDArray[np.float64] | None]:
-    """Corners, corners per polygon, (C, 2) uv per corner if the faces hold them; strips follow faces."""
+    """Corners, corners per polygon, and (C, 2) uv per corner if the faces have them; strips follow faces."""
     corners, counts, wedges = np.empty(0, np.int64), np.empty(0, np.int64), None
     if file.count("face"):
         corners, counts = _indices(file, "face", size)
@@ -162,7 +167,8 @@ def _polygons(file: _File, size: int) -> tuple[Ints, Ints, NDArray[np.float64] |
 
 
 def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints, Ints]:
-    """The vertices of the rows of an element one after the other, and how many each row has."""
+    """The vertex indices of all rows of an element, at least `least`, and their number in each row."""
+    # The list of indices, by its usual names.
     table = file.tables[element]
     lists = [name for name, column in table.items() if isinstance(column, Lists) and name != "texcoord"]
     name = next((name for name in (*_CORNERS, *lists) if isinstance(table.get(name), Lists)), None)
@@ -181,6 +187,7 @@ def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints
         place = f"{file.path}" if line is None else f"{file.path}:{line}"
         return f"{place}: {element} {number} has the index {lists_of_corners.values[position]:g}"
 
+    # Whole numbers in range.
     with np.errstate(invalid="ignore"):
         indices = lists_of_corners.values.astype(np.int64)
     if (broken := indices != lists_of_corners.values).any():
@@ -194,15 +201,15 @@ def _indices(file: _File, element: str, size: int, least: int = 0) -> tuple[Ints
 
 
 def _with_materials(file: _File, raw: RawMesh) -> RawMesh:
-    """The mesh with materials of the images that the header names."""
+    """The mesh with a material for each image that the header names."""
     path, materials = file.path, {}
     if file.head.textures and raw.uvs is None:
         note(file.repairs, "textures without coordinates left out", f":{file.head.textures[0][1]}")
         return raw
     for name, line in file.head.textures:
-        image, matter = nearby(path, name, path.parent)
-        if matter:
-            note(file.repairs, f"textures {matter} {TAKEN if image else 'left out'}", f":{line}")
+        image, fault = nearby(path, name, path.parent)
+        if fault:
+            note(file.repairs, f"textures {fault} {TAKEN if image else 'left out'}", f":{line}")
         diffuse = {} if image is None else {"diffuse": {"texture": str(image)}}
         materials[name] = {"model": "lambert", **diffuse}
     if not any("diffuse" in each for each in materials.values()):
@@ -218,7 +225,7 @@ def _with_materials(file: _File, raw: RawMesh) -> RawMesh:
 
 
 def _count_what_is_left_out(file: _File) -> None:
-    """Count what is read and means nothing here."""
+    """Count elements and properties that are not supported."""
     for element in file.head.elements:
         if element.count and element.name not in ("vertex", "face", "tristrips"):
             note(file.repairs, "rows of other elements left out", f":{element.line}", element.count)
@@ -228,7 +235,7 @@ def _count_what_is_left_out(file: _File) -> None:
 
 
 def _attributes(file: _File) -> dict[str, NDArray[Any]]:
-    """Every vertex property that is nothing else, in its own type and this machine's byte order."""
+    """The vertex properties other than positions, normals and uv, in their type and native byte order."""
     vertex = file.tables["vertex"]
     types = {each.name: each.type for each in file.element("vertex").properties}
     taken = {"x", "y", "z"}
@@ -250,7 +257,7 @@ def _attributes(file: _File) -> dict[str, NDArray[Any]]:
 
 
 def _typed(file: _File, name: str, values: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """Values in the type that the header gives them; floats in text keep all digits."""
+    """Values in the type that the header declares; floats in text keep double precision."""
     if values.dtype.kind != "f" or kind.kind == "f":
         return values.astype(values.dtype.newbyteorder("="))
     limits = np.iinfo(kind)
@@ -262,8 +269,8 @@ def _typed(file: _File, name: str, values: NDArray[Any], kind: np.dtype[Any]) ->
 
 
 def _color(values: NDArray[np.float64], kind: np.dtype[Any]) -> NDArray[np.float32]:
-    """(V, 3) linear: integers are sRGB of their type's full range, or of a byte's if none is larger; floats
-    are linear, but sRGB where they are bytes."""
+    """(V, 3) linear colours. Integers are sRGB, of their type's full range, or of a byte's if none is larger;
+    floats are linear, or sRGB if they are in 0..255."""
     if kind.kind == "f":
         code = unit_range(values)
         return (values if code is values else from_srgb(np.clip(code, 0, 1))).astype(np.float32)
@@ -278,10 +285,10 @@ _LABELS = {"normal": ["nx", "ny", "nz"], "uv": ["s", "t"], "color": ["red", "gre
 
 
 def write(path: Path, meshes: Sequence[OutputMesh], data: VertexData, source: Path | None = None) -> None:
-    """Write meshes with the columns of `data` as properties, (V,) float each; `about` is a comment.
+    """Write meshes with the columns of `data` as properties, (V,) float each; `about` becomes a comment.
 
-    A PLY `source` is written again with every element and property it has, in its own encoding. Other meshes
-    are binary; normals, uv and colours are kept where every vertex has one of its own.
+    With a PLY `source`, its elements and properties are written, too, in its own encoding. Other meshes are
+    written in binary, with normals, uv and colours if every vertex has its own.
     """
     from plyfile import PlyData, PlyElement
 
@@ -323,7 +330,7 @@ def read_about(path: Path) -> dict[str, Any]:
 
 
 def _with_columns(element: Any, data: VertexData, added: Mapping[str, NDArray[Any]]) -> Any:
-    """The element with columns added, and the colour of `data`, new or in place of their namesakes."""
+    """The element with columns and the colour of `data` added; properties of the same name are replaced."""
     from plyfile import PlyElement, PlyProperty
 
     columns = dict(added) | _colors(element.data.dtype.names, data)
@@ -358,7 +365,7 @@ def _colors(present: Sequence[str], data: VertexData) -> dict[str, NDArray[np.ui
 
 
 def _joined(meshes: Sequence[OutputMesh]) -> dict[str, NDArray[Any]]:
-    """The vertex columns of all meshes, one after the other: those that every mesh has."""
+    """The vertex columns that every mesh has, those of all meshes one after the other."""
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     kind = np.float32 if fits_single(vertices) else np.float64
     columns: dict[str, NDArray[Any]] = {name: vertices[:, k].astype(kind) for k, name in enumerate("xyz")}
@@ -384,7 +391,7 @@ def _labels(name: str, values: NDArray[Any]) -> list[str]:
 
 
 def _faces(meshes: Sequence[OutputMesh]) -> Any:
-    """The element of the polygons of all meshes, one list each, however long they are."""
+    """The element of the polygons of all meshes, one list for each."""
     from plyfile import PlyElement
 
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
@@ -401,5 +408,5 @@ def _faces(meshes: Sequence[OutputMesh]) -> Any:
 
 
 def srgb_bytes(linear: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours as PLY files have them."""
+    """Colours in the form of PLY files: sRGB bytes."""
     return np.rint(255 * to_srgb(np.clip(np.asarray(linear, np.float64), 0, 1))).astype(np.uint8)

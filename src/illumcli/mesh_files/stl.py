@@ -1,13 +1,13 @@
-"""STL, text and binary: loose triangles.
+"""STL, text and binary: triangles that share no vertices.
 
-A file's vertices stay as they are: nothing is merged, so vertex 3 t + i is corner i of triangle t. The
-normals of the facets are left out, being those of the triangles; so are the names of solids. Refused is only
-what no facet could be known from; all else that is mended or left out is counted.
+Vertices are not merged: vertex 3 t + i is corner i of triangle t. Normals of facets are ignored, since they
+are those of the triangles, and so are names of solids. A file is refused only if its facets cannot be
+determined; all other faults are repaired or left out, and counted.
 
 References
 ----------
-3D Systems (1988). Stereolithography interface specification. A loop of more than three vertices is against it
-and read as a polygon. Colours of facets (Materialise Magics, VisCAM) are left out.
+3D Systems (1988). Stereolithography interface specification. It forbids loops of more than three vertices;
+they are read as polygons. Colours of facets (Materialise Magics, VisCAM) are left out.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from illumcli.mesh_files._text import Text, keyword
 
 _HEADER = 84  # bytes before the first binary facet: 80 of any content, then the count
 _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("other", "<u2")])
-_COLORED = 1 << 15  # of the two bytes behind a facet, where they are a colour
+_COLORED = 1 << 15  # bit of the two bytes behind a facet that marks them as a colour
 
 _NAMES = (b"solid", b"facet", b"outer", b"vertex", b"endloop", b"endfacet", b"endsolid", b"end")
 _STATEMENT = re.compile(rb"[ \t](?=(?:facet|outer|vertex|endloop|endfacet|endsolid)\b)")
@@ -38,8 +38,8 @@ _SOLID = re.compile(rb"[ \t]*(?:end[ \t]*)?solid")
 def read(path: Path) -> Mesh:
     """The triangles of an STL file.
 
-    A file is binary if its size is what its count of facets says, whatever it begins with; of the others
-    those are text that speak of facets and hold no NUL.
+    A file is binary if its size agrees with its count of facets, whatever it begins with. Other files are
+    text if they contain `facet` or `solid` and no NUL.
     """
     data = content(path)
     announced = int.from_bytes(data[80:_HEADER], "little")
@@ -87,14 +87,14 @@ def _text(path: Path, data: bytes) -> Mesh:
     lines = {name: np.flatnonzero(words == keyword(name)) for name in _NAMES}
     _note_other_lines(text, lines, repairs)
 
-    # loops begin with `outer loop`, or with their facet where that is left out
+    # A loop begins with `outer loop`, or with its facet if that line is missing.
     marked = np.sort(np.concatenate([lines[b"facet"], lines[b"outer"], lines[b"vertex"]]))
     is_facet, is_outer = (np.isin(marked, lines[name]) for name in (b"facet", b"outer"))
     begins = is_outer | (is_facet & ~np.append(is_outer[1:], False))
     starts = marked[begins]
     loop = np.cumsum(begins)[~is_facet & ~is_outer] - 1
 
-    # each vertex stands behind the start of its loop, and no end lies between
+    # Each vertex must follow the start of its loop, without an end between.
     ends = np.sort(np.concatenate([lines[name] for name in (b"endloop", b"endfacet", b"end")]))
     last_end = np.append(-1, ends)[np.searchsorted(ends, lines[b"vertex"])]
     outside = last_end > np.append(-1, starts)[loop + 1]
@@ -105,7 +105,7 @@ def _text(path: Path, data: bytes) -> Mesh:
         raise InputError(f"{path}: ends within a facet; the file is cut off, export it again")
     _note_missing_ends(text, lines, starts, repairs)
 
-    # the numbers of each vertex
+    # The numbers of each vertex.
     block = text.block(lines[b"vertex"], keyword=len(b"vertex"))
     if (short := block.counts < 3).any():
         block.refuse_words(int(np.argmax(short)), 3)
@@ -123,7 +123,7 @@ def _text(path: Path, data: bytes) -> Mesh:
 
 
 def _statements_as_lines(data: bytes) -> bytes:
-    """`data` with each statement in a line of its own; the name of a solid may hold any word."""
+    """`data` with each statement in its own line; the name of a solid may contain any word."""
     return b"\n".join(
         line if _SOLID.match(line) and b"facet normal" not in line else _STATEMENT.sub(b"\n", line)
         for line in data.split(b"\n")
@@ -131,7 +131,7 @@ def _statements_as_lines(data: bytes) -> bytes:
 
 
 def _note_other_lines(text: Text, lines: dict[bytes, NDArray[Any]], repairs: dict[str, Repair]) -> None:
-    """Count the lines that are no part of a solid."""
+    """Count the lines that are not part of a solid."""
     known = np.zeros(len(text.starts), np.bool_)
     for numbers in lines.values():
         known[numbers] = True
@@ -156,7 +156,7 @@ def _note_missing_ends(
     for name, end, begun in (("loops", b"endloop", starts), ("facets", b"endfacet", lines[b"facet"])):
         missing = 0 if len(in_two) else len(begun) - len(lines[end])
         if missing > 0:
-            # the first that another follows before the next end
+            # the first that is followed by another before the next end
             following = np.append(lines[end], len(text.starts))[np.searchsorted(lines[end], begun)]
             bad = int(np.argmax(following >= np.append(begun[1:], len(text.starts))))
             note(repairs, f"{name} without an end", f":{text.number(int(begun[bad]))}", missing)

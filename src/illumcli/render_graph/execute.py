@@ -351,8 +351,7 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     """One tile's developed layers: few samples per pixel, and all of them in pixels where these few differ.
 
     The first samples also cover a border of one pixel, so that a pixel has the same neighbours in any tile.
-    Each layer decides for itself, by the shapes and by its own values: no layer depends on which others are
-    rendered.
+    Each layer decides for itself, by the shapes and by its own values, independently of the other layers.
     """
     # The first samples, also of the border.
     plan, view, stats = common.plan, common.plan.view, common.stats

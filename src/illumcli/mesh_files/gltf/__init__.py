@@ -28,19 +28,19 @@ from illumcli.mesh_files.gltf.primitives import Part, parts
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
 FILLED = {"color": 1.0, "alpha": 1.0}
-"""What vertices of a primitive have that lacks an attribute of others: white and opaque (3.7.2.1)."""
+"""Values of attributes that a primitive lacks and others have: white and opaque (3.7.2.1)."""
 
 
 def read(path: Path) -> Mesh:
     """The triangles of every node of the file's scene, one primitive after the other, in the nodes' order.
 
-    The mesh stands as the file places it at rest: the transforms of nodes, instances, skins and the default
-    weights of morph targets are applied. Primitives without normals are flat (3.7.2.1). `COLOR_0` becomes
-    the attribute `color` (and `alpha`), an attribute that begins with an underscore keeps its name; one that
-    is not on every primitive is left out. Groups are the nodes. `materials` are those of the file, as near as
-    a scene's materials come to them. All that is mended or left out is counted in `repairs`; what of the
-    materials, in `material_repairs`.
+    The mesh is in its rest pose: the transforms of nodes, instances and skins and the default weights of
+    morph targets are applied. Primitives without normals are flat (3.7.2.1). `COLOR_0` becomes the attribute
+    `color` (and `alpha`), and attributes that begin with an underscore keep their names; those that some
+    primitive lacks are left out. Groups are the nodes. `materials` approximate those of the file by a scene's
+    models. Repairs and omissions are counted in `repairs`, those of materials in `material_repairs`.
     """
+    # All triangles.
     document = open_document(path)
     primitives = list(parts(document))
     if not any(len(part.triangles) for part in primitives):
@@ -52,13 +52,13 @@ def read(path: Path) -> Mesh:
     corners = np.concatenate([np.empty((0, 3), np.int64), *triangles]).ravel()
     counts = [len(part.triangles) for part in primitives]
 
-    # normals and uv of each corner; a primitive without normals is flat
+    # Normals and uv of each corner; primitives without normals are flat.
     normals, corner_normals = _joined([part.normals for part in primitives], sizes, corners)
     uvs, corner_uvs = _joined([part.uvs.get(0) for part in primitives], sizes, corners)
     flat = np.array([part.normals is None for part in primitives], np.bool_)
     smoothing = np.repeat(np.where(flat, 0, -1), counts) if flat.any() else None
 
-    # names: materials by number, groups by name
+    # Materials by number, groups by name.
     library = Library(document, primitives)
     material_names, materials = _numbered([library.name(part) for part in primitives])
     group_names, groups = _numbered([part.group for part in primitives])
@@ -95,7 +95,7 @@ def _uris(data: bytes) -> list[bytes]:
 
 
 def _unescaped(uri: bytes) -> bytes:
-    """A text of JSON without its backslashes."""
+    """A JSON string with its escapes decoded."""
     try:
         return str(json.loads(b'"' + uri + b'"', strict=False)).encode("utf-8", "replace")
     except ValueError:
@@ -103,7 +103,7 @@ def _unescaped(uri: bytes) -> bytes:
 
 
 def _place(primitives: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:
-    """Where a part of the mesh stands in the file: its primitive, and its number in it from 1."""
+    """The place of a part of the mesh in the file: its primitive, and its number there from 1."""
     first = faces if part == "face" else vertices
     k = bisect_right(first, number, hi=len(primitives)) - 1
     where = f"meshes[{primitives[k].mesh}].primitives[{primitives[k].primitive}]"
@@ -122,7 +122,7 @@ def primitives_of(document: Document) -> list[tuple[int, int, int]]:
 def _joined(
     tables: list[NDArray[np.float64] | None], sizes: list[int], corners: Ints
 ) -> tuple[NDArray[np.float64] | None, Ints | None]:
-    """The tables one after the other and each corner's row, -1 where a part has no table."""
+    """The tables one after the other, and each corner's row, -1 if its part has no table."""
     width = next((table.shape[1] for table in tables if table is not None), None)
     if width is None:
         return None, None
@@ -143,7 +143,7 @@ def _numbered(names: list[str | None]) -> tuple[tuple[str, ...], Ints]:
 
 
 def _shared(document: Document, primitives: list[Part]) -> dict[str, NDArray[Any]]:
-    """The attributes of all parts together: those that every part has in the same width, and colours."""
+    """The attributes that all parts have in the same width, concatenated; missing colours are filled in."""
     shared = {}
     for name in sorted({name for part in primitives for name in part.attributes}):
         known = [part.attributes.get(name) for part in primitives]

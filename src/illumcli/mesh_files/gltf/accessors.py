@@ -11,7 +11,7 @@ from illumcli.errors import LimitError
 from illumcli.mesh_files.gltf.document import Document, is_index
 
 MOST_ZEROS = 1 << 24
-"""Rows of an accessor that has no data of its own: no file size bounds them."""
+"""Most rows of an accessor without data, which the size of the file does not limit."""
 
 _TYPES = {
     5120: "i1",
@@ -27,19 +27,19 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bool = False) -> NDArray[Any]:
-    """(count, width) values of an accessor in the file's own type, integers that stand for fractions made so.
+    """(count, width) values of an accessor in the file's type; normalized integers become fractions.
 
     Parameters
     ----------
     widths : tuple of int
-        Numbers per row that are fit for the use.
+        Allowed numbers per row.
     fractions : bool
-        Integers stand for fractions whether the accessor says so or not.
+        True: integers are normalized, whether the accessor says so or not.
 
     Raises
     ------
     InputError
-        An accessor that is not there, is of another type, or whose data are not.
+        An accessor that does not exist, has another type, or whose data are missing.
     """
     entry, where = document.item("accessors", index), f"accessors[{index}]"
     kind, shape = entry.get("componentType"), entry.get("type")
@@ -51,7 +51,7 @@ def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bo
     dtype = np.dtype(_TYPES[kind])
     count = document.integer(entry, "count", where)
 
-    # the dense rows, or as many of zeros, which take no memory
+    # The dense rows, or zeros, which take no memory.
     if has_rows := "bufferView" in entry:
         start = document.integer(entry, "byteOffset", where, 0)
         values = _rows(document, entry["bufferView"], start, (count, width), dtype, where)
@@ -63,7 +63,7 @@ def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bo
     else:
         values = np.broadcast_to(np.zeros(1, dtype), (count, width))
 
-    # the rows that a sparse accessor puts in their place
+    # The rows that a sparse accessor replaces.
     if "sparse" in entry:
         rows, replaced = _sparse(document, entry["sparse"], values, where)
         values = values.copy() if has_rows else np.zeros((count, width), dtype)
@@ -74,7 +74,7 @@ def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bo
 
 
 def has_data(document: Document, index: Any) -> bool:
-    """Has an accessor any data, or is it all zeros?"""
+    """True if an accessor has data, False if it is all zeros."""
     entry = document.item("accessors", index)
     return "bufferView" in entry or "sparse" in entry
 
@@ -111,7 +111,7 @@ def _rows(
     dtype: np.dtype[Any],
     where: str,
 ) -> NDArray[Any]:
-    """Rows that begin `offset` bytes into a buffer view, as far apart as it says."""
+    """Rows that begin `offset` bytes into a buffer view, with the view's stride."""
     buffer, start, end = document.view(view)
     count, width = shape
     size = width * dtype.itemsize

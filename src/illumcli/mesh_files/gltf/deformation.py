@@ -1,4 +1,4 @@
-"""Vertices as morph targets and skins leave them at rest (glTF 2.0 specification, 3.7.2.2 and 3.7.3)."""
+"""Deformation by morph targets and skins in the rest pose (glTF 2.0 specification, 3.7.2.2 and 3.7.3)."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ def morphed(
     primitive: dict[str, Any],
     weights: list[float],
 ) -> NDArray[np.float64]:
-    """(V, k) the attribute `name` with its targets added, each times its weight."""
+    """(V, k) the attribute `name` plus its morph targets, each times its weight."""
     targets = primitive.get("targets", [])
     if not any(weights) or not isinstance(targets, list):
         return values
     for number, (target, weight) in enumerate(zip(targets, weights, strict=False)):
         if not weight or not isinstance(target, dict) or name not in target:
             continue
-        moved = table(document, target[name], (values.shape[1],))
-        if len(moved) != len(values):
-            raise document.wrong(f"morph target {number} has {len(moved)} rows for {len(values)} vertices")
-        values = values + weight * moved.astype(np.float64)
+        offsets = table(document, target[name], (values.shape[1],))
+        if len(offsets) != len(values):
+            raise document.wrong(f"morph target {number} has {len(offsets)} rows for {len(values)} vertices")
+        values = values + weight * offsets.astype(np.float64)
     return values
 
 
 def weights_of(document: Document, node: dict[str, Any], mesh: dict[str, Any], where: str) -> list[float]:
-    """The weights of a mesh's morph targets at a node: the node's own, else the mesh's, else none."""
+    """The weights of a mesh's morph targets at a node: the node's, otherwise the mesh's, otherwise none."""
     weights = node.get("weights", mesh.get("weights", []))
     if not isinstance(weights, list) or not all(is_finite(weight) for weight in weights):
         document.count("weights of morph targets that are no numbers, left out", where)
@@ -46,11 +46,11 @@ def weights_of(document: Document, node: dict[str, Any], mesh: dict[str, Any], w
 def skin_matrices(
     document: Document, placed: PlacedNode, attributes: dict[str, Any], size: int
 ) -> Matrix | None:
-    """(V, 4, 4) from each vertex to world space, at rest; None for a node that has no skin.
+    """(V, 4, 4) from each vertex to world space in the rest pose; None for a node without a skin.
 
     The sum over the vertex's joints of weight * (joint to world) * (inverse bind matrix). The transform of
-    the node itself counts for nothing (3.7.3.1). Weights are divided by their sum; a vertex without any
-    follows its first joint.
+    the node itself is ignored (3.7.3.1). Weights are divided by their sum; a vertex without weights follows
+    its first joint.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def skin_matrices(
     where = f"skins[{placed.node['skin']!r:.20}]"
     skin = document.item("skins", placed.node["skin"])
 
-    # the joints in their rest pose
+    # The joints in the rest pose.
     nodes = skin.get("joints")
     if not isinstance(nodes, list) or not nodes:
         raise document.wrong(f"{where} has no list of joints")
@@ -77,7 +77,7 @@ def skin_matrices(
     if not np.isfinite(joints).all():
         raise document.wrong(f"{where} has matrices that are not finite")
 
-    # which of them each vertex follows, and how much
+    # The joints of each vertex, and their weights.
     sets = [f"{n}" for n in range(len(attributes)) if f"JOINTS_{n}" in attributes]
     if not sets:
         raise document.wrong(f"{where} deforms a primitive without joints")
@@ -89,7 +89,7 @@ def skin_matrices(
     first = np.arange(weight.shape[1]) == 0
     weight = np.divide(weight, total, out=np.broadcast_to(first * 1.0, weight.shape).copy(), where=total > 0)
 
-    # their weighted sum, one influence after the other: (V, influences, 4, 4) at once would be large
+    # Their weighted sum, one influence after the other: (V, influences, 4, 4) would be large.
     out = np.zeros((size, 4, 4))
     for column, share in zip(index.astype(np.intp).T, weight.T, strict=True):
         out += share[:, None, None] * joints[column]
@@ -107,9 +107,9 @@ def _rows(document: Document, attributes: dict[str, Any], name: str, size: int) 
 def skinned_or_placed(
     document: Document, placed: PlacedNode, attributes: dict[str, Any], size: int, where: str
 ) -> Matrix:
-    """(I, 1, 4, 4) of a node's instances, or (1, V, 4, 4) of the vertices that a skin deforms.
+    """(I, 1, 4, 4) transforms of a node's instances, or (1, V, 4, 4) of the vertices that a skin deforms.
 
-    A skin that cannot be read is left out and counted: the mesh stands where its node does.
+    A skin that cannot be read is left out and counted: the mesh then has the transform of its node.
     """
     try:
         skinned = skin_matrices(document, placed, attributes, size)

@@ -1,6 +1,6 @@
-"""A glTF document: the JSON of either kind of file, its buffers, and checked looks into both.
+"""A glTF document: the JSON of a .gltf or .glb file, its buffers, and checked access to both.
 
-The JSON is walked as it is: a typed object model of it costs 0.16 s of import and checks nothing.
+The JSON is used as it is: a typed object model of it costs 0.16 s of import time and checks nothing.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from illumcli.mesh_files._files import TAKEN, beside, content, nearby
 from illumcli.records import Value
 
 READ = frozenset({"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"})
-"""Extensions that a file may need and that are read in full."""
+"""Extensions that are fully supported."""
 
 
 @dataclass(slots=True)
 class Document:
-    """The JSON of a file and its buffers; every look into it is checked."""
+    """The JSON of a file and its buffers, with checked access."""
 
     path: Path
     json: dict[str, Any]
@@ -39,19 +39,19 @@ class Document:
     repairs: dict[str, Repair] = field(default_factory=dict)
 
     def count(self, what: str, where: str = "", count: int = 1) -> None:
-        """Note something that was mended or left out, at the part of the JSON called `where`."""
+        """Note that something was repaired or left out, at the part `where` of the JSON."""
         note(self.repairs, what, f": {where}" if where else "", count)
 
     def wrong(self, fact: str, advice: str = "export the mesh again") -> InputError:
-        """What cannot be read, with the way out."""
+        """The error for a file that cannot be read, with advice."""
         return InputError(f"{self.path}: {fact}; {advice}")
 
     def reason(self, error: InputError) -> str:
-        """The fact of an error that `wrong` made, without the file and the way out."""
+        """The fact of an error from `wrong`, without the file and the advice."""
         return str(error).removeprefix(f"{self.path}: ").rpartition("; ")[0]
 
     def items(self, kind: str) -> list[Any]:
-        """A top-level list; empty where the file has none."""
+        """A top-level list; empty if the file has none."""
         items = self.json.get(kind, [])
         if not isinstance(items, list):
             raise self.wrong(f"its {kind} are no list")
@@ -85,7 +85,7 @@ class Document:
         return np.array(values, np.float64)
 
     def view(self, index: Any) -> tuple[bytes, int, int]:
-        """The buffer that a view looks into, and where the view begins and ends in it."""
+        """The buffer of a view, and the offsets of the view's start and end in it."""
         where = f"bufferViews[{index!r:.20}]"
         entry = self.item("bufferViews", index)
         number = entry.get("buffer")
@@ -107,7 +107,7 @@ class Document:
         return data, start, end
 
     def buffer(self, index: Any) -> bytes:
-        """The content of a buffer, at most as long as announced."""
+        """The content of a buffer, cut to its declared length."""
         if is_index(index) and index in self.buffers:
             return self.buffers[index]
         entry, where = self.item("buffers", index), f"buffers[{index}]"
@@ -125,32 +125,34 @@ class Document:
         return self.buffers[index]
 
     def resource(self, uri: Any, where: str) -> bytes:
-        """What a URI stands for: data in itself, or the content of a file beside."""
+        """The content of a URI: inline data, or a file in the folder of the mesh."""
         if not isinstance(uri, str):
             raise self.wrong(f"{where} is no text")
         if is_inline(uri):
             return self._inline(uri, where)
         if "://" in uri:
             raise self.wrong(f"{where} is on the network", "copy the file beside the mesh and name it alone")
-        file, matter = self.nearby(uri)
+        file, fault = self.nearby(uri)
         if file is None:
             return content(beside(self.path, unquote(uri), str(self.path)))
-        if matter:
-            self.count(f"buffers {matter} {TAKEN}", where)
+        if fault:
+            self.count(f"buffers {fault} {TAKEN}", where)
         return content(file)
 
     def nearby(self, uri: str) -> tuple[Path | None, str]:
-        """The file that a URI names, percent-encoded as the specification says or as it stands, and what is
-        the matter with it, as `_files.nearby` has them."""
-        file, matter = nearby(self.path, unquote(uri), self.path.parent)
-        if file is None or matter:
-            plain, plain_matter = nearby(self.path, uri, self.path.parent)
-            if plain is not None and (file is None or not plain_matter):
-                return plain, plain_matter
-        return file, matter
+        """The file that a URI names, and its fault, as from `_files.nearby`.
+
+        The URI is percent-decoded as specified; if that gives no file, it is used as it is.
+        """
+        file, fault = nearby(self.path, unquote(uri), self.path.parent)
+        if file is None or fault:
+            plain, plain_fault = nearby(self.path, uri, self.path.parent)
+            if plain is not None and (file is None or not plain_fault):
+                return plain, plain_fault
+        return file, fault
 
     def _inline(self, uri: str, where: str) -> bytes:
-        """The bytes of a data URI, of any media type; blanks and missing padding are of no matter."""
+        """The bytes of a data URI of any media type; blanks and missing padding are allowed."""
         head, _, body = uri.partition(",")
         data = unquote_to_bytes(body.encode("utf-8", "replace"))
         if not head.lower().endswith(";base64"):
@@ -163,12 +165,13 @@ class Document:
 
 
 def _altchars(data: bytes) -> bytes | None:
-    """The two last letters of the alphabet that is safe in URLs, where `data` has one of them."""
+    """The last two letters of the URL-safe base64 alphabet if `data` contains one of them."""
     return b"-_" if b"-" in data or b"_" in data else None
 
 
 def open_document(path: Path) -> Document:
-    """The document in a file of either kind, checked to be glTF 2."""
+    """The document in a .gltf or .glb file, checked to be glTF 2."""
+    # The JSON.
     data = content(path)
     chunks = _chunks(path, data) if data.startswith(b"glTF") else _Chunks(data, None, False, 0)
     data = chunks.json
@@ -185,6 +188,8 @@ def open_document(path: Path) -> Document:
     version = parsed["asset"].get("version")
     if not str(version).startswith("2"):
         raise InputError(f"{path}: is glTF of version {version!r:.20}; export it as glTF 2")
+
+    # The document; a wrong length is noted.
     document = Document(path, parsed, chunks.binary, cut=chunks.cut)
     if chunks.surplus > 0:
         document.count("bytes behind the announced end", "", chunks.surplus)
@@ -197,8 +202,10 @@ def open_document(path: Path) -> Document:
 
 
 def _name_extensions(document: Document) -> None:
-    """Note the extensions that the file needs and that are not read in full: none of them keeps what the core
-    holds from being read, and where one alone holds the geometry, that is refused when it is asked for."""
+    """Note the required extensions that are not fully supported.
+
+    The core of the file is read nevertheless. Geometry that only an extension has is refused when it is read.
+    """
     needed = document.json.get("extensionsRequired", [])
     for name in needed if isinstance(needed, list) else [needed]:
         if not isinstance(name, str) or name not in READ:
@@ -206,21 +213,20 @@ def _name_extensions(document: Document) -> None:
 
 
 class _Chunks(Value):
-    """What a .glb file consists of."""
+    """The chunks of a .glb file."""
 
     json: bytes
     binary: bytes | None
     cut: bool
     """The last chunk is longer than the file."""
     surplus: int
-    """Bytes behind the announced end and all chunks; negative where chunks go on behind the announced end."""
+    """Bytes after the declared end and all chunks; negative if chunks continue after the declared end."""
 
 
 def _chunks(path: Path, data: bytes) -> _Chunks:
-    """The first JSON and the first binary chunk of a .glb file, in any order, among others.
+    """The first JSON chunk and the first binary chunk of a .glb file, in any order, among others.
 
-    An announced length that is wrong is of no matter where the chunks are whole: behind it chunks are looked
-    for as long as these are not found.
+    A wrong declared length is tolerated if both chunks are complete: the search for them continues after it.
     """
     version, length = int.from_bytes(data[4:8], "little"), int.from_bytes(data[8:12], "little")
     if version != 2:
@@ -243,32 +249,32 @@ def _chunks(path: Path, data: bytes) -> _Chunks:
 
 
 def extensions(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """What the extensions of a part of the JSON say, by name."""
+    """The extensions of a part of the JSON, by name."""
     named = entry.get("extensions")
     mapping = named if isinstance(named, dict) else {}
     return {name: each if isinstance(each, dict) else {} for name, each in mapping.items()}
 
 
 def extension(entry: dict[str, Any], name: str) -> dict[str, Any]:
-    """What one extension of a part of the JSON says; nothing where it has none of that name."""
+    """One extension of a part of the JSON; empty if it has none of that name."""
     return extensions(entry).get(name, {})
 
 
 def printable(name: Any) -> str:
-    """A name as a message has it: up to 60 letters, none of which moves a terminal's cursor."""
+    """A name for messages: up to 60 printable letters, without terminal control characters."""
     return "".join(letter if letter.isprintable() else "?" for letter in f"{name!s:.60}")
 
 
 def is_inline(uri: str) -> bool:
-    """Does a URI hold its data itself?"""
+    """True if a URI contains its data."""
     return uri[:5].lower() == "data:"
 
 
 def is_index(value: Any) -> bool:
-    """Is it a whole number from 0?"""
+    """True for whole numbers from 0."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def is_finite(value: Any) -> bool:
-    """Is it a number that products of two keep finite?"""
+    """True for numbers whose products with each other are finite."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= 1e18

@@ -1,17 +1,17 @@
-"""glTF materials, as near as the materials of a scene come to them.
+"""glTF materials, approximated by the models of a scene.
 
 metallic-roughness (3.9, appendix B): Cook-Torrance with GGX of alpha = roughness^2 and Schlick's F,
 
     diffuse = base * (1 - metallic)
     F0      = f0 * (1 - metallic) + base * metallic,   f0 = ((ior - 1) / (ior + 1))^2
 
-where the V-groove term stands for Smith's, and (1 - f0) for the share that F leaves to the diffuse part.
-Ambient light leaves by the base colour, metals too. KHR_materials_unlit is light of its own;
-KHR_materials_pbrSpecularGlossiness gives diffuse and F0 as it stands, alpha = (1 - glossiness)^2.
+with the V-groove term instead of Smith's, and (1 - f0) as the share that F leaves for the diffuse part.
+Ambient light is reflected by the base colour, of metals, too. KHR_materials_unlit becomes emission.
+KHR_materials_pbrSpecularGlossiness gives diffuse and F0 directly, and alpha = (1 - glossiness)^2.
 
-The base colour is factor * texture (sRGB) * COLOR_0. What has no word here (textures of roughness, metal,
-normals and occlusion; transparency; coats, sheen and so on) is counted, not guessed; where a texture says
-which parts are metal, none is taken for it.
+The base colour is factor * texture (sRGB) * COLOR_0. Unsupported features (textures of roughness, metal,
+normals and occlusion; transparency; coats, sheen and so on) are counted, not approximated. With a texture of
+metalness the material is not metallic.
 
 References
 ----------
@@ -45,7 +45,7 @@ from illumcli.mesh_files.gltf.primitives import Part
 BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
 SMOOTHEST = 1e-4
-"""The least alpha that single precision holds a lobe of."""
+"""Least alpha whose lobe can be resolved in single precision."""
 SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 _USED = {
     "KHR_materials_unlit",
@@ -59,15 +59,15 @@ _WRAPS = {_REPEAT: "repeat", _CLAMP: "clamp", _MIRROR: "mirror"}
 
 Color = tuple[float, float, float]
 Varying = Color | dict[str, Any]
-"""A colour, or what a scene writes for one that varies over the surface."""
+"""A colour, or the keys of a texture or of vertex values."""
 
 
 class _Missing(Exception):
-    """An image that is not there, which is counted already."""
+    """An image that does not exist and was counted."""
 
 
 class Library:
-    """The materials that the parts of a document have."""
+    """The materials of the parts of a document."""
 
     def __init__(self, document: Document, parts: list[Part]) -> None:
         self._document = document
@@ -89,16 +89,17 @@ class Library:
             name: dict(_substitutes(self.materials[name], f": materials[{number}]"))
             for number, name in self._names.items()
         }
-        """Name -> path of a parameter -> what stands in for its texture."""
+        """Name -> path of a parameter -> the value that replaces an unusable texture."""
 
     def name(self, part: Part) -> str | None:
-        """What a part's material is called; None for one that has none and no colours either."""
+        """Name of a part's material; None if it has neither a material nor colours."""
         if part.material is None and "color" not in part.attributes:
             return None
         return self._names[part.material]
 
     def coordinates(self) -> dict[str, NDArray[np.float32]]:
-        """Attribute -> (V, 2) coordinates, v upwards, of the textures that do not use set 0 as it is."""
+        """Attribute -> (V, 2) coordinates, v upwards, of textures with a transform or a uv set other than
+        0."""
         tables_by_name = {}
         for (uv_set, transform), name in self._coordinates.items():
             tables = [
@@ -112,7 +113,7 @@ class Library:
         note(self.repairs, what, f": {where}")
 
     def _material(self, number: int | None) -> dict[str, Any]:
-        """The keys for one material; None stands for colours at vertices alone."""
+        """The keys of one material; number None is a material of vertex colours only."""
         if number is None:
             return {"model": "lambert", "diffuse": {"vertex": "color"}}
         material, where = self._document.item("materials", number), f"materials[{number}]"
@@ -121,13 +122,13 @@ class Library:
         metal = material.get("pbrMetallicRoughness")
         metal = metal if isinstance(metal, dict) else {}
 
-        # light of its own
+        # Emission.
         strength = _number(extension(material, "KHR_materials_emissive_strength"), "emissiveStrength", 1.0)
         emission = _scaled(
             self._color(number, material, ("emissiveFactor", "emissiveTexture"), BLACK), max(strength, 0.0)
         )
 
-        # the colour that COLOR_0 multiplies, and what else the workflow says
+        # The base colour, times COLOR_0; then the workflow: unlit, specular-glossiness, metallic-roughness.
         names = ("diffuseFactor", "diffuseTexture") if gloss else ("baseColorFactor", "baseColorTexture")
         base = self._color(number, gloss or metal, names, WHITE)
         if any(part.material == number and "color" in part.attributes for part in self._parts):
@@ -170,7 +171,7 @@ class Library:
         }
 
     def _color(self, number: int, entry: dict[str, Any], names: tuple[str, str], default: Color) -> Varying:
-        """factor * texture of a material, the latter where it is there."""
+        """factor * texture of a material; the factor alone if there is no usable texture."""
         factor = _factor(entry, names[0], default, 1.0)
         info = entry.get(names[1])
         if info is None or not any(factor):
@@ -186,22 +187,22 @@ class Library:
         return texture if factor == WHITE else {**texture, "factor": factor}
 
     def _texture(self, number: int, info: Any) -> dict[str, Any]:
-        """What a scene writes for a texture; refused where there is none to be had."""
+        """The keys of a texture; refused if it cannot be used."""
         document = self._document
         if not isinstance(info, dict):
             raise document.wrong("no texture")
         texture = document.item("textures", info.get("index"))
         keys = {"texture": self._image(texture)}
 
-        # which coordinates it is looked up at, and what lies beyond them
+        # Its texture coordinates and wrapping.
         transform = extension(info, "KHR_texture_transform")
         uv_set = document.integer(transform or info, "texCoord", "texture", info.get("texCoord", 0))
         if not any(uv_set in part.uvs for part in self._parts if part.material == number):
             raise document.wrong(f"no TEXCOORD_{uv_set} to look them up by")
-        place = _transform(document, transform)
-        if uv_set != 0 or place != _UNMOVED:
-            plain = f"uv{uv_set}" if place == _UNMOVED else f"uv{uv_set}_{len(self._coordinates) + 1}"
-            keys["uv"] = self._coordinates.setdefault((uv_set, place), plain)
+        matrix = _transform(document, transform)
+        if uv_set != 0 or matrix != _IDENTITY:
+            name = f"uv{uv_set}" if matrix == _IDENTITY else f"uv{uv_set}_{len(self._coordinates) + 1}"
+            keys["uv"] = self._coordinates.setdefault((uv_set, matrix), name)
         if "sampler" in texture:
             keys |= self._sampling(
                 document.item("samplers", texture["sampler"]), f"samplers[{texture['sampler']}]"
@@ -217,7 +218,7 @@ class Library:
         return keys | ({"filter": "nearest"} if sampler.get("magFilter") == _NEAREST else {})
 
     def _image(self, texture: dict[str, Any]) -> str:
-        """The image of a texture: the path of a file beside, or ``FILE#images[N]`` for one in the file."""
+        """The image of a texture: the path of a file, or ``FILE#images[N]`` for an embedded one."""
         document = self._document
         sources = [texture, *extensions(texture).values()]
         number = next((each["source"] for each in sources if "source" in each), None)
@@ -226,9 +227,9 @@ class Library:
         if str(image.get("mimeType")).startswith("image/ktx") or str(uri).lower().endswith((".ktx", ".ktx2")):
             raise document.wrong("KTX images are not read", "export the textures as PNG or JPEG")
         if isinstance(uri, str) and not is_inline(uri):
-            path, matter = document.nearby(uri)
-            if matter:
-                self._count(f"textures {matter} {TAKEN if path else 'left out'}", f"images[{number}]")
+            path, fault = document.nearby(uri)
+            if fault:
+                self._count(f"textures {fault} {TAKEN if path else 'left out'}", f"images[{number}]")
             if path is None:
                 raise _Missing
             return str(path)
@@ -238,12 +239,12 @@ class Library:
 
 
 def image_bytes(document: Document, number: int) -> bytes:
-    """The encoded image that a document holds itself.
+    """The encoded image of this number in a document.
 
     Raises
     ------
     InputError
-        An image that is not there, or whose data cannot be read.
+        No such image, or unreadable data.
     """
     image = document.item("images", number)
     if "uri" in image:
@@ -253,7 +254,7 @@ def image_bytes(document: Document, number: int) -> bytes:
 
 
 def _substitutes(keys: dict[str, Any], first: str, prefix: str = "") -> Iterator[tuple[str, Substitute]]:
-    """The path of each parameter that has a texture, and its factor."""
+    """The path of each parameter that has a texture, and the texture's factor as its substitute."""
     for key, value in keys.items():
         if isinstance(value, dict) and "texture" in value:
             yield prefix + key, Substitute(value.get("factor", WHITE), first)
@@ -264,14 +265,14 @@ def _substitutes(keys: dict[str, Any], first: str, prefix: str = "") -> Iterator
 def _metallic_roughness(
     metal: dict[str, Any], base: Varying, emission: Varying, dielectric: float
 ) -> dict[str, Any]:
-    """The keys of glTF's own workflow; `dielectric` is F0 of what is no metal."""
+    """The keys of a metallic-roughness material; `dielectric` is F0 of its part that is not metal."""
     textured = "metallicRoughnessTexture" in metal
     metallic = 0.0 if textured else min(max(_number(metal, "metallicFactor", 1.0), 0.0), 1.0)
     roughness = min(max(_number(metal, "roughnessFactor", 1.0), 0.0), 1.0)
     rest = (1 - metallic) * dielectric
     if metallic == 0:
         f0: Varying = (dielectric,) * 3
-    elif isinstance(base, dict):  # a metal's share alone varies: the rest is at most 0.04 or so
+    elif isinstance(base, dict):  # only the metallic part; the rest is about 0.04 at most
         f0 = _scaled(base, metallic)
     else:
         r, g, b = (metallic * each + rest for each in base)
@@ -308,7 +309,7 @@ def _scaled(color: Varying, factor: float) -> Varying:
 
 
 def _factor(entry: dict[str, Any], key: str, default: Color, most: float) -> Color:
-    """Three numbers from 0 to `most`; `default` where there are none."""
+    """Three numbers clamped to 0..`most`; `default` if there are none."""
     values = entry.get(key)
     if not isinstance(values, list) or len(values) < 3 or not all(map(is_finite, values[:3])):
         return default
@@ -321,14 +322,14 @@ def _number(entry: dict[str, Any], key: str, default: float) -> float:
     return float(value) if is_finite(value) else default
 
 
-_UNMOVED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def _transform(document: Document, transform: dict[str, Any]) -> tuple[float, ...]:
     """KHR_texture_transform as a to f: u' = a u + b v + c, v' = d u + e v + f, v downwards.
 
-    offset * rotation * scale, the rotation as its text and examples have it, [c s; -s c]; the matrix printed
-    in the same place turns the other way.
+    offset * rotation * scale. The rotation is [c s; -s c], as in the extension's text and examples; the
+    matrix that it prints rotates the other way.
     """
     x, y = document.numbers(transform, "offset", "KHR_texture_transform", (0.0, 0.0))
     width, height = document.numbers(transform, "scale", "KHR_texture_transform", (1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Where the nodes of a glTF scene stand (glTF 2.0 specification, 3.5), and the instances at them."""
+"""Transforms of the nodes of a glTF scene (glTF 2.0 specification, 3.5) and of their instances."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from illumcli.records import Record
 Matrix = NDArray[np.float64]
 
 MOST_NODES = 1 << 22
-"""Nodes that are visited: one with several parents is visited by way of each."""
+"""Most nodes that are visited; a node with several parents is visited through each."""
 MOST_INSTANCES = 1 << 22
-"""Instances at one node."""
+"""Most instances at one node."""
 
 
 class PlacedNode(Record):
-    """A node of the scene that has a mesh, and where it stands."""
+    """A node of the scene that has a mesh, with its transforms to world space."""
 
     index: int
-    """Its number; -1 where the file has meshes alone."""
+    """Its number; -1 if the file has meshes but no nodes."""
     node: dict[str, Any]
     worlds: Matrix  # (I, 4, 4) to world space: one, or one per instance
 
@@ -36,9 +36,9 @@ def placed_nodes(document: Document) -> Iterator[PlacedNode]:
     Raises
     ------
     InputError
-        Nodes that are not there, that are among their own descendants, or whose transform is no numbers.
+        Nodes that do not exist, that are among their own descendants, or that have a malformed transform.
     """
-    if not document.items("nodes"):  # a library of meshes: each stands as it is
+    if not document.items("nodes"):  # a library of meshes, without transforms
         for index in range(len(document.items("meshes"))):
             yield PlacedNode(-1, {"mesh": index}, np.eye(4)[None])
         return
@@ -47,7 +47,7 @@ def placed_nodes(document: Document) -> Iterator[PlacedNode]:
     above: set[int] = set()
     visited = 0
     while todo:
-        # back up to the parent of the next node
+        # Leave the nodes that are not above the next one.
         index, parent, depth = todo.pop()
         while len(path) > depth:
             above.discard(path.pop())
@@ -58,7 +58,7 @@ def placed_nodes(document: Document) -> Iterator[PlacedNode]:
         path.append(index)
         above.add(index)
 
-        # what stands here, and what comes after it
+        # Its transform and mesh; then its children.
         node, where = document.item("nodes", index), f"nodes[{index}]"
         if extension(node, "KHR_node_visibility").get("visible") is False:
             document.count("hidden nodes, left out with all below them", where)
@@ -70,13 +70,16 @@ def placed_nodes(document: Document) -> Iterator[PlacedNode]:
 
 
 def _roots(document: Document) -> list[int]:
-    """The nodes that the scene begins with: of the default scene, else the first, else those of no parent."""
+    """The root nodes of the default scene, otherwise of the first, otherwise all nodes without a parent."""
+    # Without scenes: nodes without a parent.
     scenes = document.items("scenes")
     if not scenes:
         below = {
             child for index in range(len(document.items("nodes"))) for child in children(document, index)
         }
         return [index for index in range(len(document.items("nodes"))) if index not in below]
+
+    # The roots that the scene lists.
     number = document.json.get("scene", 0)
     if not is_index(number) or number >= len(scenes):
         document.count("default scene that is not there, the first taken", "scene")
@@ -85,7 +88,7 @@ def _roots(document: Document) -> list[int]:
     if not isinstance(roots, list) or not all(is_index(root) for root in roots):
         raise document.wrong("the scene has no list of nodes")
 
-    # a root that stands below another one, or twice, is drawn once, in its place
+    # A root that is below another one, or listed twice, is drawn once.
     below = set()
     todo = [child for root in roots for child in children(document, root)]
     while todo:
@@ -108,21 +111,21 @@ def children(document: Document, index: int) -> list[int]:
 
 
 def world_matrices(document: Document, nodes: list[int]) -> Matrix:
-    """(N, 4, 4) from nodes to world space, in whatever scene they are."""
+    """(N, 4, 4) from nodes to world space, whichever scene they are in."""
     parents: dict[int, int] = {}
     for index in range(len(document.items("nodes"))):
         for child in children(document, index):
             parents.setdefault(child, index)
     known: dict[int, Matrix] = {}
     for node in nodes:
-        # up to what is known or has no parent, then down again
-        line = [node]
-        while line[-1] not in known and line[-1] in parents:
-            if len(line) > len(parents):
+        # Up to an ancestor that is known or has no parent, then down again.
+        ancestors = [node]
+        while ancestors[-1] not in known and ancestors[-1] in parents:
+            if len(ancestors) > len(parents):
                 raise document.wrong(f"nodes[{node}] is among its own descendants")
-            line.append(parents[line[-1]])
-        world = known.get(line[-1], np.eye(4))
-        for index in reversed(line):
+            ancestors.append(parents[ancestors[-1]])
+        world = known.get(ancestors[-1], np.eye(4))
+        for index in reversed(ancestors):
             if index not in known:
                 known[index] = world @ local_matrix(document, index)
             world = known[index]
@@ -130,7 +133,7 @@ def world_matrices(document: Document, nodes: list[int]) -> Matrix:
 
 
 def local_matrix(document: Document, index: int) -> Matrix:
-    """(4, 4) of a node to its parent: its matrix, stored by columns, or translation * rotation * scale."""
+    """(4, 4) from a node to its parent: its matrix, stored by columns, or translation * rotation * scale."""
     node, where = document.item("nodes", index), f"nodes[{index}]"
     if "matrix" in node:
         matrix = document.numbers(node, "matrix", where, tuple(np.eye(4).ravel())).reshape(4, 4).T
@@ -146,7 +149,7 @@ def local_matrix(document: Document, index: int) -> Matrix:
 
 
 def composed(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
-    """(N, 4, 4) translation * rotation * scale; a quaternion of no length turns nothing.
+    """(N, 4, 4) translation * rotation * scale; a zero quaternion is no rotation.
 
     Parameters
     ----------
@@ -168,7 +171,8 @@ def composed(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
 
 
 def _instances(document: Document, node: dict[str, Any], where: str) -> Matrix:
-    """(I, 4, 4) where the instances of a node's mesh stand in the node; one that changes nothing without."""
+    """(I, 4, 4) transforms of the instances of a node's mesh; a single identity without instances."""
+    # The tables of translations, rotations and scales.
     tables = extension(node, "EXT_mesh_gpu_instancing").get("attributes")
     if not isinstance(tables, dict):
         return np.eye(4)[None]
@@ -178,6 +182,8 @@ def _instances(document: Document, node: dict[str, Any], where: str) -> Matrix:
             tables_by_name[name] = table(document, tables[name], (width,)).astype(np.float64)
     if not tables_by_name:
         return np.eye(4)[None]
+
+    # As many instances as the shortest table has rows.
     count = min(map(len, tables_by_name.values()))
     if count < max(map(len, tables_by_name.values())):
         document.count("instances that lack a part of their transform, left out", where)

@@ -17,7 +17,7 @@ from illumcli.mesh_files.gltf.nodes import PlacedNode, placed_nodes
 from illumcli.records import Record
 
 MOST_CORNERS = 1 << 28
-"""Vertices and corners over all nodes: a mesh may be placed many times, and each is written out."""
+"""Most vertices and corners over all nodes: each placement of a mesh is a copy."""
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class Part(Record):
-    """One primitive at one node, each of its instances after the other."""
+    """One primitive at one node, with all of its instances one after the other."""
 
     mesh: int
     primitive: int
@@ -33,8 +33,8 @@ class Part(Record):
     copies: int
     vertices: Floats  # (V, 3) in world space
     triangles: Ints  # (T, 3)
-    normals: Floats | None  # (V, 3) unit, or 0 where the file has 0
-    uvs: dict[int, Floats]  # (V, 2) by number of the set, v upwards
+    normals: Floats | None  # (V, 3) unit, or 0 if the file has 0
+    uvs: dict[int, Floats]  # (V, 2) by number of the uv set, v upwards
     attributes: dict[str, NDArray[Any]]  # (V,) or (V, k)
     material: int | None
     group: str
@@ -46,7 +46,7 @@ def parts(document: Document) -> Iterator[Part]:
     Raises
     ------
     InputError
-        Positions or indices that are not there, or are compressed.
+        Positions or indices that are missing or compressed.
     LimitError
         More than `MOST_CORNERS` vertices and corners.
     """
@@ -73,7 +73,7 @@ def parts(document: Document) -> Iterator[Part]:
 
 
 def _is_drawn(document: Document, primitive: dict[str, Any], where: str) -> bool:
-    """Has a primitive triangles whose vertices have positions? Refused where these are compressed."""
+    """True if a primitive has triangles whose vertices have positions; refused if these are compressed."""
     mode = primitive.get("mode", _TRIANGLES)
     if not is_index(mode) or mode > _FAN:
         document.count("primitives of an unknown mode, left out", where)
@@ -105,14 +105,14 @@ def _part(
     position: NDArray[Any],
     triangles: Ints,
 ) -> Part:
-    """A primitive, by the numbers of its mesh and its own, in world space at each of its node's instances."""
+    """A primitive in world space, at each instance of its node; `numbers` are of its mesh and its own."""
     where = f"meshes[{numbers[0]}].primitives[{numbers[1]}]"
     mesh = document.item("meshes", numbers[0])
     primitive = mesh["primitives"][numbers[1]]
     accessors = primitive["attributes"]
     weights = weights_of(document, placed.node, mesh, where)
 
-    # as the file has them, in the shape of their default weights
+    # Positions and normals in object space, with the default weights of morph targets.
     size = len(position)
     tables = _Tables(document, accessors, size, where)
     position = morphed(document, position.astype(np.float64), "POSITION", primitive, weights)
@@ -120,17 +120,19 @@ def _part(
     if normals is not None:
         normals = morphed(document, normals.astype(np.float64), "NORMAL", primitive, weights)
 
-    # in the world: by the matrix of each instance (I, 1, 4, 4), or of each vertex (1, V, 4, 4)
+    # To world space, by the matrix of each instance (I, 1, 4, 4), or of each vertex (1, V, 4, 4).
     worlds = skinned_or_placed(document, placed, accessors, size, where)
     linear = worlds[..., :3, :3]
-    turned = np.linalg.det(linear) < 0
-    mirrored = 2 * np.count_nonzero(turned, axis=1) > turned.shape[1]
+    is_mirrored = np.linalg.det(linear) < 0
     vertices = _applied(linear, position) + worlds[..., :3, 3]
     if normals is not None:
-        sides = np.where(turned, -1, 1)[..., None, None]
+        sides = np.where(is_mirrored, -1, 1)[..., None, None]
         normals = _unit(_applied(_cofactors(linear) * sides, normals).reshape(-1, 3))
+
+    # Instances that are mirrored, by most of their vertices, have reversed triangles.
     copies = len(vertices)
-    wound = np.where(mirrored[:, None, None], triangles[:, ::-1], triangles)
+    reverse = 2 * np.count_nonzero(is_mirrored, axis=1) > is_mirrored.shape[1]
+    oriented = np.where(reverse[:, None, None], triangles[:, ::-1], triangles)
 
     name = next((str(each) for each in (placed.node.get("name"), mesh.get("name")) if each), None)
     return Part(
@@ -138,7 +140,7 @@ def _part(
         primitive=numbers[1],
         copies=copies,
         vertices=vertices.reshape(-1, 3),
-        triangles=(wound + size * np.arange(copies)[:, None, None]).reshape(-1, 3),
+        triangles=(oriented + size * np.arange(copies)[:, None, None]).reshape(-1, 3),
         normals=normals,
         uvs={key: _repeated(values, copies) for key, values in _uvs(tables).items()},
         attributes={key: _repeated(values, copies) for key, values in _attributes(tables).items()},
@@ -170,7 +172,7 @@ class _Tables(Record):
 
 
 def _uvs(tables: _Tables) -> dict[int, Floats]:
-    """Texture coordinates by number of their set, v upwards; integers are whole only where quantised."""
+    """Texture coordinates by number of the uv set, v upwards; integers are fractions unless quantised."""
     used = tables.document.json.get("extensionsUsed")
     fractions = not (isinstance(used, list) and "KHR_mesh_quantization" in used)
     sets = {}
@@ -183,7 +185,7 @@ def _uvs(tables: _Tables) -> dict[int, Floats]:
 
 
 def _attributes(tables: _Tables) -> dict[str, NDArray[Any]]:
-    """`COLOR_0` as `color`, linear (3.7.2.1), and `alpha`; what begins with an underscore by its name."""
+    """`COLOR_0` as `color`, linear (3.7.2.1), and `alpha`; attributes with a leading underscore by name."""
     columns: dict[str, NDArray[Any]] = {}
     for name in tables.accessors:
         if name.startswith("_"):
@@ -199,7 +201,9 @@ def _attributes(tables: _Tables) -> dict[str, NDArray[Any]]:
 
 
 def _triangles(document: Document, primitive: dict[str, Any], size: int, where: str) -> Ints:
-    """(T, 3) vertices of the primitive's triangles, wound alike; those that no vertices have are left out."""
+    """(T, 3) vertices of the primitive's triangles, with equal winding; those with invalid ones are
+    dropped."""
+    # The indices.
     if "indices" in primitive:
         values = table(document, primitive["indices"], (1,))[:, 0]
         indices = values.astype(np.int64)
@@ -208,7 +212,7 @@ def _triangles(document: Document, primitive: dict[str, Any], size: int, where: 
     else:
         indices = np.arange(size)
 
-    # -1 for what names no vertex: an end of a strip, as in some files, or a fault
+    # Invalid ones become -1: in some files the end of a strip, otherwise a fault.
     indices = np.where((indices >= 0) & (indices < size), indices, -1)
     mode = primitive.get("mode", _TRIANGLES)
     if mode == _TRIANGLES:
@@ -252,7 +256,8 @@ def _material(document: Document, primitive: dict[str, Any], where: str) -> int 
 
 
 def _applied(linear: Floats, vectors: Floats) -> Floats:
-    """(I, V, 3) (V, 3) vectors by matrices of instances (I, 1, 3, 3), or of vertices (1, V, 3, 3)."""
+    """(I, V, 3) transformed vectors, (V, 3), by matrices of instances (I, 1, 3, 3) or vertices (1, V, 3,
+    3)."""
     if linear.shape[1] == 1:
         return vectors @ linear[:, 0].transpose(0, 2, 1)
     transformed: Floats = np.einsum("ivab,vb->iva", linear, vectors)
@@ -264,7 +269,7 @@ def _repeated(values: NDArray[Any], copies: int) -> NDArray[Any]:
 
 
 def _cofactors(matrices: Floats) -> Floats:
-    """(..., 3, 3) inverse transposes times the determinants, which flattening matrices have too."""
+    """(..., 3, 3) inverse transposes times the determinants; they exist for singular matrices, too."""
     a, b, c = np.moveaxis(matrices, -2, 0)
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
 

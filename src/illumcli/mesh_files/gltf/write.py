@@ -1,4 +1,4 @@
-"""GLB files: meshes with values at their vertices, or such values added to a file that is there."""
+"""Writes GLB files: meshes with values at their vertices, or such values added to an existing file."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _JSON, _BIN = 0x4E4F534A, 0x004E4942
 
 
 def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> None:
-    """Write a node per mesh with its vertices in their order, and `data` as attributes `_NAME`, float each.
+    """Write a node per mesh with its vertices in their order, and `data` as float attributes `_NAME`.
 
-    Polygons become triangles. Vertices are stored from the mesh's centre, which its node carries, so that a
-    mesh far from the origin keeps its digits. Where `data` has a colour, `COLOR_0` holds it: viewers multiply
-    all light by it, not the ambient light alone.
+    Polygons become triangles. If single precision is too coarse, vertices are relative to the mesh's centre,
+    which becomes the node's translation. If `data` has a colour, it becomes `COLOR_0`; viewers multiply all
+    light by it, not only ambient light.
     """
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "illum", "extras": {"illum": data.sealed_about()}},
@@ -41,7 +41,7 @@ def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> Non
         rows = slice(first, first + len(mesh.vertices))
         first = rows.stop
 
-        # positions, from the centre where single precision would move them
+        # Positions, relative to the centre if single precision would move them.
         node = {"mesh": number, "name": mesh.name}
         vertices = mesh.vertices
         if not fits_single(vertices):
@@ -50,7 +50,7 @@ def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> Non
             vertices = vertices - centre
         attributes = {"POSITION": buffer.add(vertices.astype("<f4"), _VERTICES, bounds=True)}
 
-        # the mesh's own attributes, then the values
+        # The mesh's attributes, then the values.
         _add_attributes(buffer, attributes, mesh, with_color=data.color is None)
         for name, column in data.columns.items():
             attributes[f"_{name.upper()}"] = buffer.add(column[rows].astype("<f4"), _VERTICES)
@@ -68,7 +68,7 @@ def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> Non
 
 
 def _add_attributes(buffer: _Buffer, attributes: dict[str, int], mesh: OutputMesh, with_color: bool) -> None:
-    """Add accessors for the attributes of a mesh that glTF has a form for: up to four numbers a vertex."""
+    """Add accessors for the attributes of a mesh that glTF can hold: up to four numbers per vertex."""
     for name, given in sorted(mesh.attributes.items(), key=lambda each: each[0] not in STANDARD):
         values = np.asarray(given)
         if name == "color":
@@ -89,12 +89,12 @@ def _add_attributes(buffer: _Buffer, attributes: dict[str, int], mesh: OutputMes
 def add_to_glb(
     path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], data: VertexData
 ) -> None:
-    """Write a GLB again with `data` added to each primitive as attributes `_NAME`, all else as it is.
+    """Write a GLB again with `data` added to each primitive as attributes `_NAME`, and nothing else changed.
 
     Parameters
     ----------
     source : (dict, bytes)
-        The JSON of the input, which is changed, and its binary chunk.
+        The JSON of the input, which is modified, and its binary chunk.
     counts : sequence of (mesh, primitive, vertices)
         The primitives in the order of the rows of `data`, each once.
     """
@@ -125,19 +125,19 @@ def read_about(path: Path) -> dict[str, Any]:
 
 
 def unit_rows(values: NDArray[Any]) -> NDArray[np.float64]:
-    """(V, 3) of length 1, (0, 0, 1) for zero: glTF takes unit normals only."""
+    """(V, 3) normalized, (0, 0, 1) for zero vectors: glTF requires unit normals."""
     size = np.linalg.norm(values, axis=1, keepdims=True)
     return np.where(size > 0, values / np.where(size > 0, size, 1), [0.0, 0.0, 1.0])
 
 
 class _Buffer:
-    """The binary part of a GLB in the making, and the views and accessors into it."""
+    """The binary chunk of a GLB while it is written, with its views and accessors."""
 
     def __init__(self, document: dict[str, Any], data: bytes = b"") -> None:
         self.document, self.parts, self.size = document, [data], len(data)
 
     def add(self, values: NDArray[Any], target: int, bounds: bool = False) -> int:
-        """Append a (N,) or (N, k) array; the number of its accessor."""
+        """Append an array, (N,) or (N, k); returns the number of its accessor."""
         raw = np.ascontiguousarray(values)
         fill = -self.size % 4
         view = {"buffer": 0, "byteOffset": self.size + fill, "byteLength": raw.nbytes, "target": target}

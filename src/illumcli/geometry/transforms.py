@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.arrays import cross
 from illumcli.geometry.bounds import box_corners, take_used
 from illumcli.geometry.mesh import Mesh
 
@@ -55,5 +56,4 @@ def rotation(axis: int, degrees: float) -> NDArray[np.float64]:
 
 def cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) cofactor matrix: det times the inverse transpose, defined for singular matrices too."""
-    a, b, c = matrix
-    return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    return np.ascontiguousarray(cross(matrix[[1, 2, 0]], matrix[[2, 0, 1]]))

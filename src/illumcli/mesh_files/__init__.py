@@ -6,6 +6,8 @@ A format is a module with `read(path) -> Mesh`, and `companions(path)` if its fi
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -61,7 +63,8 @@ def companions(path: Path) -> list[Path]:
     return files
 
 
-def _formats() -> dict[str, str]:
+@cache
+def _formats() -> Mapping[str, str]:
     """Suffix -> module."""
     return {f".{name}": name for name in modules(__path__) if name not in NO_FORMATS} | OTHER_SUFFIXES
 

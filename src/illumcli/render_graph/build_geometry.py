@@ -42,10 +42,11 @@ def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
 
 def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     """One node per mesh file or shape, and the node of every object's mesh."""
-    sources = {needs.mesh_name(scene, thing.mesh): source for thing, source in _sources(scene)}
-    names = list(sources)
-    which = tuple(names.index(needs.mesh_name(scene, thing.mesh)) for thing in scene.objects)
-    parts = {f"mesh{k}": f"mesh:{name}" for k, name in enumerate(names)}
+    of_object = [needs.mesh_name(scene, thing.mesh) for thing in scene.objects]
+    sources = {name: source for name, (_, source) in zip(of_object, _sources(scene), strict=True)}
+    number = {name: k for k, name in enumerate(sources)}
+    which = tuple(number[name] for name in of_object)
+    parts = {f"mesh{k}": f"mesh:{name}" for name, k in number.items()}
     meshes = [
         Node.of(partial(stages.mesh, _content(loaded, source)), f"mesh:{name}")
         for name, source in sources.items()

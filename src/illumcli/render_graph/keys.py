@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy
 
@@ -54,8 +56,20 @@ class Keys:
         if name not in self._known:
             node = self._graph[name]
             inputs = [(parameter, self(buffer)) for parameter, buffer in node.inputs.items()]
-            self._known[name] = digest((self._salt, node.name, node.function, inputs))
+            self._known[name] = digest((self._salt, node.name, function_digest(node.function), inputs))
         return self._known[name]
+
+
+_OF_FUNCTIONS: WeakKeyDictionary[Callable[..., Any], str] = WeakKeyDictionary()
+"""Digests of functions that live. A run forms keys of a graph several times, for files, memory and store."""
+
+
+def function_digest(function: Callable[..., Any]) -> str:
+    """Hash of a function and of the values that are bound in it, which never change."""
+    known = _OF_FUNCTIONS.get(function)
+    if known is None:
+        known = _OF_FUNCTIONS[function] = digest(function)
+    return known
 
 
 def content_key(nodes: Mapping[str, Node], view: View, buffers: Iterable[str]) -> str:

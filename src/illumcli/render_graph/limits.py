@@ -40,15 +40,17 @@ def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
     each of them.
     """
     sizes = {"shapes": 0, "meshes": 0, "textures": 0}
+    of_file: dict[Path, int] = {}  # each file is looked at once
     for thing in scene.objects:
         source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
         if isinstance(source, Shape):
             sizes["shapes"] += TRIANGLE_BYTES * source.triangles()
             continue
         path = loaded.folder / (source.file if isinstance(source, MeshFile) else str(source))
-        if path.is_file():
+        if path not in of_file:
             factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
-            sizes["meshes"] += factor * path.stat().st_size
+            of_file[path] = factor * path.stat().st_size if path.is_file() else 0
+        sizes["meshes"] += of_file[path]
     texels = [_texels(loaded, texture) for texture in _textures(scene)]
     sizes["textures"] = TEXEL_BYTES * sum(texels) + WHILE_READ * max(texels, default=0)
     return {name: count for name, count in sizes.items() if count}
@@ -56,12 +58,15 @@ def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
 
 def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
     """Path and colour space of each texture that the scene's materials name, without repeats."""
-    models: list[IlluminationModel] = []
+    models: dict[int, IlluminationModel] = {}  # each once, however many objects have it
+    by_name = False
     for thing in scene.objects:
-        own = scene.material_of(thing)
-        models += scene.materials.values() if own is None else [own]
-        models += [fallback for fallback in [scene.fallback_of(thing)] if fallback is not None]
-    values = (value for model in models for value in model.varying().values())
+        own, fallback = scene.material_of(thing), scene.fallback_of(thing)
+        by_name |= own is None
+        models |= {id(model): model for model in (own, fallback) if model is not None}
+    if by_name:
+        models |= {id(model): model for model in scene.materials.values()}
+    values = (value for model in models.values() for value in model.varying().values())
     yield from dict.fromkeys((value.texture, value.space) for value in values if isinstance(value, Texture))
 
 

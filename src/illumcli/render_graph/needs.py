@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 from illumcli.errors import InputError
@@ -53,16 +54,17 @@ def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:
 
 def candidates(scene: Scene) -> list[IlluminationModel] | None:
     """The models that some surface may have; None if a mesh file's library decides."""
-    models: list[IlluminationModel] = []
+    models: dict[int, IlluminationModel] = {}  # each once, however many objects have it
+    by_name = False
     for thing in scene.objects:
         model = scene.material_of(thing)
         if model is not None:
-            models.append(model)
-            continue
-        if imports(scene, thing):
+            models[id(model)] = model
+        elif imports(scene, thing):
             return None
-        models += [default_material(), *scene.materials.values()]
-    return models
+        else:
+            by_name = True
+    return [*models.values(), *([default_material(), *scene.materials.values()] if by_name else [])]
 
 
 def imports(scene: Scene, thing: Object) -> bool:
@@ -142,8 +144,14 @@ def all_baked(scene: Scene) -> bool:
 def source_of(scene: Scene, mesh: NameOrMesh) -> MeshFile | Shape:
     """The description of an object's mesh."""
     if isinstance(mesh, str):
-        return scene.meshes[mesh] if mesh in scene.meshes else MeshFile(file=mesh)
+        return scene.meshes[mesh] if mesh in scene.meshes else _mesh_file(mesh)
     return mesh
+
+
+@lru_cache(maxsize=1 << 16)
+def _mesh_file(path: str) -> MeshFile:
+    """The description of a mesh that is given by its path alone."""
+    return MeshFile(file=path)
 
 
 def mesh_name(scene: Scene, mesh: NameOrMesh) -> str:

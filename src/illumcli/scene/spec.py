@@ -5,6 +5,7 @@ The JSON schema in ``schemas/scene.schema.json`` is generated from this module.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import (
@@ -441,6 +442,7 @@ class Scene(Description):
         return tuple(o.name or f"object{i + 1}" for i, o in enumerate(self.objects))
 
 
+@cache
 def default_material() -> AnyModel:
     """The material of polygons without one: light grey Lambert."""
     from illumcli.models.lambert import Lambert

@@ -31,8 +31,8 @@ def unused(scene: Scene, layers: Collection[str], files: Collection[str]) -> Ite
     yield from _views(scene)
     yield from _ambient(scene, layers)
     yield from _meshes(scene)
-    for i, thing in enumerate(scene.objects):
-        yield from _object(scene, i, thing)
+    for i, (thing, (_, source)) in enumerate(zip(scene.objects, _sources(scene), strict=True)):
+        yield from _object(scene, i, thing, source)
     if scene.objects and all(thing.shading for thing in scene.objects):
         yield ("shading",), "is not used, every object has a rate of its own; change theirs"
     if files and all(name.lower().endswith(".png") for name in files):
@@ -133,14 +133,13 @@ def _meshes(scene: Scene) -> Iterator[Fault]:
                 yield (*path, "normals", key), fact
 
 
-def _object(scene: Scene, number: int, thing: Object) -> Iterator[Fault]:
-    """Keys of one object and of its material."""
+def _object(scene: Scene, number: int, thing: Object, source: Any) -> Iterator[Fault]:
+    """Keys of one object and of its material; `source` describes its mesh."""
     # Grain, fallback, override and transform.
     path: Path = ("objects", number)
     model = scene.material_of(thing)
     if model is not None and model.isotropic:
         yield (*path, "grain"), f"is not used, the model {dict(model)['model']} has none; leave it out"
-    source = _sources(scene)[number][1]
     if thing.material is not None:
         yield (*path, "fallback"), "is not used, the object has a material of its own; leave one of them out"
     if thing.override and thing.material is None and (thing.fallback or getattr(source, "materials", False)):

@@ -94,26 +94,21 @@ def numbering(choices: Sequence[Choice], named: Collection[str], geometry: Scene
     of_object = np.zeros(len(choices), np.int32)
     of_triangle = np.zeros(len(geometry.triangles), np.int32)
     several = False
-    for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
+    firsts = [placed.first_triangle for placed in geometry.placed]
+    ranges = map(slice, firsts, [*firsts[1:], len(geometry.triangles)])
+    for i, (placed, choice, of_this_object) in enumerate(zip(geometry.placed, choices, ranges, strict=True)):
         mesh = placed.mesh
         names = (None, *mesh.material_names) if choice.own is None else (None,)
         numbers = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
         if len(names) == 1:
-            of_object[i] = numbers[0]
+            of_object[i] = of_triangle[of_this_object] = numbers[0]
             continue
         several = True
         selected = (
             mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
         )
-        of_this_object = geometry.objects == i
         polygon = geometry.polygons[of_this_object] - placed.first_polygon
         of_triangle[of_this_object] = np.asarray(numbers, np.int32).take(selected.take(polygon) + 1)
-
-    # If any object has several, fill in the triangles of the others.
-    if several:
-        for i, (placed, choice) in enumerate(zip(geometry.placed, choices, strict=True)):
-            if choice.own is not None or not placed.mesh.material_names:
-                of_triangle[geometry.objects == i] = of_object[i]
     return Numbering(tuple(tokens), of_object, of_triangle if several else None)
 
 

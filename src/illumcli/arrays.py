@@ -7,6 +7,7 @@ C order, and elementwise results keep the order of their operands.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,6 +18,9 @@ F = np.float32
 Floats: TypeAlias = NDArray[np.floating[Any]]  # (N,)
 Vectors: TypeAlias = NDArray[np.floating[Any]]  # (N, 3)
 Ids: TypeAlias = NDArray[np.int32]  # (N,)
+
+BLOCK_ROWS = 3 << 13
+"""Rows of a block; a multiple of those that matrix products take at a time."""
 
 
 def column_major(values: ArrayLike, dtype: DTypeLike | None = None) -> NDArray[Any]:
@@ -44,6 +48,17 @@ def take_or_all(table: NDArray[Any], index: NDArray[Any]) -> NDArray[Any]:
 def repeat_rows(vectors: Vectors, count: int) -> Vectors:
     """(N * count, 3) each vector `count` times in a row; done per component, which is much faster."""
     return np.repeat(vectors.T, count, axis=1).T
+
+
+def row_blocks(count: int) -> Iterator[slice]:
+    """Blocks of so many rows, for work whose intermediate arrays are to stay in a processor's cache.
+
+    None is a single row, unless that is all there is: matrix products of several rows round alike wherever a
+    block begins, that of one row takes another way.
+    """
+    firsts = range(0, max(count - 1, min(count, 1)), BLOCK_ROWS)
+    for first in firsts:
+        yield slice(first, count if first == firsts[-1] else first + BLOCK_ROWS)
 
 
 def dot(a: Vectors, b: Vectors) -> Floats:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.arrays import row_blocks
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.polygon_normals import blocks
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
@@ -31,7 +33,7 @@ def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
         if len(mesh.corners):
-            low[number], high[number] = box_corners(take_used(mesh, transformed_vertices(mesh, matrix)))
+            low[number], high[number] = _transformed_box(mesh, matrix)
 
     # The box around all of them; a point at the origin where there are no polygons.
     lowest, highest = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
@@ -42,6 +44,20 @@ def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]
     render_space = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
     polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
     return ObjectBounds(tuple(matrices), low, high, polygons, render_space)
+
+
+def _transformed_box(
+    mesh: Mesh, matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner, (3,) each, of the box around what the polygons use [scene units]."""
+    used = used_vertices(mesh)
+    parts = [
+        box_corners(points[used[rows]] if not used[rows].all() else points)
+        for rows, points in transformed_blocks(mesh, matrix)
+        if used[rows].any()
+    ]
+    low, high = (np.stack(each) for each in zip(*parts, strict=True))
+    return low.min(axis=0), high.max(axis=0)
 
 
 def box_corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -72,6 +88,14 @@ def transformed_vertices(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.
     return out
 
 
+def transformed_blocks(
+    mesh: Mesh, matrix: NDArray[np.float64]
+) -> Iterator[tuple[slice, NDArray[np.float64]]]:
+    """The same in blocks: which vertices, and where they are."""
+    for rows in row_blocks(len(mesh.vertices)):
+        yield rows, mesh.vertices[rows] @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
     """The largest diagonal of a polygon's bounding box [scene units].
 
@@ -84,9 +108,12 @@ def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
     extends = low < high
     if not extends.all() and (mesh.normals is None or not mesh.normals[:, extends].any()):
         return 0.0
-    corners, first = transformed_vertices(mesh, matrix)[mesh.corners], mesh.starts[:-1]
-    size = np.maximum.reduceat(corners, first, axis=0) - np.minimum.reduceat(corners, first, axis=0)
-    return float(np.sqrt(np.square(size).sum(axis=1).max()))
+    vertices, largest = transformed_vertices(mesh, matrix), 0.0
+    for _, _, part in blocks(mesh):
+        corners, first = vertices[part.corners], part.starts[:-1]
+        size = np.maximum.reduceat(corners, first, axis=0) - np.minimum.reduceat(corners, first, axis=0)
+        largest = max(largest, float(np.square(size).sum(axis=1).max()))
+    return float(np.sqrt(largest))
 
 
 def implied_widths(

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, column_major, cross, take_rows, unit
-from illumcli.geometry.bounds import ObjectBounds, object_bounds, transformed_vertices
+from illumcli.arrays import F, Vectors, column_major, cross, row_blocks, take_rows, unit
+from illumcli.geometry.bounds import ObjectBounds, object_bounds, transformed_blocks
 from illumcli.geometry.corner_normals import CornerNormals
 from illumcli.geometry.corner_normals import corner_normals as mesh_corner_normals
 from illumcli.geometry.mesh import Mesh
@@ -132,63 +132,69 @@ def scene_geometry(
     by_file : sequence of bool
         Of which objects the file's normals are used.
     """
+    # Triangulate each mesh once, however many objects have it.
     render_space, matrices = object_bounds.render_space, object_bounds.matrices
-    placed, vertices, triangles, corners, polygons, objects = [], [], [], [], [], []
+    of_mesh = {id(mesh): mesh for mesh in meshes}
+    cuts = {key: triangulate(mesh) for key, mesh in of_mesh.items()}
+    sides = {id(mesh): mesh for mesh, uses in zip(meshes, by_file, strict=True) if uses}
+    against_file = {key: reversed_polygons(mesh) for key, mesh in sides.items()}
+    vertices = np.empty((sum(len(mesh.vertices) for mesh in meshes), 3), F, order="F")
+    count = sum(len(cuts[id(mesh)].polygon) for mesh in meshes)
+    triangles, corners = (np.empty((count, 3), np.int32, order="F") for _ in range(2))
+    polygons, objects = (np.empty(count, np.int32) for _ in range(2))
+
+    placed: list[PlacedMesh] = []
     first_vertex = first_corner = first_polygon = first_triangle = 0
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
-        # Triangulate, and orient the triangles.
-        cut = triangulate(mesh)
+        cut = cuts[id(mesh)]
         mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
-        oriented = cut.corners[:, ::-1] if mirrored else cut.corners
-        against = reversed_polygons(mesh) if by_file[number] else None
-        if against is not None:
-            oriented = np.where(against[cut.polygon][:, None], oriented[:, ::-1], oriented)
-
-        # Append the object's elements, numbered after those of the objects before it.
+        against = against_file[id(mesh)] if by_file[number] else None
         placed.append(
             PlacedMesh(
                 mesh, matrix, mirrored, against, first_vertex, first_corner, first_polygon, first_triangle
             )
         )
-        vertices.append(transformed_vertices(mesh, matrix))
-        triangles.append(mesh.corners[oriented] + np.int32(first_vertex))
-        corners.append(oriented + np.int32(first_corner))
-        polygons.append(cut.polygon + np.int32(first_polygon))
-        objects.append(np.full(len(oriented), number, np.int32))
+
+        # The object's elements, numbered after those of the objects before it, its triangles oriented.
+        for rows, points in transformed_blocks(mesh, matrix):
+            vertices[first_vertex + rows.start : first_vertex + rows.stop] = render_space.from_world(points)
+        own = slice(first_triangle, first_triangle + len(cut.polygon))
+        for rows in row_blocks(len(cut.polygon)):
+            oriented = cut.corners[rows, ::-1] if mirrored else cut.corners[rows]
+            if against is not None:
+                oriented = np.where(against[cut.polygon[rows]][:, None], oriented[:, ::-1], oriented)
+            there = slice(first_triangle + rows.start, first_triangle + rows.stop)
+            np.add(mesh.corners[oriented], np.int32(first_vertex), out=triangles[there])
+            np.add(oriented, np.int32(first_corner), out=corners[there])
+        np.add(cut.polygon, np.int32(first_polygon), out=polygons[own])
+        objects[own] = number
         first_vertex += len(mesh.vertices)
         first_corner += len(mesh.corners)
         first_polygon += mesh.polygon_count
-        first_triangle += len(oriented)
-    return SceneGeometry(
-        render_space=render_space,
-        placed=tuple(placed),
-        vertices=column_major(
-            _concatenated([render_space.from_world(v) for v in vertices], np.zeros((0, 3))), F
-        ),
-        triangles=column_major(_concatenated(triangles, np.zeros((0, 3), np.int32))),
-        corners=column_major(_concatenated(corners, np.zeros((0, 3), np.int32))),
-        polygons=_concatenated(polygons, np.zeros(0, np.int32)),
-        objects=_concatenated(objects, np.zeros(0, np.int32)),
-    )
+        first_triangle = own.stop
+    return SceneGeometry(render_space, tuple(placed), vertices, triangles, corners, polygons, objects)
 
 
 def scene_normals(geometry: SceneGeometry, normals: Sequence[CornerNormals]) -> CornerVectors:
     """Unit shading normals of every corner in scene directions, from those of each object's mesh."""
-    values, index, first = [], [], 0
+    values = np.empty((sum(len(each.normals) for each in normals), 3), F, order="F")
+    index, first = [], 0
     for placed, of_mesh in zip(geometry.placed, normals, strict=True):
         # Normals transform by the inverse transpose, up to a factor the cofactors; scaled against overflow.
         linear = placed.matrix[:3, :3]
         scale = np.abs(linear).max() or 1.0
-        transformed = of_mesh.normals @ cofactors(linear / scale).T
-        if placed.mirrored:
-            transformed = -transformed
-        size = np.linalg.norm(transformed, axis=1, keepdims=True)
-        values.append(np.divide(transformed, size, out=np.zeros_like(transformed), where=size > 0))
-        index.append(np.where(of_mesh.index >= 0, of_mesh.index + first, -1).astype(np.int32))
+        matrix = cofactors(linear / scale).T
+        for rows in row_blocks(len(of_mesh.normals)):
+            transformed = of_mesh.normals[rows] @ matrix
+            if placed.mirrored:
+                transformed = -transformed
+            size = np.linalg.norm(transformed, axis=1, keepdims=True)
+            values[first + rows.start : first + rows.stop] = np.divide(
+                transformed, size, out=np.zeros_like(transformed), where=size > 0
+            )
+        index.append(_shifted(of_mesh.index, first))
         first += len(of_mesh.normals)
-    return CornerVectors(
-        column_major(_concatenated(values, np.zeros((0, 3))), F), _concatenated(index, np.zeros(0, np.int32))
-    )
+    return CornerVectors(values, _concatenated(index, np.zeros(0, np.int32)))
 
 
 def scene_uvs(geometry: SceneGeometry) -> CornerVectors:
@@ -200,7 +206,7 @@ def scene_uvs(geometry: SceneGeometry) -> CornerVectors:
             index.append(np.full(len(mesh.corners), -1, np.int32))
             continue
         values.append(mesh.uvs)
-        index.append(np.where(mesh.corner_uvs >= 0, mesh.corner_uvs + first, -1).astype(np.int32))
+        index.append(_shifted(mesh.corner_uvs, first))
         first += len(mesh.uvs)
     return CornerVectors(
         column_major(_concatenated(values, np.zeros((0, 2))), F), _concatenated(index, np.zeros(0, np.int32))
@@ -272,5 +278,13 @@ def polygon_centres(geometry: SceneGeometry) -> PolygonCentres:
     return PolygonCentres(position, np.concatenate(starts), np.concatenate(vertices))
 
 
+def _shifted(index: NDArray[np.int32], first: int) -> NDArray[np.int32]:
+    """Rows counted from `first`; -1 stays."""
+    return index if first == 0 else np.where(index >= 0, index + np.int32(first), np.int32(-1))
+
+
 def _concatenated(arrays: list[NDArray[Any]], empty: NDArray[Any]) -> NDArray[Any]:
+    """All arrays one after the other; a single one is not copied."""
+    if len(arrays) == 1:
+        return arrays[0]
     return np.concatenate(arrays) if arrays else empty

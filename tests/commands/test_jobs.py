@@ -50,4 +50,4 @@ def test_another_process_makes_the_same_file(job, tmp_path):
     (again,), other = pickle.loads(done.stdout)
     assert again == path
     assert path.read_bytes() == own
-    assert (other.scene_hash, other.seed, other.written) == (report.scene_hash, 3, [str(path)])
+    assert (other.scene_hash, other.seed, other.written) == (report.scene_hash, 3, (str(path),))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from illumcli.commands.report import Report
 from illumcli.commands.work import Work, prepared, unused_keys
 from illumcli.commands.write_view import write_view
 from illumcli.files.outputs import refresh
+from illumcli.geometry.repairs import Repairs
 from illumcli.progress import Progress, no_progress
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import without_objects
@@ -37,8 +39,7 @@ def render_scene(job: RenderJob, progress: Progress = no_progress) -> tuple[list
     """
     start = time.perf_counter()
     paths, report = render_prepared(prepared(job), progress)
-    report.total_seconds = time.perf_counter() - start
-    return paths, report
+    return paths, replace(report, total_seconds=time.perf_counter() - start)
 
 
 def render_prepared(work: Work, progress: Progress = no_progress) -> tuple[list[Path], Report]:
@@ -46,11 +47,12 @@ def render_prepared(work: Work, progress: Progress = no_progress) -> tuple[list[
     start = time.perf_counter()
     store = open_store() if work.job.options.cache else None
     report = rendered(work, Cache(store, MemoryCache()), progress)
-    report.warnings += unused_keys(work)
+    warnings = [*report.warnings, *unused_keys(work)]
     if store is not None:
         store.finish()
-        report.warnings += [store.warning] if store.warning else []
-    report.total_seconds = time.perf_counter() - start
+        warnings += [store.warning] if store.warning else []
+    seconds = time.perf_counter() - start
+    report = replace(report, warnings=tuple(warnings), total_seconds=seconds)
     return [target.path for target in work.targets], report
 
 
@@ -61,9 +63,7 @@ def rendered(
     start = time.perf_counter()
     options, outputs = work.job.options, work.outputs
     run = Run(RenderStats(), cache, options.threads or len(os.sched_getaffinity(0)))
-    report = Report(str(work.loaded.path), work.content, work.scene.seed, run.threads)
-    due = work.due()
-    report.kept = [str(target.path) for target in work.targets if target not in due]
+    path, due = str(work.loaded.path), work.due()
 
     # what the scene decides for all views: where cameras are, which objects matter
     graph = work.graph
@@ -72,9 +72,14 @@ def rendered(
         graph = place_cameras(graph, run) if options.strict else place_and_cull(graph, outputs, run)
         if cache.memory is not None:
             cache.memory.wanted = wanted_by(following, graph, run)
-    report.skipped = why_not(graph, outputs)
+    skipped = why_not(graph, outputs)
 
     # each view that any file is due of
+    reused: dict[str, Mapping[str, str]] = {}
+    repaired: Repairs = {}
+    standard_error: dict[str, dict[str, float]] = {}
+    warnings: Sequence[str] = ()
+    clamped = 0
     for view in graph.views:
         targets = [replace(target, view=view) for target in due if target.view.name == view.name]
         if not targets:
@@ -82,25 +87,37 @@ def rendered(
         began = time.perf_counter()
         plan = plan_view(graph, outputs, view, cache)
         run.stats.add({"artifacts": time.perf_counter() - began}, {})
-        report.reused[view.name] = dict(plan.lookup.reused)
-        report.skipped = why_not(graph, outputs, plan)
+        reused[view.name] = dict(plan.lookup.reused)
+        skipped = why_not(graph, outputs, plan)
         shared = run_once(plan, run)
-        report.repairs = {**report.repairs, **repairs(shared)}
+        repaired = {**repaired, **repairs(shared)}
         if "ray_origins" in plan.buffers:
-            report.warnings = disproportion_lines(work.loaded, graph, shared.get("object_bounds"))
+            warnings = disproportion_lines(work.loaded, graph, shared.get("object_bounds"))
         if options.strict:
-            refuse_repairs(report.scene, report.repairs)
-        clamped, sums = write_view(work, plan, shared, targets, run, progress)
-        report.clamped += clamped
+            refuse_repairs(path, repaired)
+        clamped_values, sums = write_view(work, plan, shared, targets, run, progress)
+        clamped += clamped_values
         if sums.pixels:
-            report.standard_error[view.name] = sums.as_data()
+            standard_error[view.name] = sums.as_data()
 
-    report.count(run.stats)
-    report.written = [str(target.path) for target in due]
-    for path in report.kept:
-        refresh(Path(path))
-    report.total_seconds = time.perf_counter() - start
-    return report
+    kept = [target.path for target in work.targets if target not in due]
+    for image in kept:
+        refresh(image)
+    report = Report(
+        path,
+        work.content,
+        work.scene.seed,
+        run.threads,
+        written=tuple(str(target.path) for target in due),
+        kept=tuple(map(str, kept)),
+        skipped=skipped,
+        repairs=repaired,
+        reused=reused,
+        warnings=tuple(warnings),
+        clamped=clamped,
+        standard_error=standard_error,
+    )
+    return replace(report.with_counts(run.stats), total_seconds=time.perf_counter() - start)
 
 
 def wanted_by(following: Work | None, graph: Graph, run: Run) -> frozenset[str]:

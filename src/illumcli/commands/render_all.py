@@ -88,7 +88,6 @@ def _rendered(work: Work, progress: Progress) -> Rendered:
         overrides = (*options.overrides, *choice.overrides)
         work = prepared(replace(job, options=replace(options, overrides=overrides)))
     paths, report = render_prepared(work, progress)
-    if choice is not None:
-        report.error = choice.as_data()
-    report.total_seconds = time.perf_counter() - start
+    error = choice.as_data() if choice is not None else {}
+    report = replace(report, error=error, total_seconds=time.perf_counter() - start)
     return Rendered(job.scene, paths, report, choice.overrides if choice else ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field, fields, replace
 from typing import Any
 
 from illumcli import __version__
@@ -11,51 +11,56 @@ from illumcli.files.reports import sealed_json
 from illumcli.geometry.repairs import Repairs
 from illumcli.memory import peak_memory
 from illumcli.rays.ray_loop import ray_loop_name
+from illumcli.records import Value
 from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.repairs import repairs_data
 from illumcli.versions import versions
 
 
-@dataclass(slots=True)
-class Report:
+class Report(Value):
     """What happened."""
 
     scene: str
     scene_hash: str
     seed: int
     threads: int
-    written: list[str] = field(default_factory=list)
-    kept: list[str] = field(default_factory=list)
-    skipped: dict[str, str] = field(default_factory=dict)
+    written: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    skipped: Mapping[str, str] = field(default_factory=dict)
     repairs: Repairs = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    rays: dict[str, int] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    rays: Mapping[str, int] = field(default_factory=dict)
     ray_loop: str | None = None
     """How rays were traced, if any were."""
-    saved: dict[str, int] = field(default_factory=dict)
+    saved: Mapping[str, int] = field(default_factory=dict)
     """Work that was avoided: points that a light does not reach (`incident`) or that are in its shadow
     (`unshadowed`), polygons of culled objects, samples that adaptive sampling left out."""
     refined: int = 0
     """Pixels that adaptive antialiasing gave all samples."""
-    reused: dict[str, dict[str, str]] = field(default_factory=dict)
+    reused: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """Camera -> buffer -> where it was loaded from: `memory` or `store`."""
-    warnings: list[str] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()
     clamped: int = 0
-    error: dict[str, float] = field(default_factory=dict)
+    error: Mapping[str, float] = field(default_factory=dict)
     """Asked for, reached, and by which counts, where an error was asked for."""
-    standard_error: dict[str, dict[str, float]] = field(default_factory=dict)
+    standard_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Camera -> mean and root mean square of its layer `error`, where that was rendered."""
     total_seconds: float = 0.0
 
-    def count(self, stats: RenderStats) -> None:
-        """Take over what was counted."""
-        self.seconds, self.rays, self.saved = dict(stats.seconds), dict(stats.rays), dict(stats.saved)
-        self.refined = stats.refined
-        self.ray_loop = ray_loop_name() if any(self.rays.values()) else None
+    def with_counts(self, stats: RenderStats) -> Report:
+        """The report with what was counted."""
+        return replace(
+            self,
+            seconds=dict(stats.seconds),
+            rays=dict(stats.rays),
+            saved=dict(stats.saved),
+            refined=stats.refined,
+            ray_loop=ray_loop_name() if any(stats.rays.values()) else None,
+        )
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it, with versions and the peak of memory."""
-        data = {name: getattr(self, name) for name in self.__slots__} | repairs_data(self.repairs)
+        data = {part.name: getattr(self, part.name) for part in fields(self)} | repairs_data(self.repairs)
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
 
 

@@ -66,6 +66,7 @@ def copy(tmp_path_factory) -> Path:
     """A copy of the package and the shared tests, with all examples in it."""
     folder = tmp_path_factory.mktemp("contributing")
     for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/visibility/test_samplers.py",
+                 "tests/geometry/shapes/test_all_shapes.py",
                  "tests/test_layers.py", "tests/render_graph/test_polygons.py", "tests/planned.py", "scenes",
                  "pyproject.toml"):  # fmt: skip
         place = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
@@ -103,6 +104,7 @@ def test_examples_are_clean(copy):
     ("tests", "names"),
     [
         ("tests/models", "LunarLambert or test_lunar_lambert"),
+        ("tests/geometry/shapes/test_all_shapes.py", "star"),
         ("tests/visibility/test_samplers.py", "r2"),
         ("tests/render_graph/test_polygons.py", "faceted"),
         ("tests/test_layers.py", "layer"),

@@ -21,10 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from ao_error import caster
-from illumcli.arrays import F, take_rows
+from illumcli.baking.sampling import RayCounts
+from illumcli.rays.ray_loop import NO_LIMIT
 from illumcli.rays.sampling import hashed, stream, unit_interval
+from illumcli.rays.single_ray_loop import SingleRayLoop
 from illumcli.visibility import obscurance
-from illumcli.visibility.hemisphere import directions, mirror_below, sample_frames
+from illumcli.visibility.hemisphere import hemisphere_rays
 
 REPEATS = 5
 SAMPLES = 256
@@ -35,7 +37,8 @@ def main() -> None:
     bake, lanes = caster(path)
     threads = len(os.sched_getaffinity(0))
     samples = np.full(len(lanes), SAMPLES)
-    scene = bake.occluders[0].tracer._scene
+    geometry = bake.points.geometry
+    scene = SingleRayLoop(geometry.vertices, geometry.triangles)
     order = bake.order[np.isin(bake.order, lanes)]
     keys = [stream(bake.seed, f"ao {what} 0") for what in ("turn", "phase", "share")]
     at_once = max(1, obscurance.RAYS_AT_ONCE // SAMPLES)
@@ -46,19 +49,13 @@ def main() -> None:
             part = order[first : first + at_once]
             draws = np.stack([unit_interval(hashed(key, bake.points.key[part])) for key in keys])
             over = bake.points.hemispheres(part, draws[2])
-            d = directions(
-                sample_frames(over.n, draws, bake.method.sampler), draws, SAMPLES, bake.method.sampler
-            )
-            mirror_below(d, over, SAMPLES, bake.method.sampler)
-            origins = take_rows(over.origins, over.origin_of_rays(SAMPLES))
-            calls.append((np.ascontiguousarray(origins), np.ascontiguousarray(d)))
+            rays = hemisphere_rays(over, draws[:2], SAMPLES, bake.method.sampler)
+            calls.append((np.ascontiguousarray(rays.starts()), np.ascontiguousarray(rays.directions())))
         return calls
 
     def replay(calls: list[tuple[np.ndarray, np.ndarray]]) -> float:
-        reach = np.full(max(len(d) for _, d in calls), 1e37, F)
-
         def one(call: tuple[np.ndarray, np.ndarray]) -> None:
-            scene.run(call[0], call[1], reach[: len(call[1])].copy(), query="OCCLUDED")
+            scene.occluded(*call, np.asarray(NO_LIMIT))
 
         start = time.perf_counter()
         with ThreadPoolExecutor(threads) as pool:
@@ -70,7 +67,7 @@ def main() -> None:
     spent = {"bake": np.inf, "replay": np.inf}
     for _ in range(REPEATS):
         for name, run in (
-            ("bake", lambda: bake.cast("values", lanes, samples, 0)),
+            ("bake", lambda: bake.estimate("values", RayCounts(lanes, samples), 0)),
             ("replay", lambda: replay(ready)),
         ):
             start, busy = time.perf_counter(), time.process_time()

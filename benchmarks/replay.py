@@ -1,9 +1,9 @@
 """What does a whole obscurance-bound render cost beside its own rays alone?
 
-Reference: the same rays, recorded where the renderer asks them, put to embreex's own scene in the same chunks
-by as many threads: no generation, no checks, no shading, no files. The rays are recorded a row of tiles at a
-time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2, ...: no hit
-that was kept is met again. The command sets OPENBLAS_NUM_THREADS itself.
+Reference: the same rays, recorded where the renderer traces them singly, put to embreex's own scene in the
+same chunks by as many threads: no generation, no checks, no shading, no files. The rays are recorded a row of
+tiles at a time and then replayed, nothing else running, so that they need not all fit in memory. Seeds 1, 2,
+...: no hit that was kept is met again. The command sets OPENBLAS_NUM_THREADS itself.
 
     OPENBLAS_NUM_THREADS=1 PYTHONPATH=src python benchmarks/replay.py [--small] [RAYS_PER_PIXEL]
 """
@@ -24,7 +24,7 @@ from _bench import REPEATS, SMALL, Took, ambient_scene, header, planned, ratio, 
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
 from illumcli.film.tiles import Tile
-from illumcli.rays.embree import Tracer
+from illumcli.rays.single_ray_loop import SingleRayLoop
 from illumcli.render_graph import execute
 from illumcli.scene.load import load
 
@@ -33,14 +33,15 @@ Question = tuple[str, np.ndarray, np.ndarray, Any]
 
 def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
     """The world and the questions of every band of tiles, as the renderer asks them."""
+    os.environ["ILLUM_PACKETS"] = "0"  # packets form their rays in C, where no record can be taken
     loaded = load(path)
     steps = planned(loaded, ["obscurance"])
     shared = execute.run_once(steps, execute.Run())
     asked: list[Question] = []
-    own = {name: getattr(Tracer, name) for name in ("closest", "distance", "occluded")}
+    own = {name: getattr(SingleRayLoop, name) for name in ("closest", "distance", "occluded")}
 
     def recording(name: str) -> Any:
-        def question(self: Tracer, origins: np.ndarray, directions: np.ndarray, *more: Any) -> Any:
+        def question(self: SingleRayLoop, origins: np.ndarray, directions: np.ndarray, *more: Any) -> Any:
             each = len(directions) // max(len(origins), 1)
             starts = np.repeat(np.array(origins, order="C"), each, axis=0)
             asked.append((name, starts, np.array(directions, order="C"), more))
@@ -50,7 +51,7 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
 
     try:
         for name in own:
-            setattr(Tracer, name, recording(name))
+            setattr(SingleRayLoop, name, recording(name))
         view = steps.view
         side = steps.tile_side(view)
         for y in range(0, view.height, side):
@@ -63,8 +64,9 @@ def recorded(path: Path, threads: int) -> Iterable[tuple[Any, list[Question]]]:
             yield shared["geometry"], asked[:]
             asked.clear()
     finally:
+        del os.environ["ILLUM_PACKETS"]
         for name, function in own.items():
-            setattr(Tracer, name, function)
+            setattr(SingleRayLoop, name, function)
 
 
 def scene_of(geometry: Any) -> Any:

@@ -7,12 +7,15 @@ import pytest
 
 from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import offset_ray_origins
+from illumcli.rays.packet_loop import missing
+from illumcli.rays.ray_loop import SWITCH
 from illumcli.schema.families import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.hemisphere import Hemispheres, turned_frame
 from illumcli.visibility.obscurance import Method
 from illumcli.visibility.obscurance import estimates as estimated
+from illumcli.visibility.samplers import SAMPLERS
 
 F = np.float32
 FLOOR = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -183,3 +186,38 @@ def test_tilted_points_do_not_depend_on_their_company():
     assert np.array_equal(
         whole[120:133], estimated(tracer, over, draws[:, 120:133], Method(64, Step(), 1.0)).w
     )
+
+
+@pytest.mark.skipif(missing() is not None, reason="needs the loop over packets")
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize("falloff", [Step(), Exponential(falloff="exponential", tau=2.0)])
+@pytest.mark.parametrize("faces", ["count", "ignore", "one_sided"])
+def test_packets_and_single_rays_estimate_the_same_bits(sampler, falloff, faces, monkeypatch):
+    vertices, triangles = sphere(12, 24)
+    walls = np.concatenate([vertices, 0.5 * vertices + [0, 0, 0.6]]).astype(F)
+    triangles = np.concatenate([triangles, triangles + len(vertices)])
+    a, b, c = (walls[triangles[:, k]].astype(float) for k in range(3))
+    ng = np.cross(b - a, c - a)
+    has_area = np.linalg.norm(ng, axis=1) > 1e-9
+    a, b, c, ng = (each[has_area] for each in (a, b, c, ng))
+    ng = (ng / np.linalg.norm(ng, axis=1, keepdims=True)).astype(F)
+    origins = offset_ray_origins((a + b + c) / 3, ng, np.full(len(a), F(1)))
+    rng = np.random.default_rng(6)
+    tilted = ng + rng.normal(size=ng.shape) * 0.3
+    tilted = (tilted / np.linalg.norm(tilted, axis=1, keepdims=True)).astype(F)
+    over = Hemispheres(tilted, origins, ng, rng.random(len(a)) < 0.1)
+    draws = rng.random((2, len(a)))
+    normals = np.zeros((len(triangles), 3), F)
+    normals[has_area] = np.where(rng.random((len(a), 1)) < 0.5, ng, -ng)  # of either side
+    method = Method(40, falloff, 1.0, sampler, faces, normals)
+    found = []
+    for switch in ("0", "1"):
+        monkeypatch.setenv(SWITCH, switch)
+        tracer = Tracer(walls, triangles)
+        found.append(estimated(tracer, over, draws, method, bent=True))
+        counted = estimated(tracer, over, draws, method, errors=False)
+        assert counted.w.tobytes() == found[0].w.tobytes()
+    single, packets = found
+    assert 0.1 < single.w.mean() < 0.99
+    for name in ("w", "neighbor_variation", "bent"):
+        assert getattr(single, name).tobytes() == getattr(packets, name).tobytes()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors
 from illumcli.errors import IllumError
 from illumcli.geometry.scene_geometry import SceneGeometry
+from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.rays.ray_loop import NO_LIMIT, Closest, ray_loop
 
 RETRY_TURN = F(2.0**-19)
@@ -89,6 +90,20 @@ class Tracer:
         out = self._loop.occluded(origins, directions, np.asarray(np.minimum(reach, NO_LIMIT)))
         return out if lowest > 0 else out & (reach > 0)
 
+    def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
+        """Fill `out`, whose `open` is 0, with the results of rays that are `limit` long; a miss is at inf."""
+        if self._stop is not None and self._stop.is_set():
+            raise Interrupted
+        for name, array in (("origins", rays.origins), ("directions", rays.frames.reshape(-1, 3))):
+            _check_finite(name, array)
+        if not limit > 0:
+            raise ValueError(f"the limit of rays must be above 0, is {limit}")
+        points, samples = rays.shape
+        self.rays += points * samples
+        self._loop.trace_patterns(rays, min(limit, float(NO_LIMIT)), out)
+        if out.distance is not None:
+            out.distance[out.distance > 1e30] = np.inf
+
     def _admit(self, origins: Vectors, directions: Vectors) -> None:
         """Check the rays as the loops do not, and count them."""
         if self._stop is not None and self._stop.is_set():
@@ -102,16 +117,20 @@ def _check(origins: Vectors, directions: Vectors) -> None:
     for name, array in (("origins", origins), ("directions", directions)):
         if array.ndim != 2 or array.shape[1] != 3 or array.dtype != F:
             raise ValueError(f"{name} must be (N, 3) float32, are {array.shape} {array.dtype}")
-        # a sum of squares is three times faster than testing each value, and finite only if all of them are
-        flat = array.ravel(order="K")
-        with np.errstate(invalid="ignore", over="ignore"):
-            total = flat @ flat
-        if not np.isfinite(total) and not np.isfinite(array).all():
-            bad = int(np.count_nonzero(~np.isfinite(array).all(axis=1)))
-            raise IllumError(f"{bad} of {len(array)} rays have {name} that are not finite")
+        _check_finite(name, array)
     starts, count = len(origins), len(directions)
     if starts != count and not (0 < starts < count and count % starts == 0):
         raise ValueError(f"{starts} origins for {count} directions")
+
+
+def _check_finite(name: str, array: Vectors) -> None:
+    # a sum of squares is three times faster than testing each value, and finite only if all of them are
+    flat = array.ravel(order="K")
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = flat @ flat
+    if not np.isfinite(total) and not np.isfinite(array).all():
+        bad = int(np.count_nonzero(~np.isfinite(array).all(axis=1)))
+        raise IllumError(f"{bad} of {len(array)} rays have {name} that are not finite")
 
 
 def tracer(geometry: SceneGeometry) -> Tracer:

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors
 from illumcli.rays.embree_library import NATIVE_PACKETS, ROBUST, Handle, build_tree, check, embree_library
-from illumcli.rays.ray_loop import NO_LIMIT, Closest, batches
+from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
+from illumcli.rays.ray_loop import NO_LIMIT, RAYS_PER_CALL, Closest, batches
 
-INTERFACE = 1
+INTERFACE = 2
 """Version of the interface of `packets.c`; a library with another one is not used."""
 LIBRARY = Path(__file__).with_name("_packets.dll" if os.name == "nt" else "_packets.so")
 
@@ -34,12 +35,18 @@ class _Vectors(ctypes.Structure):
     _fields_ = (("data", ctypes.c_void_p), ("stride", ctypes.c_int64), ("component", ctypes.c_int64))
 
 
-class _Rays(ctypes.Structure):
+class _Query(ctypes.Structure):
     _fields_ = (
-        ("query", ctypes.c_void_p),
+        ("function", ctypes.c_void_p),
         ("scene", ctypes.c_void_p),
         ("arguments", ctypes.c_void_p),
         ("width", ctypes.c_int64),
+    )
+
+
+class _Rays(ctypes.Structure):
+    _fields_ = (
+        ("query", _Query),
         ("first", ctypes.c_int64),
         ("end", ctypes.c_int64),
         ("rays_per_origin", ctypes.c_int64),
@@ -47,6 +54,33 @@ class _Rays(ctypes.Structure):
         ("directions", _Vectors),
         ("limits", ctypes.c_void_p),
         ("limit_stride", ctypes.c_int64),
+    )
+
+
+class _Patterns(ctypes.Structure):
+    _fields_ = (
+        ("query", _Query),
+        ("first", ctypes.c_int64),
+        ("end", ctypes.c_int64),
+        ("samples", ctypes.c_int64),
+        ("origins_per_point", ctypes.c_int64),
+        ("frames", ctypes.c_void_p),
+        ("patterns", ctypes.c_void_p),
+        ("row", ctypes.c_void_p),
+        ("number", ctypes.c_void_p),
+        ("origin_of_ray", ctypes.c_void_p),
+        ("first_mirrored", ctypes.c_void_p),
+        ("origins", _Vectors),
+        ("normals", _Vectors),
+        ("limit", ctypes.c_float),
+        ("least_height", ctypes.c_float),
+    )
+
+
+class _PatternResults(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("open", "is_open", "distance", "directions")),
+        ("stride", ctypes.c_int64),
     )
 
 
@@ -63,9 +97,11 @@ def packet_library() -> Any:
             return None
         library.illum_occluded.argtypes = [ctypes.POINTER(_Rays), ctypes.c_void_p]
         library.illum_closest.argtypes = [ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)]
+        library.illum_patterns.argtypes = [ctypes.POINTER(_Patterns), ctypes.POINTER(_PatternResults)]
     except (OSError, AttributeError):
         return None
-    library.illum_occluded.restype = library.illum_closest.restype = None
+    for function in (library.illum_occluded, library.illum_closest, library.illum_patterns):
+        function.restype = None
     return library
 
 
@@ -136,19 +172,56 @@ class PacketLoop:
             rays.first, rays.end = part.start, part.stop
             packet_library().illum_closest(rays, hits)
 
+    def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
+        points, samples = rays.shape
+        patterns = rays.patterns
+        compact = patterns.compact or CompactTable(patterns.table, np.arange(samples, dtype=np.int32))
+        arrays = {
+            "frames": rays.frames,
+            "patterns": compact.table,
+            "row": patterns.row,
+            "number": compact.number,
+            "origin_of_ray": rays.origin_of_ray.take(compact.number),
+            "first_mirrored": rays.first_mirrored,
+        }
+        structure = _Patterns(
+            query=self._query("rtcOccluded" if out.distance is None else "rtcIntersect"),
+            samples=samples,
+            origins_per_point=rays.origins_per_point,
+            origins=_vectors(rays.origins),
+            limit=limit,
+            least_height=rays.least_height,
+            **{name: _address_of(array) for name, array in arrays.items()},
+        )
+        if rays.normals is not None:
+            structure.normals = _vectors(rays.normals)
+        wanted = {name: _address_of(array) for name, array in vars(out).items() if array is not None}
+        results = _PatternResults(**wanted, stride=points * samples)
+        per_call = max(1, RAYS_PER_CALL // max(samples, 1))
+        for first in range(0, points, per_call):
+            structure.first, structure.end = first, min(first + per_call, points)
+            packet_library().illum_patterns(structure, results)
+
+    def _query(self, name: str) -> _Query:
+        return _Query(_address(f"{name}{self.width}"), self._scene, None, self.width)
+
     def _rays(self, query: str, origins: Vectors, directions: Vectors, limits: Floats) -> _Rays:
         """The rays as the C loop takes them; the arrays must outlive it."""
         count = len(directions)
         return _Rays(
-            query=_address(f"{query}{self.width}"),
-            scene=self._scene,
-            width=self.width,
+            query=self._query(query),
             rays_per_origin=count // max(len(origins), 1) or 1,
             origins=_vectors(origins),
             directions=_vectors(directions),
             limits=limits.ctypes.data,
             limit_stride=1 if limits.ndim else 0,
         )
+
+
+def _address_of(array: NDArray[Any]) -> int:
+    """Address of an array that the C loop reads or writes in C order."""
+    assert array.flags.c_contiguous
+    return array.ctypes.data
 
 
 def _vectors(array: Vectors) -> _Vectors:

@@ -17,7 +17,7 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
-enum { INTERFACE = 1 }; /* of packet_loop.py: both change together */
+enum { INTERFACE = 2 }; /* of packet_loop.py: both change together */
 enum { WIDEST = 16, ALIGNMENT = 64 };
 
 /* Rows of a packet, each of as many cells as the packet has rays; the hit begins with its normal. */
@@ -44,9 +44,13 @@ typedef struct {
 } Vectors;
 
 typedef struct {
-  Function query; /* a PacketQuery such as rtcOccluded16; for packets of 1 a SingleQuery */
+  Function function; /* a PacketQuery such as rtcOccluded16; for packets of 1 a SingleQuery */
   void *scene, *arguments;
   int64_t width;
+} Query;
+
+typedef struct {
+  Query query;
   int64_t first, end;       /* the rays of this call */
   int64_t rays_per_origin;  /* ray i starts at origin i / rays_per_origin */
   Vectors origins, directions;
@@ -59,6 +63,35 @@ typedef struct {
   float *u, *v, *distance;
 } Hits;
 
+/* Rays of points that each cast the directions of a pattern, turned into a frame of their own.
+
+   Ray i of point p has direction x tangent + y bitangent + z normal, (x, y, z) column i of pattern `row[p]`. It starts at
+   origin p * origins_per_point + origin_of_ray[i]. */
+typedef struct {
+  Query query;
+  int64_t first, end;            /* the points of this call */
+  int64_t samples;               /* rays of a point */
+  int64_t origins_per_point;
+  const float *frames;           /* (points, 3, 3): tangent, bitangent and normal of each */
+  const float *patterns;         /* (rows, 3, samples) */
+  const int32_t *row;            /* (points,) */
+  const int32_t *number;         /* (samples,) number of each column, by which results are ordered */
+  const int32_t *origin_of_ray;  /* (samples,) */
+  const int32_t *first_mirrored; /* (points,) rays with a lower number are known to point above */
+  Vectors origins, normals;      /* of the triangles that the rays leave; without data, no ray is mirrored */
+  float limit;
+  float least_height;            /* of a mirrored direction above its triangle */
+} Patterns;
+
+/* Results, of the rays of each point in the order of their numbers. */
+typedef struct {
+  int32_t *open;     /* (points,) rays that are not occluded */
+  uint8_t *is_open;  /* (points, samples), or NULL */
+  float *distance;   /* (points, samples) of the closest hit, or NULL */
+  float *directions; /* (3, points, samples), or NULL */
+  int64_t stride;    /* from one component of the directions to the next */
+} PatternResults;
+
 INLINE float component(const Vectors *of, int64_t i, int k) {
   return *(const float *)(of->data + i * of->stride + k * of->component);
 }
@@ -68,12 +101,11 @@ INLINE Cell *aligned(Cell *room) {
 }
 
 INLINE void prepare(Cell *packet, int64_t width) {
+  for (int64_t j = 0; j < ROWS * width; j++)
+    packet[j].bits = 0;
   for (int64_t j = 0; j < width; j++) {
-    packet[TNEAR * width + j].real = 0;
-    packet[TIME * width + j].real = 0;
     packet[MASK * width + j].bits = 0xffffffff;
     packet[ID * width + j].bits = (uint32_t)j;
-    packet[FLAGS * width + j].bits = 0;
   }
 }
 
@@ -96,11 +128,19 @@ INLINE void fill(const Rays *of, int64_t ray, int64_t width, Cell *packet, int32
   }
 }
 
-INLINE void ask(const Rays *of, int64_t width, const int32_t *valid, Cell *packet) {
+INLINE void clear_hits(Cell *packet, int64_t width) {
+  for (int64_t j = 0; j < width; j++) {
+    packet[PRIMITIVE * width + j].number = -1;
+    packet[GEOMETRY * width + j].number = -1;
+    packet[INSTANCE * width + j].number = -1;
+  }
+}
+
+INLINE void trace(const Query *query, int64_t width, const int32_t *valid, Cell *packet) {
   if (width == 1)
-    ((SingleQuery)of->query)(of->scene, packet, of->arguments);
+    ((SingleQuery)query->function)(query->scene, packet, query->arguments);
   else
-    ((PacketQuery)of->query)(valid, of->scene, packet, of->arguments);
+    ((PacketQuery)query->function)(valid, query->scene, packet, query->arguments);
 }
 
 INLINE void occluded(const Rays *of, int64_t width, uint8_t *out) {
@@ -110,7 +150,7 @@ INLINE void occluded(const Rays *of, int64_t width, uint8_t *out) {
   prepare(packet, width);
   for (int64_t ray = of->first; ray < of->end; ray += width) {
     fill(of, ray, width, packet, valid);
-    ask(of, width, valid, packet);
+    trace(&of->query, width, valid, packet);
     for (int64_t j = 0; j < width && ray + j < of->end; j++)
       out[ray + j] = packet[TFAR * width + j].real < 0; /* Embree sets it to -inf */
   }
@@ -123,12 +163,8 @@ INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
   prepare(packet, width);
   for (int64_t ray = of->first; ray < of->end; ray += width) {
     fill(of, ray, width, packet, valid);
-    for (int64_t j = 0; j < width; j++) {
-      packet[PRIMITIVE * width + j].number = -1;
-      packet[GEOMETRY * width + j].number = -1;
-      packet[INSTANCE * width + j].number = -1;
-    }
-    ask(of, width, valid, packet);
+    clear_hits(packet, width);
+    trace(&of->query, width, valid, packet);
     for (int64_t j = 0; j < width && ray + j < of->end; j++) {
       out->distance[ray + j] = packet[TFAR * width + j].real;
       if (!out->triangle)
@@ -140,11 +176,127 @@ INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
   }
 }
 
+/* Directions of `count` consecutive rays of a point into lanes of a packet; each product and sum is rounded. */
+INLINE void turn(const Patterns *of, int64_t point, int64_t ray, int64_t count, int64_t width, Cell *lanes) {
+  const float *x = of->patterns + of->row[point] * 3 * of->samples + ray;
+  const float *y = x + of->samples, *z = y + of->samples, *frame = of->frames + 9 * point;
+  for (int k = 0; k < 3; k++) {
+    float *__restrict d = &lanes[(DIR_X + k) * width].real;
+    float tangent = frame[k], bitangent = frame[3 + k], normal = frame[6 + k];
+    for (int64_t j = 0; j < count; j++)
+      d[j] = tangent * x[j] + bitangent * y[j] + normal * z[j];
+  }
+}
+
+/* Mirrors those directions that point below the triangle they leave. */
+INLINE void mirror(const Patterns *of, int64_t point, int64_t ray, int64_t count, int64_t width, Cell *lanes) {
+  Cell *x = lanes + DIR_X * width, *y = x + width, *z = y + width;
+  const int32_t *number = of->number + ray, first = of->first_mirrored[point];
+  int32_t candidates = 0;
+  for (int64_t j = 0; j < count; j++)
+    candidates += number[j] >= first;
+  if (!candidates)
+    return;
+  for (int64_t j = 0; j < count; j++) {
+    if (number[j] < first)
+      continue;
+    int64_t triangle = point * of->origins_per_point + of->origin_of_ray[ray + j];
+    float n_x = component(&of->normals, triangle, 0), n_y = component(&of->normals, triangle, 1);
+    float n_z = component(&of->normals, triangle, 2);
+    float height = x[j].real * n_x + y[j].real * n_y + z[j].real * n_z;
+    if (height < of->least_height) {
+      float up = (-height > of->least_height ? -height : of->least_height) - height;
+      x[j].real += up * n_x;
+      y[j].real += up * n_y;
+      z[j].real += up * n_z;
+    }
+  }
+}
+
+/* `count` consecutive rays of a point into lanes of a packet. */
+INLINE void place(const Patterns *of, int64_t point, int64_t ray, int64_t count, int64_t width, Cell *lanes) {
+  turn(of, point, ray, count, width, lanes);
+  if (of->normals.data && of->first_mirrored[point] < of->samples)
+    mirror(of, point, ray, count, width, lanes);
+  for (int k = 0; k < 3; k++) {
+    float *__restrict o = &lanes[(ORG_X + k) * width].real;
+    int64_t first = point * of->origins_per_point;
+    float only = component(&of->origins, first, k);
+    for (int64_t j = 0; j < count; j++)
+      o[j] = of->origins_per_point == 1 ? only : component(&of->origins, first + of->origin_of_ray[ray + j], k);
+  }
+  for (int64_t j = 0; j < count; j++)
+    lanes[TFAR * width + j].real = of->limit;
+}
+
+/* The results of `count` consecutive rays of a point. */
+INLINE void record(const Patterns *of, int64_t point, int64_t ray, int64_t count, int64_t width, const Cell *lanes,
+                   const PatternResults *out) {
+  const Cell *far = lanes + TFAR * width;
+  int32_t open = 0;
+  for (int64_t j = 0; j < count; j++)
+    open += far[j].number >= 0; /* Embree sets the limit of occluded rays to -inf */
+  out->open[point] += open;
+  if (!out->is_open && !out->distance && !out->directions)
+    return;
+  for (int64_t j = 0; j < count; j++) {
+    int64_t i = point * of->samples + of->number[ray + j];
+    if (out->is_open)
+      out->is_open[i] = far[j].number >= 0;
+    if (out->distance)
+      out->distance[i] = far[j].real;
+    for (int64_t k = 0; k < 3 && out->directions; k++)
+      out->directions[k * out->stride + i] = lanes[(DIR_X + k) * width + j].real;
+  }
+}
+
+INLINE void patterns(const Patterns *of, int64_t width, const PatternResults *out) {
+  Cell room[ROWS * WIDEST + ALIGNMENT], *packet = aligned(room);
+  Cell mask[2 * WIDEST + ALIGNMENT];
+  int32_t *valid = &aligned(mask)->number;
+  prepare(packet, width);
+  for (int64_t j = 0; j < width; j++)
+    valid[j] = -1;
+  int64_t point = of->first, ray = 0;
+  while (point < of->end) {
+    /* Fill the packet from one point after the other. */
+    int64_t first_point = point, first_ray = ray, filled = 0;
+    while (filled < width && point < of->end) {
+      int64_t count = width - filled < of->samples - ray ? width - filled : of->samples - ray;
+      if (count == width) /* a constant, for the compiler */
+        place(of, point, ray, width, width, packet);
+      else
+        place(of, point, ray, count, width, packet + filled);
+      filled += count;
+      ray += count;
+      if (ray == of->samples) {
+        ray = 0;
+        point++;
+      }
+    }
+    for (int64_t j = filled; j < width; j++)
+      valid[j] = 0;
+    if (out->distance)
+      clear_hits(packet, width);
+    trace(&of->query, width, valid, packet);
+
+    /* Hand the results to the same points. */
+    for (int64_t p = first_point, r = first_ray, done = 0; done < filled; p++, r = 0) {
+      int64_t count = filled - done < of->samples - r ? filled - done : of->samples - r;
+      if (count == width)
+        record(of, p, r, width, width, packet, out);
+      else
+        record(of, p, r, count, width, packet + done, out);
+      done += count;
+    }
+  }
+}
+
 EXPORT int32_t illum_interface(void) { return INTERFACE; }
 
 /* 1 for each ray with a triangle between its origin and its limit. */
 EXPORT void illum_occluded(const Rays *of, uint8_t *out) {
-  switch (of->width) {
+  switch (of->query.width) {
     case 16: occluded(of, 16, out); break;
     case 8: occluded(of, 8, out); break;
     case 4: occluded(of, 4, out); break;
@@ -154,10 +306,20 @@ EXPORT void illum_occluded(const Rays *of, uint8_t *out) {
 
 /* The closest hit of each ray. */
 EXPORT void illum_closest(const Rays *of, const Hits *out) {
-  switch (of->width) {
+  switch (of->query.width) {
     case 16: closest(of, 16, out); break;
     case 8: closest(of, 8, out); break;
     case 4: closest(of, 4, out); break;
     default: closest(of, 1, out);
+  }
+}
+
+/* Traces patterns of rays about points, and counts those that are open. */
+EXPORT void illum_patterns(const Patterns *of, const PatternResults *out) {
+  switch (of->query.width) {
+    case 16: patterns(of, 16, out); break;
+    case 8: patterns(of, 8, out); break;
+    case 4: patterns(of, 4, out); break;
+    default: patterns(of, 1, out);
   }
 }

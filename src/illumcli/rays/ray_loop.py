@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
+from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.records import Record
 
 RAYS_PER_CALL = 1 << 18
@@ -56,6 +57,10 @@ class RayLoop(Protocol):
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:
         """(N,) distance of each ray's closest hit."""
+        ...
+
+    def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
+        """Fill `out`, whose `open` is 0, with the results of rays that are `limit` long."""
         ...
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F
+from illumcli.geometry.spatial_order import compact
+from illumcli.rays.pattern_rays import CompactTable
 
 U32 = np.uint32
 GOLDEN = 0.6180339887498949
@@ -120,6 +122,16 @@ def spiral_table(count: int) -> NDArray[np.float32]:
     table = np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r2)], axis=1).astype(F)
     table.setflags(write=False)
     return table
+
+
+@lru_cache(maxsize=64)
+def compact_spiral_table(count: int) -> CompactTable:
+    """`spiral_table` with rays of like directions beside each other, in boxes of 8, 16, 32, ... rays."""
+    table = spiral_table(count)
+    order = compact(table[len(table) // 2].T)
+    compact_table = np.ascontiguousarray(table[:, :, order])
+    compact_table.setflags(write=False)
+    return CompactTable(compact_table, order.astype(np.int32))
 
 
 def dither(

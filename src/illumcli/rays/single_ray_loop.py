@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors, repeat_rows
 from illumcli.errors import IllumError
 from illumcli.rays.embree_upload import upload
+from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.rays.ray_loop import Closest, batches
+
+PATTERN_RAYS_PER_CALL = 1 << 17
+"""Rays whose directions are formed at once: a tenth faster than 2^14, with two threads a fifth, although the
+arrays of 2^14 rays would fit into the processor's cache. In long batches Embree's own data stay there."""
 
 
 class SingleRayLoop:
@@ -65,6 +70,23 @@ class SingleRayLoop:
         for part in batches(len(directions)):
             out[part] = self._scene.run(origins[part], directions[part], query="DISTANCE")
         return out
+
+    def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
+        points, samples = rays.shape
+        per_call = max(1, PATTERN_RAYS_PER_CALL // max(samples, 1))
+        for first in range(0, points, per_call):
+            part = slice(first, min(first + per_call, points))
+            batch = rays.between(part.start, part.stop)
+            starts, d = batch.starts(), batch.directions()
+            if out.directions is not None:
+                out.directions[:, part] = d.T.reshape(3, -1, samples)
+            if out.distance is not None:
+                out.distance[part] = self.distance(starts, d).reshape(-1, samples)
+                continue
+            is_open = ~self.occluded(starts, d, np.asarray(limit, F)).reshape(-1, samples)
+            out.open[part] = is_open.astype(F) @ np.ones(samples, F)  # exact below 2^24
+            if out.is_open is not None:
+                out.is_open[part] = is_open
 
 
 class _Errors(logging.Handler):

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, dot, repeat_rows, take_rows
 from illumcli.rays.interaction import SurfaceInteraction
+from illumcli.rays.pattern_rays import PatternRays
 from illumcli.records import Record
-from illumcli.visibility.samplers import GRAZING, SAMPLERS
+from illumcli.visibility.samplers import GRAZING, SAMPLERS, patterns
 
 ORIGIN_STRIDE = 13
 """Step from the origin of one ray to that of the next. With 16 origins, neither neighbours on a spiral nor
@@ -55,12 +56,6 @@ class Hemispheres(Record):
             None if self.known_open is None else self.known_open[points],
         )
 
-    def origin_of_rays(self, samples: int) -> NDArray[np.int64]:
-        """(M * samples,) index of every ray's origin, one point after the other."""
-        each = self.origins_per_point
-        of_point = np.arange(samples) * ORIGIN_STRIDE % each
-        return (np.arange(len(self.n))[:, None] * each + of_point).ravel()
-
 
 def hemispheres(
     interaction: SurfaceInteraction,
@@ -105,49 +100,27 @@ def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:
     return frame
 
 
-def directions(
-    frames: NDArray[np.float32], draws: NDArray[np.float64], samples: int, sampler: str
-) -> Vectors:
-    """(M * samples, 3) float32 directions of the rays, one point after the other.
+def hemisphere_rays(over: Hemispheres, draws: NDArray[np.float64], samples: int, sampler: str) -> PatternRays:
+    """`samples` rays of each point over its hemisphere; none points below the triangle that it leaves.
 
     Parameters
     ----------
-    frames : (M, 3, 3) float32
-        From `sample_frames`.
+    draws : (2, M) float64
+        In [0, 1): rotation and phase of each point's pattern, or its scramble.
     """
-    out = np.empty((3, len(frames), samples), F)
-    # one long row per component: three times as fast as rows of three numbers, one per ray
-    pattern = SAMPLERS[sampler].directions(draws, samples)
-    np.matmul(frames.transpose(0, 2, 1), pattern, out=out.transpose(1, 0, 2))
-    return out.reshape(3, -1).T
-
-
-def mirror_below(d: Vectors, over: Hemispheres, samples: int, sampler: str) -> None:
-    """Mirror those of the rays `d` that point below the plane of the triangle they leave, in place.
-
-    Parameters
-    ----------
-    d : (M * samples, 3) float32
-        The rays of each point, one point after the other.
-    over : Hemispheres
-        With the triangles' normals.
-    """
-    # Only the last rays of a pattern can point below the plane: spirals are ordered from the axis outwards.
-    assert over.ng is not None
-    each = over.origins_per_point
-    axes = over.n if each == 1 else repeat_rows(over.n, each)
-    cosine = dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1)
-    number = SAMPLERS[sampler].max_below(cosine, samples)
-    point = np.repeat(np.arange(len(over.n)), number)
-    from_last = np.arange(len(point)) - np.repeat(np.cumsum(number) - number, number)
-    ray = point * samples + samples - 1 - from_last
-    origin = point if each == 1 else point * each + (samples - 1 - from_last) * ORIGIN_STRIDE % each
-
-    # Reflect the candidates that do point below.
-    normal = take_rows(over.ng, origin)
-    height = dot(take_rows(d, ray), normal)
-    below = np.flatnonzero(height < GRAZING)
-    height, ray = height[below], ray[below]
-    up = np.maximum(-height, F(GRAZING)) - height
-    for component, along in zip(d.T, take_rows(normal, below).T, strict=True):
-        component[ray] += up * along
+    # Only the last rays of a pattern can point below a triangle: spirals are ordered from the axis outwards.
+    first_mirrored = np.full(len(over.n), samples, np.int32)
+    if over.ng is not None:
+        each = over.origins_per_point
+        axes = over.n if each == 1 else repeat_rows(over.n, each)
+        cosine = dot(axes, over.ng).reshape(-1, each).min(axis=1, initial=1)
+        first_mirrored -= SAMPLERS[sampler].max_below(cosine, samples)
+    return PatternRays(
+        patterns(SAMPLERS[sampler], draws, samples),
+        sample_frames(over.n, draws, sampler),
+        over.origins,
+        (np.arange(samples) * ORIGIN_STRIDE % max(over.origins_per_point, 1)).astype(np.int32),
+        over.ng,
+        first_mirrored,
+        GRAZING,
+    )

@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, repeat_rows, take_rows
 from illumcli.rays.embree import Tracer
+from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 from illumcli.visibility.falloffs._base import Falloff
-from illumcli.visibility.hemisphere import Hemispheres, directions, mirror_below, sample_frames
+from illumcli.visibility.hemisphere import Hemispheres, hemisphere_rays
 from illumcli.visibility.obscurance_error import Estimates
 from illumcli.visibility.samplers import SAMPLERS
 
 Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
-RAYS_AT_ONCE = 1 << 17
-"""Rays per batch: a tenth faster than 2^14, with two threads a fifth, although the arrays of 2^14 rays would
-fit into the processor's cache. In long batches Embree's own data stay there."""
+RAYS_AT_ONCE = 1 << 19
+"""Rays per batch: so many that the arrays with a row per point cost little beside them."""
 MAX_BACK_FACES = 64
 """Back faces in a row that a ray passes through if back faces are ignored."""
 
@@ -138,62 +138,65 @@ def estimates(
         unknown = np.flatnonzero(~over.known_open)
     casting = count if unknown is None else len(unknown)
 
-    frames = sample_frames(over.n, draws, method.sampler)
     at_once = max(1, RAYS_AT_ONCE // method.samples)
     for first in range(0, casting, at_once):
-        # Directions and origins of the rays of a batch of points.
+        # Trace the rays of a batch of points, and average over each point's rays.
         end = min(first + at_once, casting)
         points = slice(first, end) if unknown is None else unknown[first:end]
         batch = over.between(first, end) if unknown is None else over.take(unknown[first:end])
-        d = directions(frames[points], draws[:, points], method.samples, method.sampler)
-        if batch.ng is not None:
-            mirror_below(d, batch, method.samples, method.sampler)
-        origins = batch.origins
-        if batch.origins_per_point > 1:
-            origins = take_rows(origins, batch.origin_of_rays(method.samples))
-
-        # Trace them, and average over each point's rays.
-        mu = occluder_weights(tracer, origins, d, method).reshape(-1, method.samples)
-        w[points] = mean_openness(mu)
-        if errors:
-            variation[points] = SAMPLERS[method.sampler].variation(mu)
-        if bent_normal is not None:
-            bent_normal[points] = mean_open_direction(d, mu)
+        rays = hemisphere_rays(batch, draws[:, points], method.samples, method.sampler)
+        traced = openness(tracer, rays, method, each_ray=errors or bent, directions=bent)
+        w[points] = traced.w
+        if errors and traced.mu is not None:
+            variation[points] = SAMPLERS[method.sampler].variation(traced.mu)
+        if bent_normal is not None and traced.mu is not None and traced.directions is not None:
+            bent_normal[points] = mean_open_direction(traced.directions, traced.mu)
     return Estimates(w, variation, bent_normal, count - casting)
 
 
-def mean_openness(mu: NDArray[Any]) -> NDArray[np.float32]:
-    """(M,) float32 mean of each row of mu, (M, samples); exactly 1 where no ray is occluded."""
-    if mu.dtype == np.bool_:  # exact: counts are below 2^24
-        return (mu.astype(F) @ np.ones(mu.shape[1], F)) / F(mu.shape[1])
-    return mu.mean(axis=1, dtype=np.float64).astype(F)
+class Openness(Record):
+    """What the rays of M points, N each, say about them."""
+
+    w: NDArray[np.float32]  # (M,) mean of mu; exactly 1 where no ray is occluded
+    mu: NDArray[Any] | None = None  # (M, N) bool for a step falloff, float32 for others
+    directions: NDArray[np.float32] | None = None  # (3, M, N)
 
 
-def mean_open_direction(d: Vectors, mu: NDArray[Any]) -> NDArray[np.float32]:
-    """(M, 3) float32 unit mean of the directions, (M * samples, 3), weighted by mu, (M, samples); 0 if all
-    are occluded."""
-    per_point = d.T.reshape(3, len(mu), -1).transpose(1, 0, 2)
-    total = np.matmul(per_point, mu.astype(F)[:, :, None])[:, :, 0]
-    size = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.divide(total, size, out=np.zeros_like(total), where=size > 0)
+def openness(tracer: Tracer, rays: PatternRays, method: Method, each_ray: bool, directions: bool) -> Openness:
+    """Trace the rays of some points.
 
-
-def occluder_weights(tracer: Tracer, origins: Vectors, d: Vectors, method: Method) -> NDArray[Any]:
-    """(M * samples,) mu along each direction: bool for a step falloff, float32 for others.
-
-    `origins` has a row for every ray, or one for all rays of each point.
+    Parameters
+    ----------
+    each_ray, directions : bool
+        What is needed beside w: mu and the direction of each ray. Otherwise it may be None.
     """
     reach = method.falloff.reach(method.radius)
+    wanted = ["directions"] if directions else []
     if method.any_hit:
-        return ~tracer.occluded(origins, d, np.inf if reach == np.inf else reach / method.radius)
+        found = PatternResults.room(rays.shape, *wanted, *(["is_open"] if each_ray else []))
+        tracer.trace_patterns(rays, np.inf if reach == np.inf else reach / method.radius, found)
+        w = found.open.astype(F) / F(method.samples)  # exact: counts are below 2^24
+        return Openness(w, found.is_open, found.directions)
+
+    # The weight of what each ray meets first.
     if method.faces == "count":
-        distance = tracer.distance(origins, d)
+        found = PatternResults.room(rays.shape, *wanted, "distance")
+        tracer.trace_patterns(rays, np.inf, found)
+        distance, d = found.distance, found.directions
     else:
-        rays_per_origin = len(d) // max(len(origins), 1)
-        per_ray = origins if rays_per_origin == 1 else repeat_rows(origins, rays_per_origin)
-        distance = front_face_distance(tracer, per_ray, d, method)
-    weight = method.falloff.weight(distance.astype(np.float64) * method.radius, reach, method.radius)
-    return weight > 0.5 if method.falloff.step else weight.astype(F)
+        d = rays.directions()
+        distance, d = front_face_distance(tracer, rays.starts(), d, method), d.T.reshape(3, *rays.shape)
+    assert distance is not None
+    weight = method.falloff.weight(distance.ravel() * np.float64(method.radius), reach, method.radius)
+    mu = (weight > 0.5 if method.falloff.step else weight.astype(F)).reshape(rays.shape)
+    return Openness(mu.mean(axis=1, dtype=np.float64).astype(F), mu, d)
+
+
+def mean_open_direction(directions: NDArray[np.float32], mu: NDArray[Any]) -> NDArray[np.float32]:
+    """(M, 3) float32 unit mean of (3, M, N) directions, weighted by mu, (M, N); 0 if all are occluded."""
+    total = np.matmul(directions.transpose(1, 0, 2), mu.astype(F)[:, :, None])[:, :, 0]
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, size, out=np.zeros_like(total), where=size > 0)
 
 
 def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> Floats:
@@ -202,8 +205,10 @@ def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) 
     `one_sided`: a ray that first meets the back of a face ends there, unoccluded. `ignore`: it goes on.
     """
     assert method.triangle_normals is not None
-    distance = np.full(len(o), np.inf, F)
-    ray, start, travelled = np.arange(len(o)), o, np.zeros(len(o), F)
+    rays_per_origin = len(d) // max(len(o), 1)
+    start = o if rays_per_origin <= 1 else repeat_rows(o, rays_per_origin)
+    distance = np.full(len(d), np.inf, F)
+    ray, travelled = np.arange(len(d)), np.zeros(len(d), F)
     for _ in range(MAX_BACK_FACES):
         # Rays that hit a front face, or nothing, are done.
         closest = tracer.closest(start, d[ray])

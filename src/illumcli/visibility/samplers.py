@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats
-from illumcli.rays.sampling import hashed, owen, sobol, spiral_table, unit_interval
+from illumcli.rays.pattern_rays import Patterns
+from illumcli.rays.sampling import compact_spiral_table, hashed, owen, sobol, spiral_table, unit_interval
 from illumcli.records import Value
 
 Directions: TypeAlias = Callable[[NDArray[np.float64], int], NDArray[np.float32]]
@@ -39,6 +40,8 @@ class Sampler(Value):
     unit directions about the third axis. The draws phase or scramble each point's pattern."""
     text: str
     """What it is, for the schema."""
+    shared: Callable[[NDArray[np.float64], int], Patterns] | None = None
+    """The same directions as rows of a table, where points share them."""
     turned: bool = False
     """True if the pattern is also turned about the normal, by the first draw."""
     variation: Callable[[NDArray[Any]], NDArray[np.float32]] = variance
@@ -80,8 +83,15 @@ def random_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.fl
 
 def spiral_directions(draws: NDArray[np.float64], samples: int) -> NDArray[np.float32]:
     """Golden-angle spirals, phased by the second draw."""
+    patterns = spiral_patterns(draws, samples)
+    return patterns.table.take(patterns.row, axis=0)
+
+
+def spiral_patterns(draws: NDArray[np.float64], samples: int) -> Patterns:
+    """The same as rows of a table that all points share."""
     table = spiral_table(samples)
-    return table.take((draws[1] * len(table)).astype(np.int32), axis=0)
+    row = (draws[1] * len(table)).astype(np.int32)
+    return Patterns(table, row, compact_spiral_table(samples))
 
 
 def spiral_variation(mu: NDArray[Any]) -> NDArray[np.float32]:
@@ -123,11 +133,20 @@ def spiral_max_below(cosine: Floats, samples: int) -> NDArray[np.int64]:
     return np.clip(np.ceil(sine2 * samples - least), 0, samples).astype(np.int64)
 
 
+def patterns(sampler: Sampler, draws: NDArray[np.float64], samples: int) -> Patterns:
+    """The pattern of each of M points, from (2, M) draws."""
+    if sampler.shared is not None:
+        return sampler.shared(draws, samples)
+    directions = sampler.directions(draws, samples)
+    return Patterns(directions, np.arange(len(directions), dtype=np.int32))
+
+
 SAMPLERS: Mapping[str, Sampler] = {
     "spiral": Sampler(
         "o",
         spiral_directions,
         "golden-angle spirals, the least error on visibility.",
+        shared=spiral_patterns,
         turned=True,
         variation=spiral_variation,
         max_below=spiral_max_below,

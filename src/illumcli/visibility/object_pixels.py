@@ -13,9 +13,6 @@ from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.records import Record
 from illumcli.visibility.hemisphere import Hemispheres
 
-FEATURES = 6
-"""Three components of the normal, three of the position."""
-
 
 class ObjectPixels(Record):
     """What G pairs of a pixel and an object in it know of w: means over the samples of the pair.
@@ -28,7 +25,7 @@ class ObjectPixels(Record):
     object: NDArray[np.int32]  # (G,)
     share: NDArray[np.float32]  # (G,) of the pixel's samples, in (0, 1]
     hidden: NDArray[np.float32]  # (G,) 1 - w
-    features: NDArray[np.float32]  # (FEATURES, G) the normal that w is taken about, the position [radii]
+    features: NDArray[np.float32]  # (6, G) the normal that w is taken about, the position [radii]
 
     def take(self, index: NDArray[np.intp]) -> ObjectPixels:
         """These pairs, in this order."""

@@ -28,7 +28,17 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats
 from illumcli.film.tiles import Tile
 from illumcli.records import Record
-from illumcli.visibility.object_pixels import FEATURES, ObjectPixels, SampledPixels, is_within
+from illumcli.visibility.object_pixels import ObjectPixels, SampledPixels, is_within
+from illumcli.visibility.regression import (
+    COUNT,
+    FEATURE,
+    FEATURES,
+    MOMENTS,
+    PAIR,
+    Planes,
+    moments,
+    polynomials,
+)
 
 CELL = 2
 """Pixels along a cell, which begin at even columns and rows of the film."""
@@ -41,23 +51,8 @@ MARGIN = CELL * (RADII[-1] + SMOOTHING + 1)
 COHERENCE = 0.75
 """Variance of a fit over what independent errors of the same size would give it: the rays of neighbouring
 pixels are dithered, so that their errors cancel in part."""
-NORMAL_RIDGE, POSITION_RIDGE = 1e-6, 1e-6
-"""Added to the variances of normals, and of positions as a share of their sum: what does not vary within a
-window gets no slope."""
-ROUNDING = 4e-14
-"""Least ridge of positions: the variance of their rounding [radii^2]."""
 CELLS_AT_ONCE = 1 << 13
 """Cells that are solved together: their moments fit into a core's own cache."""
-
-PAIRS = tuple((i, j) for i in range(FEATURES) for j in range(i + 1))
-# moments of a cell: number of pixels, features, their products, hidden share, with features, its square
-_COUNT, _FEATURE, _PAIR = 0, 1, 1 + FEATURES
-_HIDDEN = _PAIR + len(PAIRS)
-_HIDDEN_FEATURE = _HIDDEN + 1
-_SQUARE = _HIDDEN_FEATURE + FEATURES
-MOMENTS = _SQUARE + 1
-
-Planes = NDArray[np.float64]  # (planes, rows, columns)
 
 
 def reconstructed_obscurance(
@@ -166,16 +161,7 @@ def _sheets(pixels: ObjectPixels, wanted: NDArray[np.bool_]) -> Iterator[Sheet]:
 def cell_moments(share: NDArray[np.float64], hidden: NDArray[np.float64], features: Planes) -> Planes:
     """(36, rows / 2, columns / 2) moments of the pixels of each cell, weighted by their `share`."""
     out = np.empty((MOMENTS, share.shape[0] // CELL, share.shape[1] // CELL))
-    weighted = share * hidden
-    _sum_cells(share, out[_COUNT])
-    _sum_cells(weighted, out[_HIDDEN])
-    _sum_cells(weighted * hidden, out[_SQUARE])
-    for i, feature in enumerate(features):
-        own = share * feature
-        _sum_cells(own, out[_FEATURE + i])
-        _sum_cells(weighted * feature, out[_HIDDEN_FEATURE + i])
-        for j in range(i + 1):
-            _sum_cells(own * features[j], out[_PAIR + PAIRS.index((i, j))])
+    moments(share, hidden, features, _sum_cells, out)
     return out
 
 
@@ -232,59 +218,15 @@ class Fit(Record):
 
 def fit(cells: Planes, radius: int) -> Fit:
     """The polynomial of least squares in the window around each cell."""
-    sums = window_sums(cells, radius)
-    count = np.maximum(sums[_COUNT], 1e-30)
-    sums /= count
-    means, hidden = sums[_FEATURE:_PAIR], sums[_HIDDEN]
-
-    # Covariances of the features, with a ridge, and with the hidden share.
-    covariance = {(i, j): sums[_PAIR + number] - means[i] * means[j] for number, (i, j) in enumerate(PAIRS)}
-    ridge = POSITION_RIDGE * (covariance[3, 3] + covariance[4, 4] + covariance[5, 5]) + ROUNDING
-    for i in range(FEATURES):
-        covariance[i, i] += NORMAL_RIDGE if i < 3 else ridge
-    right = [sums[_HIDDEN_FEATURE + i] - means[i] * hidden for i in range(FEATURES)]
-
-    # Covariance = L D L^T; the slopes by substitution, forth and back.
-    lower: dict[tuple[int, int], NDArray[np.float64]] = {}
-    inverse: list[NDArray[np.float64]] = []
-    for j in range(FEATURES):
-        scaled = [lower[j, k] / inverse[k] for k in range(j)]
-        pivot = covariance[j, j]
-        for k in range(j):
-            pivot = pivot - lower[j, k] * scaled[k]
-        inverse.append(1 / np.maximum(pivot, ROUNDING))
-        for i in range(j + 1, FEATURES):
-            value = covariance[i, j]
-            for k in range(j):
-                value = value - lower[i, k] * scaled[k]
-            lower[i, j] = value * inverse[j]
-    forth = _substituted(lower, right)
-    slopes = [forth[i] * inverse[i] for i in range(FEATURES)]
-    explained = sum(forth[i] * slopes[i] for i in range(FEATURES))
-    for i in reversed(range(FEATURES)):
-        for k in range(i + 1, FEATURES):
-            slopes[i] = slopes[i] - lower[k, i] * slopes[k]
-    constant = hidden - sum(slope * mean for slope, mean in zip(slopes, means, strict=True))
-
-    # Value and leverage at the cell's own mean features.
-    own = cells[_FEATURE:_PAIR] / np.maximum(cells[_COUNT], 1e-30)
-    away = own - means
-    at_cell = hidden + sum(slope * step for slope, step in zip(slopes, away, strict=True))
-    steps = _substituted(lower, list(away))
-    leverage = (1 + sum(step * step * scale for step, scale in zip(steps, inverse, strict=True))) / count
-    square = np.maximum(sums[_SQUARE] - hidden * hidden - explained, 0) * count
-    return Fit(np.stack([constant, *slopes]), at_cell, leverage, square, count)
-
-
-def _substituted(
-    lower: dict[tuple[int, int], NDArray[np.float64]], right: list[NDArray[np.float64]]
-) -> list[NDArray[np.float64]]:
-    """L^-1 right."""
-    out = list(right)
-    for i in range(FEATURES):
-        for k in range(i):
-            out[i] = out[i] - lower[i, k] * out[k]
-    return out
+    of_windows = polynomials(window_sums(cells, radius))
+    own = cells[FEATURE:PAIR] / np.maximum(cells[COUNT], 1e-30)
+    return Fit(
+        of_windows.coefficients(),
+        of_windows.at(own),
+        of_windows.leverage(own),
+        of_windows.square,
+        of_windows.count,
+    )
 
 
 def cell_polynomials(cells: Planes) -> Planes:
@@ -295,7 +237,7 @@ def cell_polynomials(cells: Planes) -> Planes:
     what noise alone would give it, plus the variance of F_k: an unbiased estimate but for the bias of F_1.
     The variance of a pixel is that of the residuals in the smallest window.
     """
-    held = cells[_COUNT]
+    held = cells[COUNT]
     smallest = fit(cells, RADII[0])
     freedom = np.maximum(smallest.count - (1 + FEATURES), 0.05 * smallest.count)
     squares, freedoms, weight = window_sums(

@@ -50,7 +50,11 @@ def scene(tmp_path):
             "50000 variants (1, 2, 3, ",
         ),
         ({"texts": ["film.exposure=1,2,1"]}, "{film.exposure}.png", "2 variants (1, 3); they are equal;"),
-        ({"texts": ["film.exposure=0:1:90000"]}, "{scene}.png", "put a field that tells them apart"),
+        (
+            {"texts": ["film.exposure=0:1:90000"]},
+            "{scene}.png",
+            "add a field to the pattern in which they differ",
+        ),
         ({"texts": ["seed=1,2"], "frames": "0:9"}, "{seed}.png", "the name of 10 variants"),
         ({"texts": ["seed=1,2"]}, "{layer}.png", "the name of 2 variants"),
     ],

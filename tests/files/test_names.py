@@ -130,13 +130,13 @@ def test_unique_names_pass():
     [["a.exr", "a.exr"], ["./a.exr", "a.exr"], ["x//\u00e9.exr", "x/e\u0301.exr"]],
 )
 def test_names_that_some_file_system_takes_for_one_collide(names):
-    with pytest.raises(InputError, match=r"the name of 2 images \(1, 2\); put a field"):
+    with pytest.raises(InputError, match=r"the name of 2 images \(1, 2\); add a field"):
         check_unique(names)
 
 
 def test_names_that_differ_in_case_alone_collide():
     """Two cameras, or two lights, may be called so; files may not."""
-    with pytest.raises(InputError, match=r"A\.png: the name of 2 images \(1, 2\); they differ in case alone"):
+    with pytest.raises(InputError, match=r"A\.png: the name of 2 images \(1, 2\); they differ only in case"):
         check_unique(["A.png", "a.png"])
 
 

@@ -172,12 +172,12 @@ def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:
 
 def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
     """Write the files, except those that hold the same bytes already; these are returned."""
-    from illumcli.files.atomic import refusals, write_bytes
+    from illumcli.files.atomic import os_errors_as_output_errors, write_bytes
 
     # Refuse all before any is written.
     kept = []
     for path, data in files.items():
-        with refusals(str(path)):
+        with os_errors_as_output_errors(str(path)):
             if not force and path.is_file():
                 if path.read_bytes() != data:
                     fact = "a different file is there; use --force to replace it, or another name"

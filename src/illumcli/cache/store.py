@@ -290,14 +290,14 @@ class Writer:
         self.bytes = self._start + end
         self._failed = False
         self._number = 0
-        atomic.remember(part)
+        atomic.track(part)
         handle = atomic.created(part)
         try:
             self._file = os.fdopen(handle, "r+b", buffering=0)
         except OSError:
             os.close(handle)
             part.unlink()
-            atomic.forget(part)
+            atomic.untrack(part)
             raise
         self._try(lambda: self._file.truncate(self._start + end))
 
@@ -325,7 +325,7 @@ class Writer:
             self._file.close()
         with suppress(OSError):
             self._part.unlink()
-        atomic.forget(self._part)
+        atomic.untrack(self._part)
 
     def _finish(self) -> None:
         head = _HEADER.pack(_MAGIC, _FORMAT, len(self._text), self._end, b"")[:24]
@@ -336,7 +336,7 @@ class Writer:
         os.replace(self._part, self._target)  # not forced to disk: whoever reads it checks it
         with suppress(OSError):
             self._file.close()
-        atomic.forget(self._part)
+        atomic.untrack(self._part)
         self._store.saved(self._target.stem, self.bytes)
 
     def _try(self, action: Callable[[], object]) -> None:

@@ -1,10 +1,11 @@
-"""Files that appear whole or not at all: written beside their place, forced to disk, renamed.
+"""Atomic files: written under a temporary name in the same folder, flushed to disk, then renamed.
 
-A rename is atomic; the two fsyncs keep a crash of the machine from leaving an empty file behind the new name
+A rename is atomic; the two fsyncs prevent a system crash from leaving an empty file under the new name
 (Pillai et al. 2014, All file systems are not created equal, OSDI '14).
 
-Every file in the making is created anew, never opened through a link, and locked (flock) by the process that
-writes it. A file without a lock was left behind: process numbers and host names tell nothing to a container.
+Every temporary file is created exclusively, never opened through a link, and locked (flock) by the process
+that writes it. A temporary file without a lock is abandoned; process numbers and host names would not tell
+this between containers.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from typing import Self
 
 from illumcli.errors import OutputError
 
-_WAYS_OUT = {
+_ADVICE = {
     errno.ENOSPC: "free some space or choose another folder",
     errno.EDQUOT: "free some of your quota or choose another folder",
     errno.EFBIG: "raise the limit on file sizes (ulimit -f)",
@@ -40,53 +41,53 @@ _LEFT_OVER = re.compile(r"\.[0-9a-f]{12}\.[0-9a-f]{8}\.part")
 _OPEN_FILES = "/proc/self/fd"
 
 _open: set[Path] = set()
-"""Parts of this process that are neither committed nor discarded."""
+"""Temporary files of this process that are neither committed nor discarded."""
 _tidied: set[Path] = set()
-"""Folders in which this process has looked for parts that others left behind."""
+"""Folders in which this process has removed abandoned temporary files."""
 
 
 class AtomicFile:
-    """A file in the making: write to `path`, then `commit`; `discard` leaves no trace.
+    """A file that appears complete or not at all: write to `path`, then `commit` or `discard`.
 
     As a context manager it commits at the end of the block and discards on any exception, interrupts
-    included. Missing parent folders are made. Parts that killed processes left behind in the folder are
-    removed first. The mode of a file that is replaced is kept, and meanwhile nobody else reads the part.
+    included. Missing parent folders are created, and abandoned temporary files in the folder are removed
+    first. If a file is replaced, its mode is kept, and until then nobody else can read the temporary file.
 
     Raises
     ------
     OutputError
-        What the operating system refuses, here, in `commit`, or in the block while it writes to `path`.
+        An error of the operating system, here, in `commit`, or in the block while it writes to `path`.
     """
 
     path: Path
-    """To write to: the empty file itself, whatever others do to its name, where the system can say so."""
+    """The temporary file to write to; where the system allows, through its descriptor and not its name."""
     target: Path
-    """What the file will be called."""
+    """The final name."""
 
     def __init__(self, target: str | os.PathLike[str]) -> None:
         self._named = os.fspath(target)
-        self.target = Path(os.path.realpath(target))  # a link stays a link, the file behind it is replaced
+        self.target = Path(os.path.realpath(target))  # a link is kept, and the file that it leads to replaced
         folder = self.target.parent
-        with refusals(self._named):
+        with os_errors_as_output_errors(self._named):
             self._replaced = _status(self.target)
             if self._replaced is not None and not stat.S_ISREG(self._replaced.st_mode):
                 raise OutputError(f"{self._named}: is a folder or a device; give the name of a file")
             folder.mkdir(parents=True, exist_ok=True)
             remove_left_over(folder)
             self._name = beside(self.target, f"{os.urandom(4).hex()}.part")
-            _open.add(self._name)  # before it exists: a signal may end this call anywhere
+            _open.add(self._name)  # before it exists, because a signal may interrupt at any point
             try:
                 self._handle = created(self._name, 0o666 if self._replaced is None else 0o600)
             except OSError:
                 _open.discard(self._name)
                 raise
-        itself = Path(_OPEN_FILES, str(self._handle))
-        self.path = itself if itself.exists() else self._name
+        by_descriptor = Path(_OPEN_FILES, str(self._handle))
+        self.path = by_descriptor if by_descriptor.exists() else self._name
 
     def commit(self) -> None:
-        """Force the part to disk and give it its name; the name's old file is replaced."""
+        """Flush the temporary file to disk and rename it, which replaces an old file of this name."""
         try:
-            with refusals(self._named):
+            with os_errors_as_output_errors(self._named):
                 os.fsync(self._handle)
                 if self._replaced is not None:
                     _make_like(self._handle, self._replaced)
@@ -100,11 +101,11 @@ class AtomicFile:
             self.discard()
             raise
         self._unlock()
-        with suppress(OSError):  # some file systems cannot; the file is whole by now
+        with suppress(OSError):  # not supported by all file systems; the file itself is complete
             _force(self.target.parent)
 
     def discard(self) -> None:
-        """Remove what was written so far; nothing happens after `commit`."""
+        """Remove the temporary file; no effect after `commit`."""
         if self._name in _open:
             with suppress(OSError):
                 self._name.unlink(missing_ok=True)
@@ -113,7 +114,7 @@ class AtomicFile:
 
     def _unlock(self) -> None:
         if self._handle >= 0:
-            with suppress(OSError):  # what matters is on disk
+            with suppress(OSError):  # the data are on disk already
                 os.close(self._handle)
             self._handle = -1
 
@@ -131,49 +132,49 @@ class AtomicFile:
             raise refused(self._named, error) from error
 
 
-def remember(part: Path) -> None:
-    """Count a file that others make among the parts of this process."""
-    _open.add(part)
+def track(path: Path) -> None:
+    """Add a file to the temporary files of this process, which `discard_open` removes."""
+    _open.add(path)
 
 
-def forget(part: Path) -> None:
-    """It is a part no more."""
-    _open.discard(part)
+def untrack(path: Path) -> None:
+    """Stop tracking a temporary file."""
+    _open.discard(path)
 
 
 def discard_open() -> None:
-    """Remove every part of this process; for the end by a signal, which may fall between any two steps."""
+    """Remove all temporary files of this process; called if a signal ends it, at any point."""
     for path in tuple(_open):
         with suppress(OSError):
             path.unlink(missing_ok=True)
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write `data` to `path`, whole or not at all."""
+    """Write `data` to `path` atomically."""
     with AtomicFile(path) as part:
         part.path.write_bytes(data)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` as UTF-8 to `path`, line ends as they are, whole or not at all."""
+    """Write `text` as UTF-8 to `path` atomically, without changing line ends."""
     write_bytes(path, text.encode())
 
 
 def refused(place: str, error: OSError) -> OutputError:
-    """The operating system's refusal to write `place`: fact and way out."""
-    advice = _WAYS_OUT.get(error.errno or 0, "choose another place for the output")
+    """The error for an output that the operating system cannot write, with advice."""
+    advice = _ADVICE.get(error.errno or 0, "choose another place for the output")
     return OutputError(f"{place}: cannot be written: {error.strerror or error}; {advice}")
 
 
 def is_full(error: OutputError) -> bool:
-    """Was there no space left for what could not be written?"""
+    """True if the output could not be written because no space was left."""
     cause = error.__cause__
     return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 @contextmanager
-def refusals(place: str) -> Iterator[None]:
-    """What the operating system refuses within is an OutputError about `place`."""
+def os_errors_as_output_errors(place: str) -> Iterator[None]:
+    """Turn an OSError in the block into an OutputError about the output `place`."""
     try:
         yield
     except OSError as error:
@@ -181,10 +182,10 @@ def refusals(place: str) -> Iterator[None]:
 
 
 def claim(path: Path, create: bool = True) -> int | None:
-    """A descriptor for reading and writing of a file that is this process's until it closes it.
+    """Open and lock a file; the descriptor, for reading and writing, holds the lock until it is closed.
 
-    The file is locked, and no name is followed. None where the name is a link or no plain file, where the
-    file has another name, another owner or others who may write it, and where it is held already.
+    Links are not followed. None if the path is a link or not a regular file, if the file has another name or
+    owner or is writable by others, or if it is locked already.
 
     Raises
     ------
@@ -221,24 +222,24 @@ def claim(path: Path, create: bool = True) -> int | None:
 
 
 def created(path: Path, mode: int = 0o600) -> int:
-    """A descriptor for reading and writing of a new file, locked until it is closed where there are locks.
+    """Create and lock a new file; the descriptor, for reading and writing, holds the lock until it is closed.
 
     Raises
     ------
     OSError
-        FileExistsError where there is something of this name, a link included.
+        FileExistsError if the name exists, even as a link.
     """
     while True:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
         if _lock(handle) != errno.EWOULDBLOCK and os.fstat(handle).st_nlink:
             return handle
-        # another process took it for abandoned before it was locked
+        # another process considered it abandoned before it was locked
         os.close(handle)
         path.unlink(missing_ok=True)
 
 
 def remove_abandoned(path: Path) -> None:
-    """Remove a file whose lock nobody holds, if it is this user's."""
+    """Remove a file of this user that no process has locked."""
     with suppress(OSError):
         handle = claim(path, create=False)
         if handle is not None:
@@ -248,8 +249,8 @@ def remove_abandoned(path: Path) -> None:
 
 
 def _lock(handle: int) -> int:
-    """Lock an open file until it is closed; 0, or the number of what stands against it: EWOULDBLOCK where
-    another holds it, others where the file system has no locks."""
+    """Lock an open file until it is closed; returns 0 or an error number: EWOULDBLOCK if another process
+    holds the lock, others if the file system has no locks."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -258,7 +259,7 @@ def _lock(handle: int) -> int:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """What the system says of a file; None where there is none."""
+    """The status of a file; None if it does not exist."""
     try:
         return path.stat()
     except FileNotFoundError:
@@ -266,14 +267,14 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def _make_like(handle: int, old: os.stat_result) -> None:
-    """Give an open file the owner, where that is allowed, and the mode of the one that it replaces."""
+    """Give an open file the mode and, if permitted, the owner of the file that it replaces."""
     mode = stat.S_IMODE(old.st_mode) & 0o777
     new = os.fstat(handle)
     if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
         try:
             os.fchown(handle, old.st_uid, old.st_gid)
         except OSError:
-            mode &= 0o707 if new.st_gid != old.st_gid else 0o777  # its group is another
+            mode &= 0o707 if new.st_gid != old.st_gid else 0o777  # no rights for a different group
     with suppress(PermissionError):  # some file systems have no modes
         os.fchmod(handle, mode)
 
@@ -287,7 +288,7 @@ def _force(path: Path) -> None:
 
 
 def beside(target: Path, ending: str) -> Path:
-    """A hidden file that belongs to `target`, beside it, by a name that is short whatever `target`'s is."""
+    """A hidden file in the folder of `target`, with a name derived from `target`'s that is always short."""
     return target.with_name(f".{_digest(os.fsencode(target.name))}.{ending}")
 
 
@@ -296,7 +297,7 @@ def _digest(name: bytes) -> str:
 
 
 def remove_left_over(folder: Path) -> None:
-    """Remove the parts in a folder that no process holds; once per folder and process.
+    """Remove the abandoned temporary files in a folder; once per folder and process.
 
     Raises
     ------

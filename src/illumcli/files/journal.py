@@ -18,7 +18,7 @@ from pathlib import Path
 from illumcli.files.atomic import beside, claim
 
 ABANDONED = 7 * 86400
-"""Seconds after which nobody is expected to take a computation up again."""
+"""Age after which a computation is not expected to be resumed [seconds]."""
 SUFFIX = "unfinished"
 
 _MAGIC = b"illum journal 1\n"
@@ -27,23 +27,23 @@ _NAME = re.compile(r"\.[0-9a-f]{12}\.[0-9a-f]+\." + SUFFIX)
 
 
 class Journal:
-    """The journal of one computation, held until it is closed or removed.
+    """The journal of one computation, locked until it is closed or removed.
 
-    A file that cannot be had costs time only: nothing is kept then, and `refusal` says why.
+    If the file cannot be opened, nothing is stored, and `refusal` is the reason.
 
     Parameters
     ----------
     path
-        As `place` gives it.
+        From `place`.
     identity : str
-        Hexadecimal digits that stand for all that the values depend on.
+        Hash of everything that the values depend on, in hexadecimal digits.
     """
 
     def __init__(self, path: Path, identity: str) -> None:
         self.refusal: str | None = None
         self._path = path
         self._identity = identity.encode()
-        self._places: dict[bytes, tuple[int, int]] = {}  # of the values of each key
+        self._places: dict[bytes, tuple[int, int]] = {}  # key -> offset and size of its values
         self._end = 0
         self._handle: int | None = None
         try:
@@ -57,7 +57,7 @@ class Journal:
             self._give_up(error)
 
     def find(self, key: bytes) -> bytes | None:
-        """The values under a key of 16 bytes; None where there are none that are sound."""
+        """The values of a key of 16 bytes; None if there are none, or they are damaged."""
         if self._handle is None or key not in self._places:
             return None
         at, size = self._places[key]
@@ -69,7 +69,7 @@ class Journal:
         return values if len(values) == size and check == self._check(key, values) else None
 
     def append(self, key: bytes, values: bytes) -> None:
-        """Keep the values under a key of 16 bytes."""
+        """Store the values of a key of 16 bytes."""
         if self._handle is None:
             return
         record = memoryview(_RECORD.pack(len(values), key, self._check(key, values)) + values)
@@ -82,14 +82,14 @@ class Journal:
             self._give_up(error)
 
     def remove(self) -> None:
-        """The computation is done, or its journal is in the way."""
+        """Delete the journal, because the computation is finished or the journal unusable."""
         if self._handle is not None:
             with suppress(OSError):
                 os.unlink(self._path)
             self.close()
 
     def close(self) -> None:
-        """Let another run take the computation up, where there is anything of it."""
+        """Unlock the journal for another run; an empty one is deleted."""
         if self._handle is not None:
             if not self._places:
                 with suppress(OSError):
@@ -98,7 +98,7 @@ class Journal:
             self._handle = None
 
     def _read(self, handle: int) -> None:
-        """Find the records; a file of another computation, and a record cut short, are cut off."""
+        """Index the records; delete those of another computation, and an incomplete last one."""
         head = _MAGIC + self._identity + b"\n"
         size = os.fstat(handle).st_size
         if os.pread(handle, len(head), 0) != head:
@@ -129,12 +129,12 @@ class Journal:
 
 
 def place(output: Path, content: str) -> Path:
-    """Where the journal of a computation stands: hidden, beside its output, named by both."""
+    """The path of a computation's journal: a hidden file in its output's folder, named by both."""
     return beside(output, f"{content}.{SUFFIX}")
 
 
 def tidy(output: Path) -> None:
-    """Remove the journals of `output`, which is written, and abandoned ones beside it; none that is held."""
+    """Remove the unlocked journals of `output`, which is complete, and abandoned ones in its folder."""
     prefix = beside(output, "").name
     try:
         journals = [each for each in os.scandir(output.parent) if _NAME.fullmatch(each.name)]

@@ -1,4 +1,4 @@
-"""Files by where they are, whatever else is known of them."""
+"""The protocol of objects that have a path."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Located(Protocol):
-    """Anything with a path, as the cache's fingerprint of a file has one."""
+    """Anything with a path, such as the cache's fingerprint of a file."""
 
     @property
     def path(self) -> Path: ...

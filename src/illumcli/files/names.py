@@ -1,4 +1,4 @@
-"""The file names of an image set: a pattern with fields, filled in, safe and unique."""
+"""File names from patterns with fields: expanded, safe for file systems, and unique."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from illumcli.errors import InputError
 from illumcli.schema.messages import suggestion
 
 LONGEST = 4096
-"""Letters of a path; no system takes more."""
+"""Letters of a path that no system exceeds."""
 _FIELD = re.compile(r"\{\{|\}\}|\{(?P<name>[^{}:]*)(?::(?P<form>[^{}]*))?\}|[{}]")
 
 
 def expand(pattern: str, values: Mapping[str, Any]) -> str:
     """`pattern` with every field replaced by its value.
 
-    A field is `{name}` or `{name:form}`; the name may hold dots, as `{materials.clay.sigma}`, the form is
-    that of Python's `format`. Numbers sort as names only when they are padded: `{frame:04d}` makes 0007 of 7
-    and keeps 10,000 frames in order. `{{` and `}}` stand for braces. Folders come from the pattern alone: in
-    a value all but letters, digits and ``. _ + -`` becomes `_`, and so do dots at its ends.
+    A field is `{name}` or `{name:form}`. The name may contain dots, as in `{materials.clay.sigma}`; the form
+    is that of Python's `format`. File names with numbers sort correctly only if these are padded:
+    `{frame:04d}` turns 7 into 0007 and keeps 10,000 frames in order. `{{` and `}}` are literal braces. Values
+    never add folders: all characters except letters, digits and ``. _ + -`` become `_`, and so do dots at
+    their ends.
 
     Raises
     ------
     InputError
-        All that is wrong with the pattern: a lone brace, a field that is not among `values`, a form that does
-        not suit its value or is wider than any name, a NUL.
+        All faults of the pattern: a lone brace, a field that is not among `values`, a form that does not fit
+        its value or is wider than any name, a NUL.
     """
     problems: list[str] = []
     shown = pattern if len(pattern) <= 80 else f"{pattern[:80]}..."
@@ -69,30 +70,33 @@ def fields(pattern: str) -> set[str]:
 
 
 def check_unique(names: Sequence[str]) -> None:
-    """Nothing, where each of `names` is a file of its own, on file systems that ignore case too.
+    """Raise InputError if two of `names` are the same file, possibly on file systems that ignore case.
 
     Raises
     ------
     InputError
-        Every name that several images would have, and which images, counted from 1.
+        Every such name, and the numbers of its images from 1.
     """
+    # Images by name, ignoring case.
     images = defaultdict(list)
     normal = [unicodedata.normalize("NFC", os.path.normpath(name)) for name in names]
     for number, name in enumerate(normal, 1):
         images[name.casefold()].append(number)
+
+    # A message for each name of several images.
     problems = []
     for same in images.values():
         if len(same) > 1:
             listed = ", ".join(map(str, same[:5])) + (", ..." if len(same) > 5 else "")
-            advice = "put a field that tells them apart into the pattern"
+            advice = "add a field to the pattern in which they differ"
             if len({normal[number - 1] for number in same}) == len(same):
-                advice = "they differ in case alone, which some file systems ignore; rename one of them"
+                advice = "they differ only in case, which some file systems ignore; rename one of them"
             problems.append(f"{names[same[0] - 1]}: the name of {len(same)} images ({listed}); {advice}")
     if problems:
         raise InputError(problems)
 
 
 def _safe(text: str) -> str:
-    """`text` as part of a file name on any system; never empty, never a folder."""
+    """`text` as a part of a file name that is valid on any system; never empty, never a folder."""
     text = re.sub(r"[^\w.+-]+", "_", text)
     return re.sub(r"^\.+|\.+$", "_", text) or "_"

@@ -1,8 +1,8 @@
-"""Outputs before any work is done: may they be written, and do they already hold what would be written?
+"""Checks outputs before any work is done: whether they can be written, and whether they are up to date.
 
-Every file names the content it was made from, or those that its rows and entries were made from. Equal
-contents give equal files, except for what differs from run to run: seconds, rays, what was reused. So an
-output is known to be up to date without making it again. It also holds its own hash, which shows damage.
+Every file holds a hash of everything that its content depends on, or one for each row or entry. Equal hashes
+mean equal files, except for values that differ from run to run: seconds, rays, what was reused. So an output
+is known to be up to date without computing it again. A file also holds its own hash, which detects damage.
 """
 
 from __future__ import annotations
@@ -15,44 +15,43 @@ from pathlib import Path
 from typing import TypeAlias
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import refusals, remove_left_over
+from illumcli.files.atomic import os_errors_as_output_errors, remove_left_over
 from illumcli.files.seal import is_sealed
 
 INCOMPLETE = "incomplete"
-"""The content of what failed: a file that holds it may be replaced."""
+"""The content hash of rows and entries that failed; a file that contains it may be replaced."""
 _OR_CHANGED = ", or one that was changed or damaged since it was written"
 ContentReader: TypeAlias = Callable[[Path], Sequence[str]]
-"""Reads the contents that a file names; `report_contents`, `image_contents`, `baked_contents`. It may
-raise InputError, KeyError, TypeError or ValueError for files of others."""
+"""Reads the content hashes of a file: `report_contents`, `image_contents`, `baked_contents`. It may raise
+InputError, KeyError, TypeError or ValueError for files of other programs."""
 
 
 def refuse_suffix(path: Path, what: str, *suffixes: str) -> None:
-    """Raise InputError where `path` ends in none of `suffixes`, as `what` is written."""
+    """Raise InputError if `path` has none of the suffixes that `what` can be written with."""
     if path.suffix.lower() not in suffixes:
         raise InputError(f"{path}: {what} is written as {' or '.join(suffixes)}; let the name end so")
 
 
 def is_kept(path: Path, contents: Sequence[str], read: ContentReader, force: bool = False) -> bool:
-    """True where the file is there already with the same contents, so that it is as good as written.
+    """True if the file exists with the same contents and need not be written.
 
-    Otherwise it is going to be written, and whatever prevents that is raised now. Nothing is created, not
-    even a folder.
+    Otherwise an error is raised if the file cannot be written. Nothing is created, not even a folder.
 
     Parameters
     ----------
     contents
-        What the file will be made from.
+        The content hashes of the file to be written.
     read
-        Of the file's format.
+        Reader of the hashes for the file's format.
     force
-        Replace a file that is different.
+        Replace a different file.
 
     Raises
     ------
     OutputError
-        A different file stands there and `force` is not given; the file cannot be written.
+        A different file exists and `force` is False; the file cannot be written.
     """
-    with refusals(str(path)):
+    with os_errors_as_output_errors(str(path)):
         if path.is_file() and not force:
             stored = _readable_contents(path, read)
             if stored == list(contents) and INCOMPLETE not in stored:
@@ -68,7 +67,7 @@ def is_kept(path: Path, contents: Sequence[str], read: ContentReader, force: boo
 
 
 def _readable_contents(path: Path, read: ContentReader) -> list[str]:
-    """The same as `stored_contents`; OutputError where the file there cannot be read."""
+    """`stored_contents`, with an OutputError if the file cannot be read."""
     try:
         return list(stored_contents(path, read))
     except OSError as error:
@@ -77,25 +76,25 @@ def _readable_contents(path: Path, read: ContentReader) -> list[str]:
 
 
 def refuse_empty_link(path: Path) -> None:
-    """Raise OutputError where `path` is a link to nothing: what others plant shall make no file elsewhere."""
+    """Raise OutputError if `path` is a link to nothing: others could use it to create files elsewhere."""
     if path.is_symlink() and not path.exists():
         raise OutputError(f"{path}: is a link to nothing; use --force to write there, or another name")
 
 
 def is_complete(path: Path, read: ContentReader) -> bool:
-    """Is there a file in which nothing is missing?"""
+    """True if the file exists and no row or entry of it failed."""
     return path.is_file() and INCOMPLETE not in stored_contents(path, read)
 
 
 def refresh(path: Path) -> None:
-    """Date a file that is kept now, so that `make` takes it for made, and tidy up after killed runs."""
-    with suppress(OSError):  # somebody else's file, a folder that is read-only
+    """Set the time of a kept file to now, so that `make` considers it built; tidy up after killed runs."""
+    with suppress(OSError):  # the file of another user, a read-only folder
         os.utime(path)
         remove_left_over(Path(os.path.realpath(path)).parent)
 
 
 def stored_contents(path: Path, read: ContentReader) -> Sequence[str]:
-    """The contents that a file of ours names; empty where it is none, or is not what was written."""
+    """The content hashes of a file; empty if it was written by another program, or changed since."""
     try:
         return read(path) if is_sealed(path) else []
     except (InputError, KeyError, TypeError, ValueError):
@@ -103,8 +102,8 @@ def stored_contents(path: Path, read: ContentReader) -> Sequence[str]:
 
 
 def refuse_unwritable(path: Path) -> None:
-    """Raise OutputError where the operating system will not have `path` written; nothing is made."""
-    with refusals(str(path)):
+    """Raise OutputError if the operating system does not allow `path` to be written; nothing is created."""
+    with os_errors_as_output_errors(str(path)):
         target = Path(os.path.realpath(path))
         if os.path.lexists(target) and not target.is_file():
             raise OutputError(f"{path}: is a folder or a device; give the name of a file")

@@ -1,4 +1,4 @@
-"""Tables as CSV, reports as JSON, drawings as SVG: sealed with their own hash, and the contents they name."""
+"""Tables as CSV, reports as JSON, drawings as SVG: sealed with a hash; reading their content hashes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
 
 
 def sealed_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table as CSV, a row at least; its last column, `body`, holds the hash in the first row."""
-    import csv  # a render without a table does not wait for it
+    """A table as CSV with at least one row; its last column, `body`, has the hash in the first row."""
+    import csv  # imported here, because few renders write a table
 
     out = io.StringIO()
     lines = csv.writer(out, lineterminator="\n")
@@ -27,19 +27,19 @@ def sealed_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def sealed_json(entries: Sequence[Mapping[str, object]], in_a_list: bool) -> str:
-    """Entries, one at least, as JSON; the first holds the hash as its `body`. A lone one may have no list."""
+    """Entries, at least one, as JSON; the first has the hash as its `body`. A single one needs no list."""
     first, *others = entries
     body = {**first, "body": BLANK}
     return sealed_text(json.dumps([body, *others] if in_a_list else body, indent=1) + "\n")
 
 
 def report_contents(path: Path) -> list[str]:
-    """The contents that a table, report or drawing names, row by row or entry by entry.
+    """The content hashes of a table, report or drawing, row by row or entry by entry.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        A file of others.
+        A file of another program.
     """
     match path.suffix.lower():
         case ".csv":

@@ -1,10 +1,9 @@
 """Files that contain their own hash, so that later damage and edits are detected.
 
-The metadata of every image and baked mesh hold `illum-body:` and 32 hexadecimal digits, the BLAKE2b-128 of
-the file with these digits 0. A PNG, whose pieces have checksums, has them in its last piece before the end,
-over all that stands before. A table has them in the column `body` of its first row, a report in the key
-`body` of its first entry, an SVG among its keywords. The hash finds accidents and edits; whoever wants to can
-compute it anew.
+The metadata of every image and baked mesh contain `illum-body:` and 32 hexadecimal digits, the BLAKE2b-128 of
+the file with these digits set to 0. A PNG, whose chunks have checksums, has them in its last chunk before the
+end, as the hash of everything before. A table has them in the column `body` of its first row, a report in the
+key `body` of its first entry, an SVG among its keywords. The hash detects accidents and edits, not forgery.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ from typing import BinaryIO
 
 _MARK, _DIGITS = b"illum-body:", 32
 BLANK = (_MARK + b"0" * _DIGITS).decode()
-"""What the metadata hold until the file is sealed."""
+"""The placeholder in the metadata until the file is sealed."""
 _SEAL = re.compile(re.escape(_MARK) + rb"([0-9a-f]{%d})" % _DIGITS)
 _PIECE = 1 << 20
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
 def seal(path: Path) -> None:
-    """Put the hash in the place of `BLANK`, which the file holds.
+    """Replace `BLANK` in the file by the file's hash.
 
     Raises
     ------
@@ -41,7 +40,7 @@ def seal(path: Path) -> None:
 
 
 def is_sealed(path: Path) -> bool:
-    """Does the file hold what was written, to the last bit?
+    """True if the file is unchanged since it was sealed.
 
     Raises
     ------
@@ -60,13 +59,13 @@ def is_sealed(path: Path) -> bool:
 
 
 def sealed_text(text: str) -> str:
-    """`text`, to be written as UTF-8, with its hash in the place of `BLANK`, which it holds."""
+    """`text`, to be written as UTF-8, with its hash in place of `BLANK`."""
     digest = hashlib.blake2b(text.encode(), digest_size=_DIGITS // 2)
     return text.replace(BLANK, _MARK.decode() + digest.hexdigest(), 1)
 
 
 def sealed_png(data: bytes) -> bytes:
-    """A whole PNG with its hash."""
+    """A complete PNG with its hash."""
     data = data.removesuffix(_PNG_END)
     digest = png_digest()
     digest.update(data)
@@ -74,18 +73,19 @@ def sealed_png(data: bytes) -> bytes:
 
 
 def png_digest() -> hashlib.blake2b:
-    """Takes the bytes of a PNG up to its end."""
+    """The hash object for the bytes of a PNG up to its end."""
     return hashlib.blake2b(digest_size=_DIGITS // 2)
 
 
 def png_end(digest: hashlib.blake2b) -> bytes:
-    """The last two pieces of a PNG, with the hash of all before them."""
+    """The last two chunks of a PNG, with the hash of everything before them."""
     chunk = b"tEXtillum:body\0" + _MARK + digest.hexdigest().encode()
     return struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk)) + _PNG_END
 
 
 def _body(file: BinaryIO) -> tuple[int, bytes, bytes] | None:
-    """Where the digits stand, the digits, and the hash of the file with these 0; None where it has none."""
+    """The offset of the digits, the digits, and the hash of the file with the digits set to 0; None if the
+    file has no digits."""
     digest = hashlib.blake2b(digest_size=_DIGITS // 2)
     mark: tuple[int, bytes] | None = None
     at, rest = 0, b""
@@ -95,7 +95,7 @@ def _body(file: BinaryIO) -> tuple[int, bytes, bytes] | None:
         if seal is not None:
             mark = at + seal.start(1), seal[1]
             data = data[: seal.start(1)] + b"0" * _DIGITS + data[seal.end(1) :]
-        # the mark may go on in the next piece
+        # the mark may continue in the next piece
         done = len(data) if mark else max(0, len(data) - len(BLANK) + 1)
         digest.update(data[:done])
         at, rest = at + done, data[done:]

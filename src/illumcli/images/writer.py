@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError, OutputError
-from illumcli.files.atomic import AtomicFile, refusals
+from illumcli.files.atomic import AtomicFile, os_errors_as_output_errors
 from illumcli.film.channels import ChannelType, Metadata
 from illumcli.film.finite import refuse_nonfinite
 from illumcli.images.format import ImageFile, WriteError
@@ -181,7 +181,7 @@ class ImageWriter:
     def _all_or_nothing(self) -> Iterator[None]:
         """Leave no temporary file behind, whatever goes wrong; what the file refuses is an OutputError."""
         try:
-            with refusals(self._name):
+            with os_errors_as_output_errors(self._name):
                 yield
         except BaseException as error:
             self.discard()

@@ -1,1 +1,1 @@
-"""The numerical stability suite: scenes, rays, models and meshes at the limits."""
+"""The numerical stability suite: scenes, rays, models and meshes at the limits of their ranges."""

@@ -1,4 +1,4 @@
-"""One surface written in several ways has the same w; one image rendered on any threads the same bytes."""
+"""Invariance: the same surface in different files has the same w; an image is the same for any threads."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from illumcli.stress.scenes import BALL, FLOOR, scene
 
 Faces = NDArray[np.int64]
 RAYS = 32
-"""Per pixel. Embree rounds a hit on a reversed face differently, by 1e-8 radii, and now and then a ray passes
-an edge on the other side."""
+"""Rays per pixel. Embree rounds a hit on a reversed face differently, by 1e-8 radii, so that occasionally a
+ray passes an edge on the other side."""
 
 
 def check_meshes(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
-    """Meshes written in several ways, and threads."""
+    """Different files of the same surface, and numbers of threads."""
     film = {"width": 40, "height": 30, "samples": 1} if quick else {"width": 320, "height": 240, "samples": 1}
     return [*_written(sandbox, film), _threads(sandbox, film, quick)]
 
 
 def variants(vertices: NDArray[np.float64], faces: Faces) -> dict[str, tuple[NDArray[np.float64], Faces]]:
-    """The same surface as other files might hold it."""
+    """The same surface as other files might contain it."""
     random = np.random.default_rng(3)
     order = random.permutation(len(faces))
-    renamed = random.permutation(len(vertices))
-    back = np.argsort(renamed)
+    shuffled = random.permutation(len(vertices))
+    new_number = np.argsort(shuffled)
     flat = np.repeat(random.integers(len(vertices), size=(1000, 1)), 3, axis=1)
     return {
         "every face twice": (vertices, np.concatenate([faces, faces])),
         "every face and its reverse": (vertices, np.concatenate([faces, faces[:, ::-1]])),
         "faces reversed": (vertices, faces[:, ::-1]),
         "faces shuffled": (vertices, faces[order]),
-        "vertices shuffled": (vertices[renamed], back[faces]),
+        "vertices shuffled": (vertices[shuffled], new_number[faces]),
         "padded with 1000 faces without area": (vertices, np.concatenate([faces, flat])),
         "padded with 1000 unused vertices": (np.concatenate([vertices, np.zeros((1000, 3))]), faces),
         "vertices not shared": (vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)),
@@ -41,13 +41,16 @@ def variants(vertices: NDArray[np.float64], faces: Faces) -> dict[str, tuple[NDA
 
 
 def _written(sandbox: Sandbox, film: dict[str, int]) -> list[CheckResult]:
+    # Two bodies close to each other, so that w varies.
     ball = icosphere(3)
     vertices, faces = (
         ball.vertices * [1, 0.7, 0.4] + [0.1, 0.2, 0.3],
         ball.corners.reshape(-1, 3).astype(np.int64),
     )
-    inner = vertices[:, [1, 2, 0]] * 0.6 + [0.9, 0.1, 0.2]  # a second body close by, so that w varies
-    vertices, faces = np.concatenate([vertices, inner]), np.concatenate([faces, faces + len(vertices)])
+    second = vertices[:, [1, 2, 0]] * 0.6 + [0.9, 0.1, 0.2]
+    vertices, faces = np.concatenate([vertices, second]), np.concatenate([faces, faces + len(vertices)])
+
+    # Each variant against the original.
     reference = _w(sandbox, vertices, faces, film)
     results = []
     for name, (v, f) in variants(vertices, faces).items():

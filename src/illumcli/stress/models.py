@@ -1,4 +1,4 @@
-"""Every illumination model with its parameters at the ends of their ranges, at every kind of direction."""
+"""Every illumination model with parameters at the ends of their ranges, for all kinds of directions."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from illumcli.shading.terms import evaluate
 from illumcli.stress.sandbox import CheckResult
 
 MEASURED = "file"
-"""A model with this field is a measurement; there is none to stress."""
+"""Models with this field need a measurement, and are left out."""
 
 
 def check_models(quick: bool) -> list[CheckResult]:
     """A result per model."""
-    lanes, draws = (256, 20) if quick else (4096, 400)
+    points, draws = (256, 20) if quick else (4096, 400)
     models = [Model for Model in members("illumcli.models") if MEASURED not in Model.model_fields]
-    return [_row(Model, lanes, draws) for Model in models]
+    return [_result(Model, points, draws) for Model in models]
 
 
-def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
+def _result(Model: type[Any], points: int, draws: int) -> CheckResult:
+    """The check of one model with `draws` random sets of parameters, at `points` points each."""
     random = np.random.default_rng(1)
     wrong: list[str] = []
     values = sets = 0
@@ -34,7 +35,7 @@ def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
         model = Model.model_validate(description)
         sets += 1
         for dtype in (np.float32, np.float64):
-            given = directions(sets, lanes, dtype)
+            given = directions(sets, points, dtype)
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 try:
@@ -52,8 +53,9 @@ def _row(Model: type[Any], lanes: int, draws: int) -> CheckResult:
 
 
 def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Iterator[dict[str, Any]]:
-    """Values for every field: each number at each of its ends with the others at their defaults, then all
-    fields drawn at once from ends, middles and choices."""
+    """Sets of parameters: each field at its ends with the others at their defaults, then all fields drawn at
+    random from ends, values between and choices."""
+    # The fields from the JSON schema.
     schema = schema_of(Model)
     defs = schema.get("$defs", {})
     tag = {"model": tag_of(Model)}
@@ -62,6 +64,7 @@ def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Ite
         for name, field in schema["properties"].items()
         if name not in ("model", "emission", "ambient")
     }
+
     yield tag
     for name, field in fields.items():
         for value in _ends(field, defs):
@@ -71,7 +74,8 @@ def parameters(Model: type[Any], random: np.random.Generator, draws: int) -> Ite
 
 
 def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
-    """The values at the ends of a field's range, or every choice."""
+    """The values at the ends of a field's range, or all choices."""
+    # A nested description, or alternatives.
     if "$ref" in field:
         inner = defs[field["$ref"].rpartition("/")[2]]
         if "properties" not in inner:
@@ -83,12 +87,16 @@ def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
         if several in field:
             chosen = field[several] if "discriminator" in field else field[several][:1]
             return [end for choice in chosen for end in _ends(choice, defs)]
+
+    # Choices.
     if "const" in field:
         return [field["const"]]
     if "enum" in field:
         return list(field["enum"])
     if field.get("type") == "boolean":
         return [False, True]
+
+    # Colours and numbers.
     if field.get("type") == "array":
         ends = _ends(field["items"], defs)
         return [[end] * 3 for end in ends] + [[ends[0], ends[-1], ends[0]]]
@@ -110,7 +118,8 @@ def _drawn(field: dict[str, Any], defs: dict[str, Any], random: np.random.Genera
 
 
 def directions(seed: int, count: int, dtype: Any) -> dict[str, NDArray[Any]]:
-    """Unit n, t, l, v with n.l > 0: general, grazing to 1e-7, mirrored, along the light, below."""
+    """Unit n, t, l, v with n.l > 0: v is general, grazing to 1e-7, mirrored, along l, or below."""
+    # Frames.
     random = np.random.default_rng(seed)
     n = unit(column_major(random.normal(size=(count, 3))))
     t = unit(cross(n, unit(column_major(random.normal(size=(count, 3))))))
@@ -123,11 +132,14 @@ def directions(seed: int, count: int, dtype: Any) -> dict[str, NDArray[Any]]:
             height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
         )
 
+    # Light and eye above the horizon, then special cases of the eye.
     l, v = above(), above()
     kind = random.integers(0, 8, count)
     mirrored = 2 * dot(n, l)[:, None] * n - l
     for number, other in enumerate((mirrored, l, -l, n, t, v - 2 * dot(n, v)[:, None] * n)):
         v[kind == number] = other[kind == number]
+
+    # In the requested precision, where the light is above the horizon.
     v = column_major(unit(v), np.float64)
     given = {name: column_major(x.astype(dtype)) for name, x in {"n": n, "t": t, "l": l, "v": v}.items()}
     lit = dot(given["n"], given["l"]) > 0

@@ -1,4 +1,4 @@
-"""Rays at the limits of single precision: self-hits, contact gaps, leaks, shadow terminators."""
+"""Rays at the limits of single precision: self-intersection, contact gaps, leaks, shadow terminators."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from illumcli.stress.sandbox import CheckResult, Sandbox
 from illumcli.stress.scenes import scene
 
 GAPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-"""Between floor and plate, in radii of the scene."""
+"""Gaps between floor and plate, in radii of the scene."""
 SLIVERS_PPM = 20
-"""Of a needle turned out of its axes; its vertices in single precision leave it not quite convex."""
+"""Allowed self-intersections of a rotated needle; rounding of its vertices makes it slightly non-convex."""
 EDGES_PPM = 1000
-"""A ray that starts within 4e-7 radii of a sharp edge may pass it by less than the ray core's
-tolerance, which then takes the face beyond for hit. A longer offset would lose contact gaps of 1e-6 radii."""
+"""Allowed self-intersections near edges. A ray that starts within 4e-7 radii of a sharp edge may pass it by
+less than Embree's tolerance and hit the face beyond. A longer offset would lose gaps of 1e-6 radii."""
 
 
 def check_rays(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
-    """Every check of the tracer and of ray origins."""
+    """All checks of the tracer and of ray origins."""
     count = 20_000 if quick else 2_000_000
     return [
         *(row for name, mesh, away in _bodies() for row in _self_hits(name, mesh, away, count)),
@@ -40,7 +40,8 @@ def check_rays(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
 
 
 def icosphere(divisions: int) -> Mesh:
-    """A ball of 20 * 4^divisions triangles with smooth normals."""
+    """A sphere of 20 * 4^divisions triangles with smooth normals."""
+    # The icosahedron: all triples of vertices at the shortest distance, oriented outwards.
     g = (1 + 5**0.5) / 2
     points = np.array([[s * a, t * b, 0.0] for s in (1, -1) for t in (1, -1) for a, b in [(1, g)]])
     vertices = np.concatenate([np.roll(points, k, axis=1) for k in range(3)])
@@ -57,6 +58,8 @@ def icosphere(divisions: int) -> Mesh:
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     inward = dot(cross(b - a, c - a), a + b + c) < 0
     triangles[inward] = triangles[inward][:, ::-1]
+
+    # Split every triangle into four.
     for _ in range(divisions):
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         edges, number = np.unique(edges, axis=0, return_inverse=True)
@@ -89,7 +92,7 @@ def _scaled(mesh: Mesh, factor: float) -> Mesh:
 
 
 def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
-    """The mesh turned about all axes and moved; with `away` a speck at the origin keeps the radius at 1."""
+    """The mesh rotated about all axes and moved; with `away`, a speck at the origin enlarges the scene."""
     matrix = rotation(2, 23.0) @ rotation(1, 41.0) @ rotation(0, 17.0)
     matrix[:3, 3] = away
     if not away:
@@ -101,7 +104,7 @@ def world_of(mesh: Mesh, away: float = 0.0) -> SceneGeometry:
 def surface_points(
     geometry: SceneGeometry, count: int, seed: int
 ) -> tuple[NDArray[np.float64], SurfaceInteraction]:
-    """Points of object 0, one in four on an edge or vertex, and their interactions seen from outside."""
+    """Points on object 0, one in four on an edge or vertex, and their surface interactions from outside."""
     random = np.random.default_rng(seed)
     of_object = np.flatnonzero(geometry.objects == 0).astype(np.int32)
     triangle = of_object[random.integers(len(of_object), size=count)]
@@ -119,7 +122,7 @@ def surface_points(
 
 
 def grazing(n: NDArray[Any], seed: int) -> NDArray[np.float32]:
-    """(N, 3) directions above the plane of each normal, half of them within 1e-6 to 1e-1 of it."""
+    """(N, 3) directions above the plane of each normal, half of them within 1e-6 to 1e-1 of the plane."""
     random = np.random.default_rng(seed)
     count = len(n)
     tangent = unit(column_major(cross(n, column_major(random.normal(size=(count, 3))))))
@@ -137,7 +140,7 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[CheckResu
         part = min(1 << 18, count - first)
         position, interaction = surface_points(geometry, part, seed)
         direction = grazing(interaction.ng.astype(np.float64), seed)
-        # rounding brings a ray of 1e-6 rad below the horizon now and then; such a one asks about the inside
+        # rounding moves some rays that are 1e-6 rad above the horizon below it; these start into the body
         up = dot(direction.astype(np.float64), interaction.ng.astype(np.float64)) > 1e-7
         origins = offset_ray_origins(position, interaction.ng, interaction.edge)
         hidden = tracer.occluded(column_major(origins[up]), column_major(direction[up]), limit)
@@ -164,7 +167,7 @@ def _self_hits(name: str, mesh: Mesh, away: float, count: int) -> list[CheckResu
 
 
 def _gaps(count: int) -> CheckResult:
-    """A plate over a floor shades all of what lies under it."""
+    """A plate above a floor shadows all points below it, at any gap."""
     random = np.random.default_rng(5)
     lit: dict[float, float] = {}
     square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], np.float64)
@@ -196,7 +199,7 @@ def _gaps(count: int) -> CheckResult:
 
 
 def _leaks(divisions: int, count: int) -> list[CheckResult]:
-    """No ray leaves a closed mesh: through faces, edges or vertices."""
+    """No ray from inside leaves a closed mesh, through faces, edges or vertices."""
     geometry = world_of(icosphere(divisions))
     tracer = Tracer(geometry.vertices, geometry.triangles)
     random = np.random.default_rng(9)
@@ -222,7 +225,7 @@ def _leaks(divisions: int, count: int) -> list[CheckResult]:
 
 
 def _terminators(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
-    """A lone smooth ball has no shadow on its lit side, however coarse it is."""
+    """A single smooth sphere has no shadow on its lit side, however coarse its mesh is."""
     results = []
     film = {"width": 48, "height": 48, "samples": 1} if quick else {"width": 256, "height": 256, "samples": 1}
     for divisions in (1, 3) if quick else (1, 2, 3, 5):
@@ -256,7 +259,7 @@ def _terminators(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
 def _near_lights(
     sandbox: Sandbox, heights: Sequence[float] = (0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4, 1e-2)
 ) -> CheckResult:
-    """A light however near to a plane, on its lit side, casts no shadow there."""
+    """A light on one side of a plane casts no shadow on that side, however near it is."""
     plane = {"mesh": {"shape": "plane", "size": [2, 2]}}
     lamps = [
         {"light": "point", "name": f"h{i}", "position": [0.013, height, 0.017]}

@@ -1,4 +1,4 @@
-"""The result of a check, and the folder in which its scenes are rendered and their values counted."""
+"""The result of a check, and the folder in which scenes are rendered and their values counted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Channels = dict[str, NDArray[np.float32]]
 
 
 class CheckResult(Value):
-    """One line of the table of the suite."""
+    """One line of the suite's table."""
 
     case: str
     check: str
@@ -27,14 +27,14 @@ class CheckResult(Value):
 
 
 class Sandbox:
-    """A folder in which scenes are rendered, and a count of every value that came out of them."""
+    """A folder in which scenes are rendered, with counts of all values that were rendered."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.pictures = self.pixels = self.values = self.not_finite = self.negative = 0
 
     def file(self, name: str, content: bytes) -> str:
-        """Write a file into the sandbox; its name, as scenes refer to it."""
+        """Write a file into the sandbox; returns its name for scenes."""
         (self.folder / name).write_bytes(content)
         return name
 
@@ -97,7 +97,7 @@ class Sandbox:
 
 
 def faults(channels: Channels) -> list[str]:
-    """What no picture may have: values not finite, light, shares or distances below 0, shares above 1."""
+    """Faults of an image: values that are not finite, negative light, shares or distances, shares above 1."""
     results = []
     for name, values in channels.items():
         layer = layer_of_channel(name)
@@ -112,10 +112,10 @@ def faults(channels: Channels) -> list[str]:
 
 
 def refusal(error: IllumError) -> str:
-    """The first line of a refusal, and its exit code."""
+    """The first line of an error, and its exit code."""
     return f"exit {error.exit_code}: {str(error).splitlines()[0]}"
 
 
 def is_refusal(error: IllumError) -> bool:
-    """Was the input refused, before anything was rendered?"""
+    """True if the input was refused before anything was rendered."""
     return isinstance(error, InputError | LimitError)

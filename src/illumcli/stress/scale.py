@@ -1,4 +1,4 @@
-"""Size and place: the same scene at any scale and distance from the origin gives the same image."""
+"""Scale invariance: the same scene at any size and distance from the origin gives the same image."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from illumcli.stress.scenes import Scene, scaled, scene
 
 SCALES = (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)
 DISTANCES = (0.0, 1e2, 1e4, 1e6)
-"""In radii from the origin, along a diagonal."""
+"""Distances from the origin along a diagonal, in radii."""
 LAYERS = ("beauty", "obscurance", "alpha")
 RAYS = 16
 BEYOND = 1e-3
-"""Share of pixels that may differ: their rays pass edges by less than a rounding of the vertices."""
+"""Share of pixels that may differ: their rays pass edges by less than the rounding of the vertices."""
 
 
 def check_scale(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
-    """The matrix of sizes and distances, powers of two, and bodies that nothing can shade."""
+    """All sizes and distances, powers of two of both, and bodies without occluders."""
     pairs = list(product(SCALES, DISTANCES))
     chosen = pairs[:: 5 if quick else 1]
     film = {"width": 32, "height": 24, "samples": 1} if quick else {"width": 96, "height": 72, "samples": 1}
@@ -69,7 +69,7 @@ def _baked(sandbox: Sandbox, pairs: list[tuple[float, float]]) -> CheckResult:
 
 
 def _there(size: float, distance: float) -> Scene:
-    """Ball and floor of a size, so many radii from the origin; the scene's radius is about 5."""
+    """Ball and floor of a size, at a distance in radii from the origin; the scene's radius is about 5."""
     return scaled(size, *(5 * size * distance,) * 3)
 
 
@@ -103,7 +103,7 @@ BODIES: dict[str, Scene] = {
 
 
 def _convex(sandbox: Sandbox, pairs: list[tuple[float, float]], film: Scene) -> list[CheckResult]:
-    """Bodies without hollows: w is 1 exactly, at any size and distance."""
+    """On convex bodies w is exactly 1, at any size and distance."""
     results = []
     for name, body in BODIES.items():
         pixels = shaded = 0

@@ -1,4 +1,4 @@
-"""Scenes at the limits of what can be described: each must render without a fault, or be refused."""
+"""Scenes at the limits of their parameters: each must render without a fault, or be refused."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def lamp(*position: float, **more: Any) -> Scene:
 
 
 def scene(*objects: Scene, lights: Sequence[Scene] | None = None, scale: float = 1, **more: Any) -> Scene:
-    """A scene with ambient light, obscurance and a highlight; `scale` sizes what it has by default."""
+    """A scene with ambient light, obscurance and a highlight; `scale` is that of the default light."""
     far = [[scale * x for x in p] for p in ([3, 4, 5], [-3, 2, 1], [2.5, 2, 4])]
     default = [
         lamp(*far[0], intensity=30 * scale * scale),
@@ -52,7 +52,7 @@ def polygons(vertices: Sequence[Sequence[float]], faces: Sequence[Sequence[int]]
 
 
 def sheets(gap: float) -> Scene:
-    """Two squares, one `gap` above the other."""
+    """Two squares, with a `gap` between them."""
     above = [[x, y, z + gap] for x, y, z in SQUARE]
     return polygons([*SQUARE, *above], [(0, 1, 2, 3), (4, 5, 6, 7)])
 
@@ -62,7 +62,7 @@ def shiny(exponent: float, model: str = "phong") -> Scene:
 
 
 def scaled(size: float, *away: float) -> Scene:
-    """Ball and floor of `size`, as far from the origin as `away` says, camera and lights with them."""
+    """Ball and floor of `size`, with camera and lights, moved from the origin by `away`."""
 
     def there(x: float, y: float, z: float) -> list[float]:
         return [size * x + away[0], size * y + away[1], size * z + away[2]]
@@ -86,7 +86,7 @@ def scaled(size: float, *away: float) -> Scene:
 
 
 def obj(sandbox: Sandbox, text: str, **more: Any) -> Scene:
-    """A scene around a mesh file of this text."""
+    """A scene with an OBJ mesh file of this text."""
     return scene({"mesh": sandbox.file(f"mesh{sandbox.pictures}.obj", text.encode())}, FLOOR, **more)
 
 
@@ -271,7 +271,7 @@ MUST_RENDER: dict[str, Callable[[Sandbox], Scene]] = {
         {**BALL, "material": {"model": "lambert", "emission": 1e18}}, FLOOR
     ),
 }
-"""Name -> scene, of what must render."""
+"""Name -> scene that must render."""
 
 MUST_REFUSE: dict[str, Callable[[Sandbox], Scene]] = {
     "a mesh without faces": lambda sandbox: obj(sandbox, TRIANGLE),
@@ -290,11 +290,11 @@ MUST_REFUSE: dict[str, Callable[[Sandbox], Scene]] = {
     "a coordinate of 1e39": lambda sandbox: scene(BALL, lights=[lamp(1e39, 0, 0)]),
     "a field of view of 180": lambda sandbox: scene(BALL, camera={**CAMERA, "fov": 180}),
 }
-"""Name -> scene, of what must be refused."""
+"""Name -> scene that must be refused."""
 
 
 def check_scenes(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
-    """A result per scene: rendered at every shading rate, or refused."""
+    """A result for each scene: rendered at every shading rate, or refused."""
     rates = ("phong", "gouraud") if quick else tuple(RATES)
     size = {"width": 24, "height": 18, "samples": 1} if quick else {"width": 120, "height": 90, "samples": 2}
     results = [_rendered(name, make, sandbox, rates, size) for name, make in MUST_RENDER.items()]
@@ -318,7 +318,7 @@ def _rendered(
             wrong += [f"{rate}: {fault}" for fault in faults(channels)]
         except IllumError as error:
             wrong.append(f"{rate}: {refusal(error)}")
-        except Exception as error:  # what would be a traceback is a finding, and the next case goes on
+        except Exception as error:  # an unexpected exception is a finding; the suite continues
             wrong.append(f"{rate}: {type(error).__name__}: {error}")
     return CheckResult(name, check, wrong[0] if wrong else "-", not wrong)
 

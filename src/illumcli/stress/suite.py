@@ -1,4 +1,4 @@
-"""The numerical stability suite: scenes, rays, models and meshes at the limits, and what came of them."""
+"""Runs the numerical stability suite and formats its results."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from illumcli.tables import aligned
 
 
 class SuiteResult(Value):
-    """The result of every check, and how much was checked."""
+    """The results of all checks, and the amount of values that were checked."""
 
     rows: tuple[CheckResult, ...]
     pictures: int
@@ -34,20 +34,20 @@ class SuiteResult(Value):
 
     @property
     def failed(self) -> list[str]:
-        """The cases that did not pass."""
+        """The names of the failed cases."""
         return [row.case for row in self.rows if not row.passed]
 
     def as_data(self) -> dict[str, Any]:
-        """The result as JSON holds it."""
+        """The result for JSON output."""
         data = {name: value for name, value in vars(self).items() if name != "rows"}
         return {**data, "failed": self.failed, "cases": [vars(row) for row in self.rows]}
 
 
 def run_suite(quick: bool = False, progress: Progress = no_progress) -> SuiteResult:
-    """Run every check; with `quick` on small images. Nothing is kept between runs."""
+    """Run all checks, with `quick` on small images. Nothing is cached between runs."""
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="illum-stress-") as folder, warnings.catch_warnings():
-        warnings.simplefilter("error")  # an overflow that numpy notices is a finding
+        warnings.simplefilter("error")  # numpy's warnings, such as of an overflow, are findings
         sandbox = Sandbox(Path(folder))
         parts: dict[str, Callable[[], list[CheckResult]]] = {
             "scenes": lambda: check_scenes(sandbox, quick),
@@ -68,13 +68,13 @@ def run_suite(quick: bool = False, progress: Progress = no_progress) -> SuiteRes
 
 
 def refuse_failures(result: SuiteResult) -> None:
-    """Raise ThresholdError where a case failed."""
+    """Raise ThresholdError if a case failed."""
     if result.failed:
         raise ThresholdError(f"failed: {', '.join(result.failed)}")
 
 
 def suite_table(result: SuiteResult) -> str:
-    """One line per case, and the totals."""
+    """A line for each case, and the totals."""
     lines = [("case", "what is checked", "worst", "verdict")]
     lines += [
         (row.case, row.check, _short(row.worst), "ok" if row.passed else "FAILED") for row in result.rows
@@ -83,7 +83,7 @@ def suite_table(result: SuiteResult) -> str:
 
 
 def summary(result: SuiteResult) -> str:
-    """The totals in a line."""
+    """The totals in one line."""
     passed = len(result.rows) - len(result.failed)
     seen = f"{result.pictures:,} pictures, {result.pixels:,} pixels, {result.values:,} values"
     wrong = f"{result.not_finite} NaN or infinite, {result.negative} below 0"

@@ -20,7 +20,7 @@ SCRIPTS = {
     "growth": "exponent time",
     "memory": "cpu per pixel",
     "replay": "ratio whole / rays alone",
-    "adaptive": "samples saved",
+    "adaptive": "to full: RMSE",
     "reconstruction": "blades",
 }
 

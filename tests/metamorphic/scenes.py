@@ -421,8 +421,8 @@ def film(random: Random) -> dict[str, Any]:
         made["filter"] = {"filter": kind, "width": number(random, 0.5, 2)}
     if random.random() < 0.3:
         made["background"] = color(random)
-    if random.random() < 0.2 and made["samples"] > 2:
-        made["adaptive"] = random.choice([2, {"first": 2, "difference": 0.05}])
+    if random.random() < 0.3 and made["samples"] > 1:
+        made["adaptive"] = random.choice([True, {"probes": 2, "difference": 0.05}])
     return made
 
 

@@ -71,7 +71,7 @@ def test_threads_and_tiles_change_no_bit(picture, whole, threads, side):
         assert values.tobytes() == again[name].tobytes(), name
 
 
-@pytest.mark.parametrize("overrides", [(), ("film.samples=8", "film.adaptive={first: 4}")])
+@pytest.mark.parametrize("overrides", [(), ("film.samples=8", "film.adaptive=true")])
 def test_bands_hold_what_is_made_of_their_tiles(picture, overrides):
     def develop(tile, layers):
         x, y = np.meshgrid(range(tile.x, tile.x + tile.width), range(tile.y, tile.y + tile.height))

@@ -39,7 +39,7 @@ CASES = {
     "up": (["camera.target=[0,-9,5]"], "camera.up=[0,2,0]", "camera.up: is not used, it lies along the line"),
     "width": (["camera.width=9"], "film.width=640", "film.width: is not used, every camera has its own"),
     "samples": (["camera.samples=2"], "film.samples=7", "film.samples: is not used, every camera"),
-    "adaptive": ([], "film.adaptive=4", "film.adaptive: is not used, no pixel has more than the 4 samples"),
+    "adaptive": (["film.samples=1"], "film.adaptive=true", "film.adaptive: is not used, no pixel has more"),
     "filter": (["film.samples=1"], "film.filter={filter: gaussian}", "film.filter: is not used, a single"),
     "rate": (["objects.o.shading=constant"], "shading=gouraud", "shading: is not used, every object has a"),
     "obscurance": (["ambient=0"], "obscurance={samples: 4}", "obscurance: is not used, there is no ambient"),
@@ -114,7 +114,7 @@ def test_a_key_without_effect_is_told_and_has_none(scene, name):
     "overrides",
     [
         ["film.filter={filter: tent}"],
-        ["film.samples=8", "film.adaptive=4"],
+        ["film.samples=8", "film.adaptive=true"],
         ["camera.up=[0,0,-1]"],
         ["obscurance={samples: 4}"],
         ["obscurance={samples: 4}", "ambient=0", "outputs.layers=[obscurance]"],

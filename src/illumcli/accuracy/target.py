@@ -82,7 +82,7 @@ class SamplingChoice(Record):
         overrides = [f"film.samples={self.sampling.pixel}"]
         scene = self.layers[0].scene
         if scene.film.adaptive is not None:  # the choice is for images without adaptive sampling
-            overrides.append("film.adaptive=null")
+            overrides.append("film.adaptive=false")
         for name, camera in scene.named_cameras().items():
             if camera.samples is not None:
                 path = f"cameras.{name}" if scene.cameras else "camera"

@@ -54,10 +54,10 @@ def table(parts: Sequence[Mapping[str, Any]]) -> str:
 
 def _lines(part: Mapping[str, Any]) -> list[str]:
     view, reused = part["views"][0], part["reused"]
-    first = f", {view['first_samples']} where these agree" if "first_samples" in view else ""
+    probes = f", or one at its centre, and {view['probes']} first hits" if "probes" in view else ""
     lines = [
         f"view    {view['camera']}: {view['width']} x {view['height']}, "
-        f"{view['samples']} samples per pixel{first}",
+        f"{view['samples']} samples per pixel{probes}",
         f"objects {part['objects']}",
         _row("layers", part["layers"]),
         _row("once", [name for name in part["once"] if name not in reused]),

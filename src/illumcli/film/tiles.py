@@ -44,11 +44,16 @@ class Tile(Value):
         x, y = np.arange(self.x, self.x + self.width), np.arange(self.y, self.y + self.height)
         return np.tile(x, self.height), np.repeat(y, self.width)
 
-    def grown(self, width: int, height: int) -> Tile:
-        """The rectangle and a border of one pixel, within a film of this size."""
-        x, y = max(self.x - 1, 0), max(self.y - 1, 0)
-        right, lower = min(self.x + self.width + 1, width), min(self.y + self.height + 1, height)
+    def grown(self, border: int, width: int, height: int) -> Tile:
+        """The rectangle and a border of so many pixels, within a film of this size."""
+        x, y = max(self.x - border, 0), max(self.y - border, 0)
+        right, lower = min(self.x + self.width + border, width), min(self.y + self.height + border, height)
         return Tile(x, y, right - x, lower - y)
+
+    def within(self, other: Tile) -> tuple[slice, slice]:
+        """Its rows and columns among those of a rectangle that holds it."""
+        x, y = self.x - other.x, self.y - other.y
+        return slice(y, y + self.height), slice(x, x + self.width)
 
 
 def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
@@ -94,7 +99,6 @@ class Samples(Record):
     y: NDArray[np.int64]  # (P,) row of each pixel
     points: NDArray[np.float64]  # (N, 2) in [0, 1)^2
     per_pixel: int
-    first: int | None = None  # number of the first of them among a pixel's samples; None if they are all
 
     def nearest(self) -> Ids:
         """(P,) index of the sample nearest to each pixel's centre."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -19,13 +18,15 @@ from illumcli.records import Value
 from illumcli.render_space import RenderSpace
 
 
-class Adaptive(Protocol):
-    """How few samples every pixel has at first, and what makes it need all."""
+class Adaptive(Value):
+    """How the pixels are found that one sample is not enough for (`film.adaptive`)."""
 
-    @property
-    def first(self) -> int: ...
-    @property
-    def difference(self) -> float: ...
+    probes: int
+    """Samples whose first hits are looked at."""
+    reach: int
+    """Pixels across and down that the pixel filter reaches from a pixel."""
+    spread: float
+    """Variance of the pixel filter, as a multiple of a box's of one pixel."""
 
 
 class View(Value):
@@ -37,37 +38,45 @@ class View(Value):
     height: int
     samples: int
     adaptive: Adaptive | None = None
-    first: int | None = None
-    """Number of the first sample, where these are part of a pixel's samples."""
+    """Set where pixels get one sample or all."""
+    stands_for: int = 1
+    """Samples that each sample stands for: it casts the obscurance rays of so many."""
 
     @property
-    def is_adaptive(self) -> bool:
-        """Are pixels sampled to different counts?"""
-        return self.adaptive is not None and self.adaptive.first < self.samples
+    def reach(self) -> int:
+        """Pixels across and down that the pixel filter of an adaptive picture reaches from a pixel."""
+        return self.adaptive.reach if self.adaptive else 0
 
-    def coarse(self) -> View:
-        """The view with the samples that every pixel gets."""
-        assert self.adaptive is not None
-        return replace(self, samples=self.adaptive.first, adaptive=None, first=0)
+    @property
+    def border(self) -> int:
+        """Pixels around a tile of an adaptive picture that decide about those within."""
+        return self.reach + 1
 
-    def rest(self) -> View:
-        """The view with all the other samples."""
+    def centres(self) -> View:
+        """An adaptive view with the one sample that every pixel gets."""
+        return replace(self, samples=1, stands_for=self.samples)
+
+    def all_samples(self) -> View:
+        """The view with all samples for every pixel."""
+        return replace(self, adaptive=None)
+
+    def probing(self) -> View:
+        """The view with the samples whose first hits are looked at."""
         assert self.adaptive is not None
-        few = self.adaptive.first
-        return replace(self, samples=self.samples - few, adaptive=None, first=few)
+        return replace(self, samples=self.adaptive.probes, adaptive=None, stands_for=1)
 
 
 def samples(seed: int, view: View, tile: Tile) -> Samples:
     """Where the tile's samples lie, keyed by pixel number."""
     x, y = tile.pixels()
     pixel = (y * view.width + x).astype(np.uint32)
-    points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples, view.first)
-    return Samples(x, y, points, view.samples, view.first)
+    points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples)
+    return Samples(x, y, points, view.samples)
 
 
 def rays(film_filter: PixelFilter, render_space: RenderSpace, view: View, samples: Samples) -> Rays:
     """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
-    several = samples.per_pixel > 1 or samples.first is not None
+    several = samples.per_pixel > 1
     points = film_points(samples.x, samples.y, samples.points, film_filter if several else None)
     return camera_rays(view.camera, render_space, view.width, view.height, points)
 

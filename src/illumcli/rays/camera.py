@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -233,3 +234,13 @@ def offsets(u: Floats, v: Floats, film_filter: PixelFilter | None) -> tuple[Floa
     r = deviation * np.sqrt(-2 * np.log1p(-u * inside))
     angle = 2 * np.pi * v
     return r * np.cos(angle), r * np.sin(angle)
+
+
+def footprint(film_filter: PixelFilter) -> tuple[int, float]:
+    """Pixels that a filter reaches from a pixel, and its variance as a multiple of a box's of one pixel."""
+    width = film_filter.width
+    if film_filter.filter == "box":
+        return max(1, math.ceil(width / 2)), width**2
+    if film_filter.filter == "tent":
+        return max(1, math.ceil(width / 2)), width**2 / 2
+    return max(1, math.ceil(0.75 * width)), 0.75 * width**2  # three deviations of width / 4

@@ -82,19 +82,15 @@ def owen(reversed_bits: NDArray[np.uint32], seed: NDArray[np.uint32]) -> NDArray
     return unit_interval(reverse_bits(x))
 
 
-def pixel_points(
-    key: int, pixel: NDArray[np.uint32], count: int, first: int | None = None
-) -> NDArray[np.float64]:
+def pixel_points(key: int, pixel: NDArray[np.uint32], count: int) -> NDArray[np.float64]:
     """(N * count, 2) in [0, 1)^2: `count` points per pixel, an Owen-scrambled Sobol set each.
 
-    A single point is the pixel's centre. With `first` they are points `first` to `first + count` of a larger
-    set.
+    One point is the pixel's centre; otherwise fewer points are the first of more.
     """
-    if count == 1 and first is None:
+    if count == 1:
         return np.full((len(pixel), 2), 0.5, order="F")
     out = np.empty((2, len(pixel), count))
-    begin = first or 0
-    for axis, base in enumerate(sobol(begin + count)[:, begin:]):
+    for axis, base in enumerate(sobol(count)):
         seeds = hashed(key + axis & 0xFFFFFFFF, pixel)
         out[axis] = owen(base[None, :], seeds[:, None])
     return out.reshape(2, -1).T

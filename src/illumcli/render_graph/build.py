@@ -30,6 +30,7 @@ from illumcli.rays.interaction import (
 )
 from illumcli.records import Value
 from illumcli.render_graph import needs, stages
+from illumcli.render_graph.build_adaptive import adaptive_nodes
 from illumcli.render_graph.build_geometry import baked_files, geometry_nodes
 from illumcli.render_graph.build_lights import light_nodes, sum_nodes
 from illumcli.render_graph.build_materials import material_nodes
@@ -42,17 +43,17 @@ from illumcli.shading.rates import RATES, normal, obscurance_normals, point_weig
 from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
 from illumcli.visibility.object_pixels import object_pixels
-from illumcli.visibility.obscurance import baked_or_open, obscurance, obscurance_method
+from illumcli.visibility.obscurance import baked_or_open, obscurance_method
 from illumcli.visibility.open_hemisphere import known_open, open_triangles
 from illumcli.visibility.reconstruction import reconstructed_obscurance
 from illumcli.visibility.shadows import ray_origins
 
 SURROUNDINGS = "surrounding_pixels"
 """The buffer `object_pixels` of a tile and its surroundings, so far as a reconstruction reads them."""
-GIVEN = ("view", "tile", SURROUNDINGS)
+READ = "read_pixels"
+"""The buffer of the pixels of a tile whose obscurance is read, (P,), None if it is all of them."""
+GIVEN = ("view", "tile", SURROUNDINGS, READ)
 """Buffers that need no node."""
-SHAPE = ("object_id", "geometric_normal")
-"""Buffers whose differences show edges, where adaptive sampling takes more samples whatever the light."""
 
 
 class Known(Value):
@@ -110,6 +111,7 @@ def build(scene: Scene, loaded: SceneFile) -> Graph:
     by_name = {node.output: node for node in nodes}
     views = tuple(needs.views(scene))
     counts = [view.samples for view in views]
+    by_name |= adaptive_nodes(scene, by_name, GIVEN)
     by_name |= error_nodes(by_name, scene.seed, scene.film.background, counts, GIVEN)
     return Graph(scene, views, by_name, reasons=_reasons(scene, by_name))
 
@@ -177,7 +179,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     if needs.all_baked(scene) or (scene.obscurance is None and some_baked):
         w = Node.of(baked_or_open, "obscurance")
     else:
-        w = Node.of(obscurance, **partly_baked)
+        w = Node.of(stages.obscurance, **partly_baked)
     nodes = [w]
     if needs.reconstructs(scene):
         nodes = [

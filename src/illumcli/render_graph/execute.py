@@ -7,24 +7,24 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import column_major
 from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
-from illumcli.film.adaptive import differs_in_light, differs_in_shape
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
-from illumcli.film.view import View
 from illumcli.graph import Buffers, Node
+from illumcli.layers import FIXED
 from illumcli.lights._incident import LitPoints
 from illumcli.memory import keep_freed_memory
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record, Value
-from illumcli.render_graph.build import SHAPE, SURROUNDINGS
+from illumcli.render_graph.build import READ, SURROUNDINGS
+from illumcli.render_graph.build_adaptive import decision
 from illumcli.render_graph.schedule import Plan
 from illumcli.visibility.object_pixels import ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
@@ -50,10 +50,15 @@ class RenderStats:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(
-        self, seconds: Mapping[str, float], rays: Mapping[str, int], saved: Mapping[str, int] | None = None
+        self,
+        seconds: Mapping[str, float],
+        rays: Mapping[str, int],
+        saved: Mapping[str, int] | None = None,
+        refined: int = 0,
     ) -> None:
         """Add the statistics of a node or tile."""
         with self.lock:
+            self.refined += refined
             for name, value in seconds.items():
                 self.seconds[name] += value
             for name, count in rays.items():
@@ -86,7 +91,12 @@ class _Common(Record):
     stop: threading.Event
     recorder: BufferRecorder
     develop: Develop
-    last_use: Mapping[str, int]
+
+    @cached_property
+    def last_use(self) -> tuple[Mapping[str, int], Mapping[str, int]]:
+        """`Plan.last_use` of the plan, and of that of all samples."""
+        others = self.plan.all_samples
+        return self.plan.last_use(), others.last_use() if others else {}
 
 
 def _unchanged(tile: Tile, layers: Planes) -> Planes:
@@ -147,14 +157,12 @@ def bands(
     done : callable
         Called with the number of pixels of each finished tile.
     """
-    # An adaptive view first takes few samples of every pixel, so its tiles are larger.
     view = plan.view
-    first = view.coarse() if view.is_adaptive else view
-    rows = tiles(view.width, view.height, plan.tile_side(first, side), first.samples)
-    keeps = {} if view.is_adaptive else plan.lookup.keeps
+    rows = tiles(view.width, view.height, plan.tile_side(view, side), view.samples)
+    keeps = {} if plan.all_samples else plan.lookup.keeps
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
-    common = _Common(plan, shared, run.stats, stop, recorder, develop, plan.last_use())
-    compute = _adaptive_tile if view.is_adaptive else _tile
+    common = _Common(plan, shared, run.stats, stop, recorder, develop)
+    compute = _adaptive_tile if plan.all_samples else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
         try:
@@ -206,6 +214,7 @@ def _result(future: Future[Result]) -> Result:
 class _Started(Record):
     """A tile of which some nodes have run."""
 
+    plan: Plan
     tile: Tile
     buffers: dict[str, Any]
     kept: Kept
@@ -252,7 +261,7 @@ class _Ahead:
 
 def _first_nodes(common: _Common, tile: Tile) -> _Started:
     """A tile after the nodes whose results the tiles around read."""
-    started = _Started(tile, _given(common, common.plan.view, tile), {})
+    started = _Started(common.plan, tile, _given(common, common.plan, tile), {})
     _run_nodes(common, started, range(common.plan.before))
     return started
 
@@ -280,7 +289,7 @@ def at_pixels(plan: Plan, shared: Buffers, run: Run, x: NDArray[np.int64], y: ND
     count = max(1, MAX_TILE_SAMPLES // plan.view.samples)
     pieces = [Scattered.at(x[a : a + count], y[a : a + count]) for a in range(0, len(x), count)]
     stop, recorder = threading.Event(), BufferRecorder(NO_CACHE, {}, plan.view)
-    common = _Common(plan, shared, run.stats, stop, recorder, _unchanged, plan.last_use())
+    common = _Common(plan, shared, run.stats, stop, recorder, _unchanged)
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
         try:
             pending = [pool.submit(_tile, common, tile) for tile in pieces]
@@ -293,28 +302,28 @@ def at_pixels(plan: Plan, shared: Buffers, run: Run, x: NDArray[np.int64], y: ND
 
 def _tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
     """One tile's developed layers, and its buffers for the cache."""
-    buffers, kept = _buffers(common, common.plan.view, tile)
+    buffers, kept = _buffers(common, common.plan, tile)
     return _developed(common, tile, buffers), kept
 
 
 def _developed(common: _Common, tile: Tile, buffers: Buffers) -> Mapping[str, NDArray[Any]]:
     """One tile's developed layers."""
     start = time.perf_counter()
-    out = common.develop(tile, _pixels(common.plan, buffers, common.plan.view, tile))
+    out = common.develop(tile, _pixels(common.plan, buffers, tile))
     common.stats.add({"film": time.perf_counter() - start}, {})
     return out
 
 
-def _buffers(common: _Common, view: View, tile: Tile) -> tuple[dict[str, Any], Kept]:
-    """The buffers of one tile that the film reads, and those for the cache; `view` says how many samples."""
-    started = _Started(tile, _given(common, view, tile), {})
-    _run_nodes(common, started, range(len(common.plan.tile)))
+def _buffers(common: _Common, plan: Plan, tile: Tile) -> tuple[dict[str, Any], Kept]:
+    """The buffers of one tile that the film reads, and those for the cache."""
+    started = _Started(plan, tile, _given(common, plan, tile), {})
+    _run_nodes(common, started, range(len(plan.tile)))
     return started.buffers, started.kept
 
 
-def _given(common: _Common, view: View, tile: Tile) -> dict[str, Any]:
+def _given(common: _Common, plan: Plan, tile: Tile) -> dict[str, Any]:
     """The buffers that the nodes of a tile start from."""
-    buffers: dict[str, Any] = {**common.shared, "view": view, "tile": tile}
+    buffers: dict[str, Any] = {**common.shared, "view": plan.view, "tile": tile, READ: None}
     if "tracer" in common.shared:
         buffers["tracer"] = common.shared["tracer"].counting(common.stop)
     return buffers
@@ -324,8 +333,9 @@ def _run_nodes(common: _Common, started: _Started, numbers: range) -> None:
     """Run the nodes of these numbers on the buffers of a tile."""
     buffers, tracer = started.buffers, started.buffers.get("tracer")
     seconds, rays, unlit = {}, {}, {}
+    plan, last_use = started.plan, common.last_use[started.plan is common.plan.all_samples]
     for number in numbers:
-        node = common.plan.tile[number]
+        node = plan.tile[number]
         if common.stop.is_set():
             raise Interrupted
 
@@ -342,129 +352,65 @@ def _run_nodes(common: _Common, started: _Started, numbers: range) -> None:
         if node.output in common.recorder.names:
             started.kept[node.output] = common.recorder.take(node.output, buffers, started.tile)
         for name in node.inputs.values():
-            if common.last_use.get(name) == number:
+            if last_use.get(name) == number:
                 buffers.pop(name, None)
     common.stats.add(seconds, rays, unlit)
 
 
 def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
-    """One tile's developed layers: few samples per pixel, and all of them in pixels where these few differ.
+    """One tile's developed layers: of its pixels' centres, and of all samples where these are not enough.
 
-    The first samples also cover a border of one pixel, so that a pixel has the same neighbours in any tile.
-    Each layer decides for itself, by the shapes and by its own values, independently of the other layers.
+    Each layer decides for itself, independently of the other layers.
     """
-    # The first samples, also of the border.
-    plan, view, stats = common.plan, common.plan.view, common.stats
-    coarse, bordered = view.coarse(), tile.grown(view.width, view.height)
-    buffers, _ = _buffers(common, coarse, bordered)
+    plan, all_samples, stats = common.plan, common.plan.all_samples, common.stats
+    assert all_samples is not None
 
-    # The tile's pixels from these, and which of them need more.
+    # What decides about the pixels, with a border, so that a pixel has the same neighbours in any tile.
+    bordered = tile.grown(plan.view.border, plan.view.width, plan.view.height)
+    own, shape = tile.within(bordered), (bordered.height, bordered.width)
+    started = _Started(plan, bordered, _given(common, plan, bordered), {})
+    _run_nodes(common, started, range(plan.decided_by))
+    buffers = started.buffers
+    means = [*all_samples.outputs, FIXED["alpha"]]
+    refined = {
+        layer.name: buffers[decision(layer)].reshape(shape)[own]
+        for layer in means
+        if decision(layer) in buffers
+    }
+
+    # The layers at the centres; obscurance only where some layer shows it.
+    read = np.zeros(shape, np.bool_)
+    read[own] = ~np.logical_and.reduce([refined[layer.name] for layer in all_samples.outputs])
+    buffers[READ] = read.ravel()
+    _run_nodes(common, started, range(plan.decided_by, len(plan.tile)))
     start = time.perf_counter()
-    inside = (
-        slice(tile.y - bordered.y, tile.y - bordered.y + tile.height),
-        slice(tile.x - bordered.x, tile.x - bordered.x + tile.width),
-    )
-    coarse_pixels = _pixels(plan, buffers, coarse, bordered)
-    out = {name: np.array(values[inside]) for name, values in coarse_pixels.items()}
-    assert view.adaptive is not None
-    differing = _differing(plan, buffers, coarse, bordered, view.adaptive.difference)
-    to_refine = {name: mask[inside] for name, mask in differing.items()}
-    down, across = np.nonzero(np.logical_or.reduce([*to_refine.values()]))
+    layers = {name: np.array(values[own]) for name, values in _pixels(plan, buffers, bordered).items()}
+    down, across = np.nonzero(np.logical_or.reduce([*refined.values()]))
     stats.add({"film": time.perf_counter() - start}, {})
 
-    # The remaining samples of those pixels, a batch at a time; each layer takes the pixels it refines.
-    rest = view.rest()
-    at_once = max(1, MAX_TILE_SAMPLES // rest.samples)
+    # All samples of the pixels that some layer needs them for.
+    at_once = max(1, MAX_TILE_SAMPLES // all_samples.view.samples)
     for first in range(0, len(down), at_once):
         y, x = down[first : first + at_once], across[first : first + at_once]
-        part = Scattered.at(x + tile.x, y + tile.y)
-        others, _ = _buffers(common, rest, part)
+        pixels = Scattered.at(x + tile.x, y + tile.y)
+        others, _ = _buffers(common, all_samples, pixels)
         start = time.perf_counter()
-        pixel = (part.rows - bordered.y) * bordered.width + part.columns - bordered.x
-        joined = _joined(plan, buffers, others, pixel)
+        for name, values in _pixels(all_samples, others, pixels).items():
+            mine = refined[name][y, x]
+            layers[name][y[mine], x[mine]] = values[0][mine]
         stats.add({"film": time.perf_counter() - start}, {})
-        for name, values in _pixels(plan, joined, view, part).items():
-            refine = to_refine[name][y, x]
-            out[name][y[refine], x[refine]] = values[0][refine]
 
-    # Statistics.
-    pixels, refined = tile.width * tile.height, len(down)
-    taken = bordered.width * bordered.height * coarse.samples + refined * rest.samples
-    stats.add({}, {}, {"samples": pixels * view.samples - taken})
-    with stats.lock:
-        stats.refined += refined
-
+    saved = (tile.width * tile.height - len(down)) * (all_samples.view.samples - 1)
+    stats.add({}, {}, {"samples": saved}, len(down))
     start = time.perf_counter()
-    developed = common.develop(tile, out)
+    developed = common.develop(tile, layers)
     stats.add({"film": time.perf_counter() - start}, {})
-    return developed, {}
+    return developed, started.kept
 
 
-def _joined(plan: Plan, coarse: Buffers, others: Buffers, pixel: NDArray[np.int64]) -> dict[str, Any]:
-    """The buffers that the film reads, for some pixels: their first samples, followed by the others.
-
-    Parameters
-    ----------
-    coarse : mapping
-        The buffers of the first samples of a tile.
-    others : mapping
-        The buffers of the other samples of K pixels.
-    pixel : (K,)
-        Those pixels' numbers in the tile.
-    """
-    # The hits of the first samples in those pixels.
-    first, last = coarse["samples"], others["samples"]
-    count = first.per_pixel + last.per_pixel
-    new_pixel = np.full(len(first.x), -1)
-    new_pixel[pixel] = np.arange(len(pixel))
-    coarse_pixel, coarse_sample = np.divmod(coarse["hits"].sample, first.per_pixel)
-    kept = np.flatnonzero(new_pixel[coarse_pixel] >= 0)
-
-    # Number all samples pixel by pixel.
-    other_pixel, other_sample = np.divmod(others["hits"].sample, last.per_pixel)
-    sample = np.concatenate(
-        [
-            new_pixel[coarse_pixel[kept]] * count + coarse_sample[kept],
-            other_pixel * count + first.per_pixel + other_sample,
-        ]
-    ).astype(np.int32)
-
-    # Join the buffers in that order.
-    order = np.argsort(sample)
-    points = np.concatenate(
-        [each.points.reshape(-1, each.per_pixel, 2)[which] for each, which in ((first, pixel), (last, ...))],
-        axis=1,
-    )
-    joined = {
-        "hits": replace(others["hits"], sample=sample[order]),
-        "samples": replace(last, points=points.reshape(-1, 2), per_pixel=count, first=None),
-    }
-    for name in {"alpha", *(layer.buffer for layer in plan.outputs)}:
-        values = np.concatenate([coarse[name][kept], others[name]])
-        joined[name] = column_major(values[order])
-    return joined
-
-
-def _differing(
-    plan: Plan, buffers: Buffers, view: View, tile: Tile, difference: float
-) -> dict[str, NDArray[np.bool_]]:
-    """(rows, columns) by layer: the pixels that need more samples than the view has."""
-    sample, shape = buffers["hits"].sample, (tile.height, tile.width)
-    objects, normals = (buffers[name] for name in SHAPE)
-    by_shape = differs_in_shape(objects, normals, sample, shape, view.samples)
-    out = {}
-    for name, buffer, data in [(layer.name, layer.buffer, layer.data) for layer in plan.outputs] + [
-        ("alpha", "alpha", True)
-    ]:
-        out[name] = by_shape
-        if not data:
-            by_light = differs_in_light(buffers[buffer], sample, shape, view.samples, difference)
-            out[name] = by_shape | by_light
-    return out
-
-
-def _pixels(plan: Plan, buffers: Buffers, view: View, tile: Tile) -> Planes:
+def _pixels(plan: Plan, buffers: Buffers, tile: Tile) -> Planes:
     """The layers of a tile, reconstructed from the buffers of its samples."""
+    view = plan.view
     sample = buffers["hits"].sample
     pixels = tile.width * tile.height
     out = {}

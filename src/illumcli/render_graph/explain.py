@@ -13,6 +13,7 @@ from illumcli.film.view import View
 from illumcli.layers import Layer
 from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.render_graph.build import Graph
+from illumcli.render_graph.build_adaptive import OPEN, REFINED
 from illumcli.render_graph.culling import why_all
 from illumcli.render_graph.replicates import REPLICATE, replicated_count
 from illumcli.render_graph.schedule import Plan, reached
@@ -35,7 +36,7 @@ def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) ->
     computed = set(order)
     reasons = {}
     for name in graph.nodes:
-        if name in computed or name.startswith((REPLICATE, "camera:")):
+        if name in computed or name.startswith((REPLICATE, OPEN, REFINED, "camera:")):
             continue
         if graph.culled and name in ("implied_widths", "every_mesh"):
             continue
@@ -64,25 +65,37 @@ def which_objects(graph: Graph, outputs: Sequence[Layer]) -> str:
 
 
 def expected_rays(scene: Scene, views: Sequence[View], computed: set[str]) -> dict[str, int]:
-    """Upper bounds of the rays of some views, by purpose, if these buffers are computed."""
-    samples = sum(view.width * view.height * view.samples for view in views)
-    rays = _rays_of(scene, samples, computed)
+    """Upper bounds of the rays of some views, by purpose, if these buffers are computed.
 
-    replicated = sum(replicated_count(view.width, view.height) * view.samples for view in views)
+    As if every pixel of an adaptive view needed all samples; the borders of its tiles are not counted.
+    """
+    samples = full = probes = replicated = 0
+    for view in views:
+        pixels, count = view.width * view.height, view.samples * view.stands_for
+        full += pixels * count
+        replicated += replicated_count(view.width, view.height) * count
+        if view.adaptive is None:
+            samples += pixels * count
+        else:
+            refines = any(name.startswith(REFINED) for name in computed)
+            samples += pixels * (1 + count) if refines else pixels
+            probes += pixels * view.adaptive.probes
+    rays = _rays_of(scene, samples, full, computed) | ({"probes": probes} if "probes" in computed else {})
+
     of_replicates = {name.removeprefix(REPLICATE) for name in computed if name.startswith(REPLICATE)}
-    more = _rays_of(scene, replicated, of_replicates)
+    more = _rays_of(scene, replicated, replicated, of_replicates)
     return rays | {f"{REPLICATE}{name}": count for name, count in more.items()}
 
 
-def _rays_of(scene: Scene, samples: int, computed: set[str]) -> dict[str, int]:
-    """Upper bounds of the rays of this many samples, by purpose."""
+def _rays_of(scene: Scene, samples: int, full: int, computed: set[str]) -> dict[str, int]:
+    """Upper bounds of the rays of this many samples, by purpose; `full` of them cast obscurance rays."""
     rays = {"primary": samples} if "hits" in computed else {}
     for name, light in scene.named_lights().items():
         if f"shadow:{name}" in computed and light.shadows and any(light.color()):
             rays[f"shadow:{name}"] = samples
     if {"obscurance", "obscurance_draws"} <= computed and scene.obscurance:
         traced = "raw_obscurance" if "raw_obscurance" in computed else "obscurance"
-        rays[traced] = samples * scene.obscurance.samples
+        rays[traced] = full * scene.obscurance.samples
     return rays
 
 
@@ -102,12 +115,13 @@ def expected_bytes(plan: Plan) -> dict[str, int]:
 def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
     """A plan for JSON output; `expected` is the memory of shapes, mesh files and textures [bytes]."""
     view, graph = plan.view, plan.graph
-    size = {"camera": view.name, "width": view.width, "height": view.height, "samples": view.samples}
-    first = {"first_samples": view.adaptive.first} if view.adaptive and view.is_adaptive else {}
+    count = view.samples * view.stands_for
+    size = {"camera": view.name, "width": view.width, "height": view.height, "samples": count}
+    probes = {"probes": view.adaptive.probes} if view.adaptive else {}
     whole = graph.without_loaders()
     rays = expected_rays(graph.scene, (view,), plan.computed)
     return {
-        "views": [size | first],
+        "views": [size | probes],
         "layers": [layer.name for layer in plan.outputs],
         "objects": which_objects(whole, plan.outputs),
         "once": [node.output for node in plan.once],

@@ -49,7 +49,7 @@ class Keys:
     def __init__(self, graph: Mapping[str, Node], view: View | None, salt: str) -> None:
         self._graph = graph
         self._salt = salt
-        self._known = {"tile": "tile", "surrounding_pixels": "", "view": fingerprint(view)}
+        self._known = {"tile": "tile", "surrounding_pixels": "", "read_pixels": "", "view": fingerprint(view)}
 
     def __call__(self, name: str) -> str:
         """The key of the buffer `name`, the same for all tiles."""

@@ -7,32 +7,40 @@ from functools import lru_cache
 from typing import Any
 
 from illumcli.errors import InputError
-from illumcli.film.view import View
+from illumcli.film.view import Adaptive, View
 from illumcli.geometry.shapes import Shape
 from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
-from illumcli.scene.spec import MeshFile, NameOrMesh, Object, Scene, default_material
+from illumcli.rays.camera import footprint
+from illumcli.scene.spec import Film, MeshFile, NameOrMesh, Object, Scene, default_material
 from illumcli.schema.messages import suggestion
 from illumcli.shading.rates import RATES, Rate
 from illumcli.shading.terms import given_terms
 from illumcli.shading.textures import paths
 
+FEWEST_PROBES, PROBE_SHARE = 2, 4
+"""Samples whose first hits adaptive sampling looks at: one in so many, but at least so many."""
+
 
 def views(scene: Scene) -> list[View]:
     """The scene's cameras with their films."""
     film = scene.film
-    return [
-        View(
-            name,
-            camera,
-            camera.width or film.width,
-            camera.height or film.height,
-            camera.samples or film.samples,
-            film.adaptive,
-        )
-        for name, camera in scene.named_cameras().items()
-    ]
+    cameras = []
+    for name, camera in scene.named_cameras().items():
+        count = camera.samples or film.samples
+        width, height = camera.width or film.width, camera.height or film.height
+        cameras.append(View(name, camera, width, height, count, adaptive(film, count)))
+    return cameras
+
+
+def adaptive(film: Film, samples: int) -> Adaptive | None:
+    """How adaptive sampling finds the pixels that one sample is not enough for; None if all get all."""
+    if film.adaptive is None or samples == 1:
+        return None
+    probes = film.adaptive.probes or max(FEWEST_PROBES, samples // PROBE_SHARE)
+    reach, spread = footprint(film.filter)
+    return Adaptive(min(probes, samples), reach, spread)
 
 
 def layers(scene: Scene, names: Sequence[str]) -> list[Layer]:

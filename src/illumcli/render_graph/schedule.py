@@ -8,9 +8,10 @@ from illumcli.errors import InputError
 from illumcli.film.tiles import min_tile_samples, tile_side
 from illumcli.film.view import View
 from illumcli.graph import Node
-from illumcli.layers import Layer
+from illumcli.layers import FIXED, Layer
 from illumcli.records import Value
-from illumcli.render_graph.build import GIVEN, SHAPE, SURROUNDINGS, Graph
+from illumcli.render_graph.build import GIVEN, SURROUNDINGS, Graph
+from illumcli.render_graph.build_adaptive import decision
 from illumcli.render_graph.cached import Lookup
 from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.needs import layers, reconstructs, views
@@ -30,11 +31,16 @@ class Plan(Value):
     graph: Graph
     outputs: tuple[Layer, ...]
     view: View
+    """With one sample per pixel if the picture is adaptive."""
     once: tuple[Node, ...]
     tile: tuple[Node, ...]
     lookup: Lookup = NOTHING_CACHED
     before: int = 0
     """How many of the steps of a tile run before the others read what these made of the tiles around."""
+    decided_by: int = 0
+    """How many of the steps of a tile decide which pixels of an adaptive picture need all samples."""
+    all_samples: Plan | None = None
+    """The nodes that run for those pixels."""
 
     @property
     def buffers(self) -> set[str]:
@@ -49,7 +55,7 @@ class Plan(Value):
     def last_use(self) -> dict[str, int]:
         """Number of the last tile node that reads each buffer of a tile; the film's buffers have none."""
         kept = {layer.buffer for layer in self.outputs} | COVERAGE
-        kept |= set(SHAPE) if self.view.is_adaptive else set()
+        kept |= {decision(layer) for layer in self.outputs} if self.all_samples else set()
         of_tile = {node.output for node in self.tile}
         last: dict[str, int] = {}
         for number, node in enumerate(self.tile):
@@ -85,7 +91,7 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
         Layers that do not exist, or that this film cannot have.
     """
     outputs = tuple(layers(scene, only or scene.outputs.layers))
-    if reconstructs(scene) and any(view.is_adaptive for view in views(scene)):
+    if reconstructs(scene) and any(view.adaptive for view in views(scene)):
         raise InputError(
             "obscurance.reconstruct needs the same samples in every pixel; leave it out, or film.adaptive"
         )
@@ -94,7 +100,7 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
             "the layer error is that of samples which are not reconstructed; leave it out, or "
             "obscurance.reconstruct"
         )
-    if any(layer.per_pixel for layer in outputs) and any(view.is_adaptive for view in views(scene)):
+    if any(layer.per_pixel for layer in outputs) and any(view.adaptive for view in views(scene)):
         raise InputError(
             "the layer error is that of a fixed number of samples; leave it out, or film.adaptive"
         )
@@ -103,16 +109,23 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
 
 def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]) -> list[str]:
     """The buffers that the film reads to reconstruct layers of some views."""
-    buffers = dict.fromkeys(layer.buffer for layer in outputs)
-    adaptive = any(view.is_adaptive for view in shown)
-    if adaptive:
-        buffers |= dict.fromkeys(SHAPE)
-    if adaptive or any(layer.buffer == "beauty" for layer in outputs):
+    buffers: dict[str, None] = {}
+    if any(view.adaptive for view in shown):
+        buffers |= dict.fromkeys(decisions(outputs))
+    buffers |= dict.fromkeys(layer.buffer for layer in outputs)
+    if any(layer.buffer == "beauty" for layer in outputs):
         buffers["alpha"] = None
     if any(layer.data for layer in outputs):
         buffers["samples"] = None
     repairs = (name for name in REPAIRS if name in graph.nodes)
     return [*(buffers | dict.fromkeys(["hits", "render_space", *repairs]))]
+
+
+def decisions(outputs: Sequence[Layer]) -> list[str]:
+    """The buffers that say which pixels of layers need all samples; data, never averaged, needs none."""
+    means = [layer for layer in outputs if not layer.data]
+    beauty = any(layer.buffer == "beauty" for layer in outputs)  # its alpha comes with it
+    return [*dict.fromkeys(decision(layer) for layer in [*means, *([FIXED["alpha"]] if beauty else [])])]
 
 
 def reached(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
@@ -121,22 +134,51 @@ def reached(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
     return [node.output for node in graph.topological_order(needed)]
 
 
-def schedule(graph: Graph, outputs: Sequence[Layer], view: View, lookup: Lookup = NOTHING_CACHED) -> Plan:
-    """The nodes that layers of a view need; those that read neither view nor tile run once, not per tile."""
+def schedule(
+    graph: Graph,
+    outputs: Sequence[Layer],
+    view: View,
+    lookup: Lookup = NOTHING_CACHED,
+    all_samples: Plan | None = None,
+) -> Plan:
+    """The nodes that layers of a view need; those that read neither view nor tile run once, not per tile.
+
+    Parameters
+    ----------
+    all_samples : Plan, optional
+        For the pixels of an adaptive picture that need all samples; by default from the same graph.
+    """
+    once, tile = _split(graph.topological_order(needed_buffers(graph, outputs, [view])))
+    if view.adaptive is None:
+        before = 0
+        if any(SURROUNDINGS in node.inputs.values() for node in tile):
+            needed = {node.output for node in graph.topological_order(["object_pixels"])}
+            tile.sort(key=lambda node: node.output not in needed)
+            before = sum(node.output in needed for node in tile)
+        return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
+
+    # An adaptive picture: first what decides, at the centres of pixels.
+    means = [layer for layer in outputs if not layer.data]
+    if means and all_samples is None:
+        all_samples = schedule(graph, means, view.all_samples())
+    if all_samples is not None:
+        known = {node.output for node in once}
+        once += [node for node in all_samples.once if node.output not in known]
+    decided_by = len(_split(graph.topological_order(decisions(outputs)))[1])
+    own, centres = tuple(outputs), view.centres()
+    return Plan(graph, own, centres, tuple(once), tuple(tile), lookup, 0, decided_by, all_samples)
+
+
+def _split(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
+    """Nodes that run once, and those that run for each tile."""
     of_tile = set(GIVEN)
-    once, tile = [], []
-    for node in graph.topological_order(needed_buffers(graph, outputs, [view])):
+    for node in nodes:
         if of_tile & set(node.inputs.values()):
             of_tile.add(node.output)
-            tile.append(node)
-        else:
-            once.append(node)
-    before = 0
-    if any(SURROUNDINGS in node.inputs.values() for node in tile):
-        needed = {node.output for node in graph.topological_order(["object_pixels"])}
-        tile.sort(key=lambda node: node.output not in needed)
-        before = sum(node.output in needed for node in tile)
-    return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
+    parts: tuple[list[Node], list[Node]] = ([], [])
+    for node in nodes:
+        parts[node.output in of_tile].append(node)
+    return parts
 
 
 def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> frozenset[str]:

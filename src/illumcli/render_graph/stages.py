@@ -18,12 +18,21 @@ from illumcli.film.view import View, distance
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.mesh_checks import faults
+from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.shapes import Shape
 from illumcli.rays import sampling
+from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import DepthCue
 from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
+from illumcli.shading.textures import Varying, texel_positions
+from illumcli.visibility.hemisphere import Hemispheres
+from illumcli.visibility.obscurance import Method
+from illumcli.visibility.obscurance import obscurance as traced
+
+MAX_RAYS = 1 << 16
+"""Obscurance rays of one sample, at most."""
 
 # --- once: contents of files -----------------------------------------------------------------------------
 
@@ -102,7 +111,45 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
     key = sampling.stream(seed, "obscurance")
     pixel = hits.sample // samples.per_pixel
     sample = hits.sample - pixel * samples.per_pixel
-    return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample + (samples.first or 0))
+    return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
+
+
+def obscurance(
+    tracer: Tracer,
+    hemispheres: Hemispheres,
+    obscurance_draws: NDArray[np.float64],
+    obscurance_method: Method,
+    hits: Hits,
+    view: View,
+    read_pixels: NDArray[np.bool_] | None,
+    baked_obscurance: Floats | None = None,
+) -> NDArray[np.float32]:
+    """(M,) w of every hit, by the rays of all samples that each sample stands for.
+
+    Parameters
+    ----------
+    read_pixels : (P,) bool, optional
+        Pixels whose obscurance is read; that of others is NaN.
+    """
+    method = replace(obscurance_method, samples=min(obscurance_method.samples * view.stands_for, MAX_RAYS))
+    if read_pixels is None:
+        return traced(tracer, hemispheres, obscurance_draws, method, baked_obscurance)
+    w = np.full(len(hits.sample), np.nan, F)
+    hit = np.flatnonzero(read_pixels.take(hits.sample // view.samples))
+    baked = None if baked_obscurance is None else baked_obscurance.take(hit)
+    w[hit] = traced(tracer, hemispheres.take(hit), obscurance_draws[:, hit], method, baked)
+    return w
+
+
+def texels(
+    geometry: SceneGeometry,
+    uvs: CornerVectors,
+    hits: Hits,
+    material_id: NDArray[np.uint32],
+    **textures: Varying,
+) -> NDArray[np.float32]:
+    """(M, 2) place of every hit in the largest texture of its material [texels]."""
+    return texel_positions(geometry, uvs, hits, material_id.astype(np.int32) - 1, tuple(textures.values()))
 
 
 def depth_cued(

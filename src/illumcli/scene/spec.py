@@ -240,25 +240,20 @@ class Filter(Description):
 
 
 class Adaptive(Description):
-    """Adaptive sampling: few samples for every pixel, and all of them only if these differ from each other or
-    from those of neighbouring pixels, in object, in normal, or, layer by layer, in light.
+    """Adaptive sampling: one sample at the centre of every pixel, and all of them only where one is not
+    enough: where objects meet, surfaces turn or leap in depth, light bends, textures are finer than pixels.
 
-    It is biased: features smaller than the spacing of the first samples stay missed.
+    It is biased: features between the samples that are looked at, such as the shadow of a wire, stay missed.
     """
 
-    first: Count = 4
-    """Samples of every pixel."""
-    difference: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """Greatest difference in light among them, as a share of the brightest."""
+    probes: Count | None = None
+    """Samples of every pixel whose first hits are looked at; by default a quarter of them, but at least 2."""
+    difference: Annotated[float, Field(gt=0, le=1)] = 0.02
+    """Greatest second difference of light over three pixels, as a share of the brightest around."""
 
 
 def _adaptive(value: Any) -> Any:
-    return {"first": value} if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-AdaptiveOrCount: TypeAlias = Annotated[
-    Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)
-]
+    return ({} if value else None) if isinstance(value, bool) else value
 
 
 class Film(Description):
@@ -270,11 +265,11 @@ class Film(Description):
     """Height of the image [pixels]."""
     samples: Count = 4
     """Samples per pixel; a single one is at the pixel's centre."""
-    adaptive: (
-        Annotated[Adaptive, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | Count)] | None
-    ) = None
-    """Adaptive sampling: all samples only where fewer differ; a number is short for `first`. By default every
-    pixel has all samples."""
+    adaptive: Annotated[
+        Adaptive | None, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool | None)
+    ] = None
+    """Adaptive sampling: all samples only where one is not enough; `true`, or how that is found out. By
+    default every pixel has all samples."""
     filter: Filter = DEFAULTS
     """The pixel filter."""
     background: Color | None = None

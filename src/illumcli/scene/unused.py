@@ -77,10 +77,9 @@ def _views(scene: Scene) -> Iterator[Fault]:
         if all(getattr(camera, key) for camera in cameras.values()):
             yield ("film", key), f"is not used, every camera has its own {key}; change theirs"
     samples = [camera.samples or film.samples for camera in cameras.values()]
-    if film.adaptive is not None and max(samples) <= film.adaptive.first:
-        fact = f"is not used, no pixel has more than the {film.adaptive.first} samples that come first"
-        yield ("film", "adaptive"), f"{fact}; raise film.samples"
     if max(samples) == 1:
+        if film.adaptive is not None:
+            yield ("film", "adaptive"), "is not used, no pixel has more than one sample; raise film.samples"
         yield ("film", "filter"), "is not used, a single sample looks through the pixel's centre; take more"
 
 

@@ -21,8 +21,8 @@ from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
-from illumcli.rays.corner_weights import CornerWeights
-from illumcli.rays.interaction import uv_at
+from illumcli.rays.corner_weights import CornerWeights, TriangleCorners
+from illumcli.rays.interaction import Hits, uv_at
 from illumcli.records import Record, Value
 from illumcli.schema.annotations import field_annotation, number_range
 from illumcli.schema.fields import LARGEST
@@ -374,6 +374,37 @@ def parameters(
         tuple(names),
         {key: at_all[:, 0] if key[1] == 1 else column_major(at_all) for key, at_all in values.items()},
     )
+
+
+def texel_positions(
+    geometry: SceneGeometry, uvs: CornerVectors, hits: Hits, material: Ids, varying: Sequence[Varying]
+) -> Floats:
+    """(M, 2) place of every hit in the largest texture of its material [texels]; 0 where it has none.
+
+    Parameters
+    ----------
+    material : (M,) int32
+        Material number of each hit.
+    varying : sequence of Varying
+        What the materials' parameters vary by.
+    """
+    out = np.zeros((len(material), 2), F, order="F")
+    for number in range(max((len(each.of_material) for each in varying), default=0)):
+        maps = [
+            each for part in varying for each in part.of_material[number].values() if isinstance(each, Map)
+        ]
+        at = np.flatnonzero(material == number) if maps else np.zeros(0, np.int64)
+        if not at.size:
+            continue
+        largest = max(maps, key=lambda each: each.image.shape[0] * each.image.shape[1])
+        corners = TriangleCorners(None, hits.triangle.take(at), hits.u.take(at), hits.v.take(at))
+        if largest.uv is None:
+            place = uv_at(geometry, uvs, CornerWeights(corners, (corners,)))
+        else:
+            place = CornerWeights(corners, (corners,)).interpolate_vertices(geometry, largest.uv)
+        height, width = largest.image.shape[:2]
+        out[at] = place * np.array([width, height], F)
+    return out
 
 
 class PointMaterials(Record):

@@ -148,13 +148,14 @@ def quads(*rectangles):
 
 
 def test_probes_find_what_lies_between_centres(tmp_path):
-    """A wire 0.4 pixels wide between two columns of centres, before nothing: all of it is found."""
+    """A wire 0.4 pixels wide between two columns of centres, close to another object: all of it is found."""
     path = tmp_path / "scene.yaml"
-    path.write_text(WIRE)
+    path.write_text(WIRE + "  - {mesh: wall.obj, material: {model: lambert, diffuse: 0.1}}\n")
+    (tmp_path / "wall.obj").write_text(quads((-3, 3, -3, 3, -0.02)))
     (tmp_path / "wire.obj").write_text(quads((0.03, 0.05, -0.5, 0.5, 0)))
     own, _ = rendered(path, ["beauty"])
     many, _ = rendered(path, ["beauty"], overrides=["film.adaptive=false"])
-    assert many["beauty"].max() > 0.2
+    assert np.count_nonzero(many["beauty"][..., 0] > 0.2) == 20
     assert own["beauty"].tobytes() == many["beauty"].tobytes()
 
 
@@ -180,6 +181,14 @@ objects:
 """)
     _, stats = rendered(path, ["beauty"])
     assert 50 <= stats.refined <= 280
+
+
+def test_a_steep_slope_is_no_edge_at_the_film_s(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_text(WIRE.replace("[0, 0, 5]", "[0, 1, 5.7]"))  # six pixels deeper with every row
+    (tmp_path / "wire.obj").write_text("v -9 0 -90\nv 9 0 -90\nv 9 0 90\nv -9 0 90\nf 4 3 2 1\n")
+    _, stats = rendered(path, ["beauty"])
+    assert stats.refined == 0
 
 
 def test_a_texture_finer_than_pixels_wants_all_samples(tmp_path):

@@ -41,7 +41,7 @@ def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:
     for numbers in same.values():
         if len(numbers) > 1:
             listed = ", ".join(map(str, numbers[:5])) + (", ..." if len(numbers) > 5 else "")
-            advice = "put a field that tells them apart into the pattern"
+            advice = "add a field to the pattern in which they differ"
             if variants[numbers[0] - 1] == variants[numbers[1] - 1]:
                 advice = "they are equal; give each value once"
             raise InputError(f"{pattern}: the name of {len(numbers)} variants ({listed}); {advice}")

@@ -1,4 +1,4 @@
-"""Verification: the renderer's own formulas against reference vectors."""
+"""Verification: compares the renderer's formulas with reference vectors."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ EVALUATORS: dict[str, Callable[[Inputs], Result]] = {
 
 
 def verify(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[TypeResult]:
-    """The cases of a vectors file in float64 against what is expected, by type in the file's order.
+    """Compare the cases of a vectors file, in float64, with their expected values; by type, in file order.
 
     Parameters
     ----------
     file : Path
-        By default the vectors that come with the package.
+        By default the vectors of the package.
     only : sequence of str
         Case types to verify; by default all.
 
     Raises
     ------
     InputError
-        The file is malformed, or holds an unknown case type or inputs that a formula does not accept.
+        The file is malformed, or has an unknown case type or inputs that a formula does not accept.
     """
     groups = _by_type(read_cases(file, EVALUATORS, only))
     return [
@@ -84,9 +84,9 @@ def refuse_failures(results: Sequence[TypeResult]) -> None:
 
 
 def verify_single(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[SingleResult]:
-    """The same in float32: how far each type is off, and why.
+    """The same in float32: the error of each type, and its cause.
 
-    Types that cast rays, which are always float32, are left out.
+    Types that cast rays are left out, because rays are always float32.
     """
     groups = _by_type(read_cases(file, EVALUATORS, only))
     evaluate_case = partial(evaluate, file)
@@ -104,14 +104,14 @@ def evaluate(
     place = f"{file}: {case.id}"
     inputs = Inputs(place, case.id, case.inputs, dtype, rounded)
     try:
-        with np.errstate(all="ignore"):  # what is not finite shows as an error of inf
+        with np.errstate(all="ignore"):  # values that are not finite give an error of inf
             return EVALUATORS[case.type](inputs)
     except ValueError as error:  # a parameter out of its range
         raise InputError([f"{place}: {fact}" for fact in _facts(error)]) from error
 
 
 def _facts(error: ValueError) -> list[str]:
-    """One line per problem; a description that is refused lists them with their places."""
+    """One line per problem; the errors of a description have several, with their places."""
     details: list[Any] = getattr(error, "errors", list)()
     return [f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in details] or [str(error)]
 

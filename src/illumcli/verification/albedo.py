@@ -19,12 +19,12 @@ from illumcli.verification.lobes import response
 NODES = 24
 """Gauss-Legendre nodes per panel."""
 HALVINGS = 24
-"""Panels halve towards the normal, so that lobes of exponent 10^6 and more are resolved."""
+"""Panels, each half as wide as the next, towards the normal: lobes of exponent 10^6 and more are resolved."""
 RIGHT = np.pi / 2
 
 
 def directional_albedo(inputs: Inputs) -> NDArray[np.float64]:
-    """The share of light from all directions that one lobe sends to the eye.
+    """The albedo of one lobe for an eye direction: its response to uniform light, integrated.
 
     Responses are evaluated in the precision of the inputs and summed in float64.
     """
@@ -42,7 +42,7 @@ def _qualitative(inputs: Inputs) -> OrenNayar:
 
 
 def _lobe_alone(Model: type[Phong] | type[BlinnPhong], inputs: Inputs) -> float:
-    """These models have no cosine on the lobe; as reflected light it gets one."""
+    """The albedo of the lobe times the cosine, which these models do not have."""
     model = Model(diffuse=(0.0, 0.0, 0.0), specular=(1.0, 1.0, 1.0), exponent=inputs.number("exponent"))
     return _eye_on_normal(model, inputs, np.cos)
 
@@ -52,7 +52,7 @@ def _eye_on_normal(
     inputs: Inputs,
     factor: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.ones_like,
 ) -> float:
-    """The integral where the response does not depend on the azimuth."""
+    """The integral if the response does not depend on the azimuth."""
     edges = np.concatenate([[0], RIGHT * 0.5 ** np.arange(HALVINGS, -1, -1)])
     theta, weight = _panels(edges)
     values = _response(model, inputs, theta, np.zeros_like(theta), 0.0)
@@ -60,8 +60,8 @@ def _eye_on_normal(
 
 
 def _eye_anywhere(model: IlluminationModel, inputs: Inputs) -> float:
-    """The integral over both angles, split where Oren-Nayar's terms have a kink: at the eye's own angle
-    and at azimuths a right angle apart."""
+    """The integral over both angles, split where Oren-Nayar's terms have a kink: at the eye's polar angle and
+    at azimuths a right angle apart."""
     eye = inputs.number("theta")
     theta, weight = _panels(np.array([0, eye, RIGHT]))
     phi, around = _panels(np.array([0, RIGHT, np.pi]))

@@ -1,4 +1,4 @@
-"""The inputs of one case as the renderer's functions take them: arrays of length 1, in a chosen precision."""
+"""The inputs of a case, converted for the renderer's functions: arrays of length 1, in a chosen precision."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ T = TypeVar("T")
 
 
 class Inputs(Value):
-    """The inputs of a case by key; what is missing or of the wrong kind is an InputError at `place`.
+    """The inputs of a case by key; missing or malformed ones raise an InputError at `place`.
 
-    `dtype` is the precision of every array returned. The keys in `rounded` pass through float32 first, so
-    that float64 code can be run on the inputs that float32 code sees.
+    `dtype` is the precision of all returned arrays. The inputs in `rounded` are rounded to float32 first, so
+    that float64 code can be run with the inputs of float32 code.
     """
 
     place: str
@@ -31,7 +31,7 @@ class Inputs(Value):
     rounded: frozenset[str] = frozenset()
 
     def value(self, key: str) -> Any:
-        """The input as the file has it."""
+        """The input as in the file."""
         if key not in self.values:
             raise InputError(f"{self.place}: inputs lack '{key}'")
         return self.values[key]
@@ -41,7 +41,7 @@ class Inputs(Value):
         return float(self._array(key, ()))
 
     def number_or_none(self, key: str) -> float | None:
-        """A scalar, or None where the file has null."""
+        """A scalar, or None if the file has null."""
         return None if self.value(key) is None else self.number(key)
 
     def scalars(self, key: str) -> Floats:
@@ -54,7 +54,7 @@ class Inputs(Value):
         return float(value[0]), float(value[1]), float(value[2])
 
     def vectors(self, key: str) -> Vectors:
-        """(k, 3) points or vectors as they are; one vector is (1, 3), a list of k is (k, 3)."""
+        """(k, 3) points or vectors, not normalized; a single one is (1, 3)."""
         return column_major(self._array(key, (3,), (None, 3)).reshape(-1, 3))
 
     def points2(self, key: str) -> NDArray[Any]:
@@ -62,7 +62,7 @@ class Inputs(Value):
         return self._array(key, (2,), (3,))[:2]
 
     def unit(self, key: str) -> Vectors:
-        """(1, 3) direction, made unit in float64 before it is rounded."""
+        """(1, 3) direction, normalized in float64 before it is rounded."""
         vector = self._exact(key, (3,))
         size = np.linalg.norm(vector)
         if not size > 0:
@@ -70,7 +70,7 @@ class Inputs(Value):
         return column_major(self._round(key, vector / size).reshape(1, 3))
 
     def tangent(self) -> Vectors:
-        """(1, 3) unit: the direction `t` made perpendicular to `n` in float64 before it is rounded."""
+        """(1, 3) unit: the direction `t`, projected perpendicular to `n` in float64 before it is rounded."""
         n, t = self._exact("n", (3,)), self._exact("t", (3,))
         t = t - (t @ n) / (n @ n) * n
         return column_major(self._round("t", t / np.linalg.norm(t)).reshape(1, 3))
@@ -105,7 +105,7 @@ class Inputs(Value):
         return replace(self, values=value, rounded=frozenset(value if key in self.rounded else ()))
 
     def _exact(self, key: str, *shapes: tuple[int | None, ...]) -> NDArray[np.float64]:
-        """The input in float64, of one of these shapes, where None stands for any length."""
+        """The input in float64, which must have one of these shapes; None allows any length."""
         try:
             array = np.asarray(self.value(key))
         except ValueError:

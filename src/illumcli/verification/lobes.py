@@ -1,4 +1,4 @@
-"""Evaluators of the illumination models: the classes that scenes use, on the terms the renderer forms."""
+"""Evaluators of the illumination models: the renderer's models, on terms that the renderer computes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) 
     Parameters
     ----------
     more : (N, 3) or (3,)
-        Further terms that the model reads: `v`, `t`, and `light`, the light's colour.
+        Other given terms that the model needs: `v`, `t`, and `light`, the light's colour.
     """
     out = np.zeros_like(l)
     lit = np.flatnonzero(dot(n, l) > 0)
@@ -39,7 +39,7 @@ def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) 
 
 
 def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Floats:
-    """(1,) f_r = response / n.l of a grey model; 0 where light or eye are below the horizon."""
+    """(1,) f_r = response / n.l of a grey model; 0 if light or eye is below the horizon."""
     n, l, v = (inputs.unit(key) for key in ("n", "l", "v"))
     n_l = dot(n, l)
     if not (n_l[0] > 0 and dot(n, v)[0] > 0):
@@ -48,12 +48,12 @@ def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Floats:
 
 
 def facing(inputs: Inputs) -> bool:
-    """Whether light and eye are both above the horizon."""
+    """True if light and eye are both above the horizon."""
     n = inputs.unit("n")
     return bool(dot(n, inputs.unit("l"))[0] > 0 and dot(n, inputs.unit("v"))[0] > 0)
 
 
-def formed(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
+def computed_terms(inputs: Inputs, *names: str, **more: Vectors) -> list[Any]:
     """Terms of the renderer by name, computed from the case's n, l and v and from `more`."""
     buffers: dict[str, Any] = {key: inputs.unit(key) for key in ("n", "l", "v")} | more
     for node in terms.ordered_terms(names, tuple(buffers)):
@@ -74,7 +74,7 @@ def oren_nayar_bounces(inputs: Inputs) -> Floats:
     """[f1, f2] as parts of f_r, not clamped."""
     if not facing(inputs):
         return np.zeros(2, inputs.dtype)
-    n_l, n_v, sin_l, sin_v, cos_phi = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "cos_phi")
+    n_l, n_v, sin_l, sin_v, cos_phi = computed_terms(inputs, "n_l", "n_v", "sin_l", "sin_v", "cos_phi")
     one, two = oren_nayar_terms(n_l, n_v, sin_l, sin_v, cos_phi, inputs.scalars("sigma"))
     rho = inputs.scalars("albedo")
     return np.concatenate([one * rho, two * rho * rho]) / np.pi
@@ -94,7 +94,7 @@ def strauss_terms(inputs: Inputs) -> NDArray[Any]:
     """[r_d, r_n, F, G_i, G_r, r_j, r_s]."""
     white = Strauss(color=(1.0, 1.0, 1.0), **strauss_parameters(inputs))
     surface = Surface(*(inputs.scalars(key) for key in ("smoothness", "transparency", "kj", "kf", "kg")))
-    n_l, n_v, sin_l, sin_v, gap_rv = formed(inputs, "n_l", "n_v", "sin_l", "sin_v", "gap_rv")
+    n_l, n_v, sin_l, sin_v, gap_rv = computed_terms(inputs, "n_l", "n_v", "sin_l", "sin_v", "gap_rv")
     specular = strauss_specular(n_l, n_v, sin_l, sin_v, gap_rv, surface)
     r_d = np.asarray(white.diffuse_color(), inputs.dtype)[:1]
     return np.concatenate([r_d, (1 - surface.t) * surface.s**3, *specular])
@@ -114,7 +114,7 @@ def geometry_of_strauss(inputs: Inputs) -> Floats:
 
 
 def kajiya_kay(inputs: Inputs) -> Floats:
-    """A strand of hair: no surface hides the light, so the lobes are evaluated directly."""
+    """A strand of hair without a surface that blocks light: the lobes are evaluated directly."""
     model = KajiyaKay(
         diffuse=inputs.color("kd"), specular=inputs.color("ks"), exponent=inputs.number("exponent")
     )
@@ -123,12 +123,12 @@ def kajiya_kay(inputs: Inputs) -> Floats:
 
 
 def grained(Model: type[IlluminationModel], **keys: str) -> Callable[[Inputs], Floats]:
-    """Evaluator of f_r of a model whose grain is the case's tangent.
+    """Evaluator of f_r of an anisotropic model with the case's tangent.
 
     Parameters
     ----------
     keys
-        The key in the cases of each parameter: colours of `diffuse` and `specular`, numbers of others.
+        Parameter -> its key in the cases: colours for `diffuse` and `specular`, numbers for others.
     """
 
     def evaluate_case(inputs: Inputs) -> Floats:

@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from illumcli.arrays import Floats
 from illumcli.models import merl
 from illumcli.verification.inputs import Inputs
-from illumcli.verification.lobes import formed
+from illumcli.verification.lobes import computed_terms
 
 
 def rusinkiewicz(inputs: Inputs) -> Floats:
     """[theta_h, phi_h, theta_d, phi_d] about the tangent."""
     theta_h, theta_d, phi_d = angles(inputs)
-    t_s, b_s = formed(inputs, "t_s", "b_s", t=inputs.tangent())
+    t_s, b_s = computed_terms(inputs, "t_s", "b_s", t=inputs.tangent())
     return np.concatenate([theta_h, np.arctan2(b_s, t_s), theta_d, phi_d])
 
 
 def rusinkiewicz_theta(inputs: Inputs) -> Floats:
-    """[theta_h, theta_d], which are defined where the azimuths are not."""
+    """[theta_h, theta_d], which are defined even if the azimuths are not."""
     return np.concatenate(angles(inputs)[:2])
 
 
 def angles(inputs: Inputs) -> tuple[Floats, Floats, Floats]:
-    """theta_h, theta_d and phi_d, as the model looks them up."""
-    return merl.rusinkiewicz(*formed(inputs, "nxs", "n_s", "n", "d", "s_s"))
+    """theta_h, theta_d and phi_d, as the model computes them."""
+    return merl.rusinkiewicz(*computed_terms(inputs, "nxs", "n_s", "n", "d", "s_s"))
 
 
 def merl_index(inputs: Inputs) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Evaluators of Cook-Torrance and its terms: Fresnel, distributions, masking, the shift of colour."""
+"""Evaluators of Cook-Torrance and its terms: Fresnel, distributions, masking, colour shift."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from illumcli.verification.lobes import brdf
 PI = float(np.pi)
 
 Facets = tuple[_microfacet.Distribution, bool, float]
-"""A distribution, whether with its printed constants, and what multiple of it the case's D is."""
+"""A distribution, True for its printed constants, and the factor between it and the case's D."""
 
 DISTRIBUTIONS: dict[str, Callable[[Inputs], Facets]] = {
     "gaussian": lambda d: (_microfacet.Gaussian(m=d.number("m"), c=d.number("c")), False, 1),
@@ -39,7 +39,7 @@ REFLECTANCES: dict[str, Callable[[Inputs], _fresnel.Fresnel]] = {
     "one": lambda f: _fresnel.Constant(value=(1.0, 1.0, 1.0)),
 }
 UNDER_DGF = {"microfacet_4": 4.0, "printed_pi": PI}
-"""What n.l n.v is multiplied by under D G F."""
+"""Factor on n.l n.v in the denominator under D G F."""
 
 
 def ndf(inputs: Inputs) -> Floats:
@@ -62,7 +62,7 @@ def geometry_vgroove(inputs: Inputs) -> Floats:
 
 
 def cook_torrance(inputs: Inputs) -> Floats:
-    """f_r of the model; where a case joins a D and a constant that no scene can, by their ratio."""
+    """f_r of the model; for combinations of D and constant that scenes do not have, by their ratio."""
     d, f = inputs.part("D"), inputs.part("F")
     distribution, printed, share = d.choose("kind", DISTRIBUTIONS)(d)
     share *= UNDER_DGF["printed_pi" if printed else "microfacet_4"] / inputs.choose("convention", UNDER_DGF)
@@ -92,7 +92,7 @@ def fresnel_schlick(inputs: Inputs) -> Floats:
 
 
 def fresnel_sin_tan(inputs: Inputs) -> Floats:
-    """The form by angles: the dielectric at c = cos(phi)."""
+    """The formula by angles: the dielectric at c = cos(phi)."""
     return _fresnel.dielectric(np.cos(inputs.scalars("phi")), inputs.scalars("mu"))
 
 

@@ -51,7 +51,7 @@ def vertex_normal(inputs: Inputs) -> NDArray[Any]:
 
 
 def implicit_normal(inputs: Inputs) -> NDArray[Any]:
-    """The gradient of f, by the derivatives that formulas of a scene have."""
+    """The gradient of f, by the derivatives of a scene's formulas."""
     f = parsed(inputs.choose("surface", IMPLICIT), inputs, ("x", "y", "z"))
     return formula.implicit_normal(f, inputs.vectors("point").astype(np.float64))[0]
 
@@ -64,7 +64,7 @@ def parametric_normal(inputs: Inputs) -> NDArray[Any]:
 
 
 def parsed(text: str, inputs: Inputs, variables: tuple[str, ...]) -> formula.Formula:
-    """The formula with the case's constants written into it."""
+    """The formula with the case's constants inserted."""
     names = {name for _, name, _, _ in Formatter().parse(text) if name}
     return formula.parse(text.format(**{name: f"({inputs.number(name)!r})" for name in names}), variables)
 

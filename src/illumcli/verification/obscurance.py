@@ -1,4 +1,4 @@
-"""Evaluators of the obscurance cases: the falloff itself, and closed forms against the Monte Carlo estimator.
+"""Evaluators of the obscurance cases: falloffs, and the Monte Carlo estimator against closed forms.
 
 A closed form is built as real geometry and estimated at its receiver by the same code that shades pixels. The
 estimate is compared by its own standard error, from independent turns of the sample pattern.
@@ -27,9 +27,9 @@ from illumcli.visibility.obscurance import Method, estimates
 
 PATTERNS = 128
 RAYS = 256
-"""Per pattern."""
+"""Rays per pattern."""
 RESOLUTION = 1 / (64 * RAYS)
-"""Least standard error of an estimate: the 16 phases of a pattern resolve r^2 to 1 / (32 RAYS)."""
+"""Least standard error of an estimate, since the 16 phases of a pattern resolve r^2 to 1 / (32 RAYS)."""
 
 
 def exponential(inputs: Inputs) -> Exponential:
@@ -45,23 +45,23 @@ def mu(inputs: Inputs) -> Floats:
 
 
 def ao_visible(inputs: Inputs) -> Estimate:
-    """Every hit blocks."""
+    """All hits occlude."""
     return estimate(surroundings(inputs), Step(), inputs.id)
 
 
 def ao_dmax(inputs: Inputs) -> Estimate:
-    """Hits nearer than d_max block."""
+    """Hits nearer than d_max occlude."""
     return estimate(surroundings(inputs), Step(max_distance=inputs.number("d_max")), inputs.id)
 
 
 def obscured(inputs: Inputs) -> Estimate:
-    """Hits weigh by their distance."""
+    """Hits are weighted by distance."""
     return estimate(surroundings(inputs), exponential(inputs), inputs.id)
 
 
 def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
-    """w at the receiver, the mean over many turns and phases of the pattern, and its standard error."""
-    # One receiver for every pattern, at the origin of the scene.
+    """w at the receiver, the mean over many rotations and phases of the pattern, and its standard error."""
+    # A receiver for each pattern, all at the origin of the scene.
     geometry = place_meshes([Mesh.of_triangles(around.vertices, around.triangles)], [np.eye(4)])
     ng = column_major(np.tile([0.0, 0.0, 1.0], (PATTERNS, 1)), F)
     here = np.tile(geometry.render_space.from_world(np.zeros(3)), (PATTERNS, 1))
@@ -69,7 +69,7 @@ def estimate(around: Surroundings, falloff: Falloff, purpose: str) -> Estimate:
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() / geometry.render_space.radius
     origins = offset_ray_origins(here, ng, np.full(PATTERNS, edge))
 
-    # A random turn and phase for each pattern.
+    # A random rotation and phase for each pattern.
     number = np.arange(PATTERNS, dtype=np.uint32)
     draws = np.stack(
         [unit_interval(hashed(stream(0, f"{purpose} {what}"), number)) for what in ("turn", "phase")]

@@ -12,29 +12,29 @@ from illumcli.records import Record, Value
 from illumcli.verification.vectors import Case
 
 STANDARD_ERRORS = 4.5
-"""An estimate further off than this many of its own standard errors fails; one in 150 000 does by chance."""
+"""An estimate with an error above this many of its standard errors fails; by chance one in 150 000 does."""
 
 
 class Estimate(Value):
-    """A Monte Carlo value and its own standard error."""
+    """A Monte Carlo value and its standard error."""
 
     value: float
     standard_error: float
 
 
 Result: TypeAlias = NDArray[Any] | Estimate
-"""What an evaluator returns: values of any shape, in the order of what is expected."""
+"""The result of an evaluator: values of any shape, in the order of the expected values, or an estimate."""
 
 
 class Outcome(Record):
-    """A case's error, and the largest error that passes, in the same unit."""
+    """A case's error and the largest error that passes, in the same unit."""
 
     case: Case
     error: float
-    """Largest deviation over the largest expected value, or standard errors; inf where it is not finite."""
+    """Largest deviation relative to the largest expected value, or in standard errors; inf if not finite."""
     allowed: float
     statistical: bool = False
-    """Errors are counted in standard errors."""
+    """True if the error is in standard errors."""
 
     @property
     def passed(self) -> bool:
@@ -49,12 +49,12 @@ class TypeResult(Record):
 
     @property
     def worst(self) -> Outcome:
-        """The outcome of the largest error; among equals the first."""
+        """The outcome with the largest error, the first among equals."""
         return max(self.outcomes, key=lambda outcome: outcome.error)
 
     @property
     def used(self) -> float:
-        """The largest share of its own tolerance that a case needs; above 1 it fails."""
+        """The largest error of a case relative to its tolerance; above 1 the case fails."""
         return float(max(_share(outcome.error, outcome.allowed) for outcome in self.outcomes))
 
     @property
@@ -64,14 +64,14 @@ class TypeResult(Record):
 
 
 def _share(error: float, allowed: float) -> float:
-    """Of the tolerance that an error needs; inf where nothing but 0 passes."""
+    """The error relative to the tolerance; inf if only 0 passes."""
     if allowed:
         return error / allowed
     return 0.0 if error == 0 else float("inf")
 
 
 def judge(case: Case, result: Result) -> Outcome:
-    """The error of a result and what the case allows."""
+    """The error of a result, and the largest that the case allows."""
     if isinstance(result, Estimate):
         error = deviation(case, np.array([result.value]))
         return Outcome(case, error / result.standard_error, STANDARD_ERRORS, statistical=True)
@@ -79,7 +79,7 @@ def judge(case: Case, result: Result) -> Outcome:
 
 
 def deviation(case: Case, result: NDArray[Any]) -> float:
-    """max |x_i - e_i|; inf where the result is not finite or has another number of values."""
+    """max |x_i - e_i|; inf if the result is not finite or has another number of values."""
     values = np.asarray(result, np.float64).ravel()
     if values.shape != case.expected.shape or not np.isfinite(values).all():
         return float("inf")

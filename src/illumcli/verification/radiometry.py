@@ -57,7 +57,7 @@ def lambert_radiance(inputs: Inputs) -> Floats:
 
 
 def lighting_12_75(inputs: Inputs) -> Floats:
-    """Ambient light times obscurance plus direct light: kept apart, or coupled as one text prints it."""
+    """Ambient light times obscurance plus direct light: separate, or coupled as printed in one text."""
     n, kd, w = inputs.unit("n"), inputs.scalars("kd"), inputs.scalars("w")
     ka_light = (inputs.scalars("ka") * inputs.scalars("Ia"))[:, None]
     law = InverseSquare(law="inverse_square")

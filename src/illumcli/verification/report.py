@@ -28,7 +28,7 @@ def as_table(results: Sequence[TypeResult]) -> str:
 
 
 def summary(results: Sequence[TypeResult]) -> str:
-    """How many cases were verified, and how many are beyond their tolerance."""
+    """Number of verified cases, and of those beyond their tolerance."""
     count = sum(len(result.outcomes) for result in results)
     statistical = sum(outcome.statistical for result in results for outcome in result.outcomes)
     failed = sum(len(result.failed) for result in results)
@@ -62,7 +62,7 @@ def as_data(results: Sequence[TypeResult]) -> dict[str, Any]:
 
 
 def single_table(results: Sequence[SingleResult]) -> str:
-    """Worst errors of float32 per type; then, for each type that loses digits, its worst case and why."""
+    """Worst float32 errors by type; then, for each type that loses digits, its worst case and the cause."""
     lines = [("type", "cases", "worst error", "in case", f"above {FINE:.0e}")]
     lines += [
         (
@@ -86,7 +86,7 @@ def single_table(results: Sequence[SingleResult]) -> str:
 
 
 def single_summary(results: Sequence[SingleResult]) -> str:
-    """How many cases lost digits, by cause."""
+    """Number of cases that lost digits, by cause."""
     count = sum(len(result.outcomes) for result in results)
     causes = Counter(loss.cause for result in results for loss in result.losses)
     return (

@@ -24,13 +24,13 @@ Point = NDArray[Any]  # (3,) or (2,)
 
 
 def lerp(inputs: Inputs) -> Floats:
-    """The value at the distance a from v1 and b from v2."""
+    """The value at distance a from v1 and b from v2, linearly interpolated."""
     a, b = inputs.scalars("a"), inputs.scalars("b")
     return (b * inputs.scalars("v1") + a * inputs.scalars("v2")) / (a + b)
 
 
 def constant_shading(inputs: Inputs) -> Floats:
-    """One value per facet, light and eye along +z, no highlight."""
+    """One value per facet, with light and eye along +z and no highlight."""
     n = unit(column_major(cross_normal(inputs.vectors("vertices"), 0)[None], inputs.dtype))
     up = column_major(np.array([[0, 0, 1]], inputs.dtype))
     model = BlinnPhong(diffuse=inputs.color("kd"), specular=(0.0, 0.0, 0.0))
@@ -83,17 +83,17 @@ def phong_shading(inputs: Inputs) -> Floats:
 
 
 def quadratic_normal(inputs: Inputs) -> Vectors:
-    """n(s) along an edge, not unit."""
+    """n(s) along an edge, not normalized."""
     return quadratic(inputs.unit("n0"), inputs.unit("n1"), inputs.vectors("delta"), inputs.scalars("s"))
 
 
 def linear(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
-    """The normal between two, not unit (Phong 1975)."""
+    """The linearly interpolated normal, not normalized (Phong 1975)."""
     return _mix(n0, n1, s[:, None])
 
 
 def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
-    """The same by van Overveld and Wyvill (1997): the renderer's triangle, of which one edge is looked at."""
+    """The quadratic normal of van Overveld and Wyvill (1997), on an edge of the renderer's triangle."""
     origin, none = np.zeros_like(delta), np.zeros_like(s)
     corners = ((origin, n0, 1 - s), (delta, n1, s), (origin, n0, none))
     n = linear(n0, n1, delta, s)
@@ -102,7 +102,7 @@ def quadratic(n0: Vectors, n1: Vectors, delta: Vectors, s: Floats) -> Vectors:
 
 
 def _along(y: Floats, start: Point, end: Point) -> Floats:
-    """Where the scanline y crosses an edge, 0 at its start and 1 at its end."""
+    """The parameter where scanline y crosses an edge, 0 at its start and 1 at its end."""
     return (y - start[1]) / (end[1] - start[1])
 
 

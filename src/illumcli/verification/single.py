@@ -1,4 +1,4 @@
-"""Where single precision loses digits, and why: the renderer's formulas in float32 against the reference."""
+"""Errors of single precision and their causes: the renderer's formulas in float32 against the reference."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from illumcli.verification.outcome import Outcome, Result, judge
 from illumcli.verification.vectors import Case
 
 FINE = 1e-5
-"""Relative error that float32 keeps where nothing cancels."""
+"""Relative error of float32 without cancellation."""
 DIRECTIONS = ("l", "v", "h", "t")
-"""Inputs that are shown by their cosine to the normal."""
+"""Inputs that are printed as their cosine to the normal."""
 
 Evaluate: TypeAlias = Callable[[Case, DTypeLike, frozenset[str]], Result]
-"""From a case and the fields `dtype` and `rounded` of `Inputs`."""
+"""The result of a case, for fields `dtype` and `rounded` of `Inputs`."""
 
 
 class Loss(Record):
-    """A case that float32 gets wrong by more than `FINE`."""
+    """A case with a float32 error above `FINE`."""
 
     outcome: Outcome
     cause: str
-    """`inputs` where rounding them explains it, `range` where float32 has no such number, or `arithmetic`."""
+    """`inputs` if their rounding explains the error, `range` if float32 cannot represent them, or
+    `arithmetic`."""
     reason: str
     inputs: str
-    """The case's inputs, in short."""
+    """The case's inputs, abbreviated."""
 
 
 class SingleResult(Record):
@@ -45,7 +46,7 @@ class SingleResult(Record):
 
 
 def single_result(type_: str, cases: Sequence[Case], evaluate: Evaluate) -> SingleResult:
-    """The cases of one type in float32; those that lost digits with the reason."""
+    """The cases of one type in float32, with the cause for those that lost digits."""
     outcomes = [_outcome(case, evaluate, dtype=np.float32) for case in cases]
     return SingleResult(type_, outcomes, [_loss(o, evaluate) for o in outcomes if o.error > FINE])
 
@@ -57,18 +58,18 @@ def _outcome(
 
 
 def _loss(outcome: Outcome, evaluate: Evaluate) -> Loss:
-    """Why a case lost digits, found by rounding its inputs to float32 in float64 code."""
+    """The cause of a case's error, by running float64 code with inputs rounded to float32."""
     case, limits = outcome.case, np.finfo(np.float32)
     short = shortened(case.inputs)
     if not limits.tiny <= case.scale <= limits.max:
         return Loss(outcome, "range", f"{case.scale:.1e} is outside float32's range", short)
 
-    # Less than half of the error comes from rounding the inputs: it is the arithmetic.
+    # If rounding all inputs causes less than half of the error, the cause is arithmetic.
     by_inputs = _outcome(case, evaluate, rounded=frozenset(case.inputs)).error
     if by_inputs < outcome.error / 2:
         return Loss(outcome, "arithmetic", f"arithmetic; rounding the inputs makes {by_inputs:.1e}", short)
 
-    # Otherwise name the input whose rounding alone does most.
+    # Otherwise it is the input whose rounding alone has the largest effect.
     by_input = {
         key: _outcome(case, evaluate, rounded=frozenset([key])).error
         for key, value in case.inputs.items()

@@ -19,11 +19,11 @@ from illumcli.verification.inputs import Inputs
 ENDLESS = 1e5
 """Size of infinite walls, in distances to the wall."""
 LONG = 1e2
-"""Length of infinite walls of a finite height, in heights or distances: the error falls with its cube."""
+"""Length of infinite walls of finite height, in heights or distances; the error falls with its cube."""
 WIDE = 3e2
-"""Half width of infinite plates, in heights; they get side walls."""
+"""Half width of infinite plates, in heights; side walls close them."""
 SIDES = 256
-"""Corners of the polygon that stands for a circle."""
+"""Corners of the polygon that approximates a circle."""
 
 
 class Surroundings(Record):
@@ -45,7 +45,7 @@ class Surroundings(Record):
 
 
 def surroundings(inputs: Inputs) -> Surroundings:
-    """The geometry that the case names, with a floor where the receiver is flat."""
+    """The geometry that the case names, with a floor if the receiver is flat."""
     return inputs.choose("geometry", GEOMETRIES)(inputs)
 
 
@@ -64,7 +64,7 @@ def floor(size: float) -> Surroundings:
 
 
 def on_floor(size: float, *parts: Surroundings) -> Surroundings:
-    """The parts, and a floor of this size under the receiver; rays start farther off a larger one."""
+    """The parts and a floor of this size under the receiver; the larger it is, the larger are ray offsets."""
     scene = floor(size)
     for part in parts:
         scene = scene + part
@@ -131,7 +131,7 @@ def wall_finite(inputs: Inputs) -> Surroundings:
 
 
 def corner(inputs: Inputs) -> Surroundings:
-    """Two infinite walls at x = a and y = b; each hides the rest of the other."""
+    """Two infinite walls at x = a and y = b; each ends where the other hides it."""
     a, b, height = inputs.number("a"), inputs.number("b"), _height_or_none(inputs)
     along, up = _reach(max(a, b), height)
     return on_floor(min(a, b) / 2, upright([a, -along], [a, along], up), upright([-along, b], [along, b], up))
@@ -189,14 +189,14 @@ def dome(inputs: Inputs) -> Surroundings:
 
 
 def sphere_inside(inputs: Inputs) -> Surroundings:
-    """The receiver on the inner wall of a ball; rings lie closer near the receiver."""
+    """The receiver on the inside of a sphere, whose rings are denser near the receiver."""
     arc = raised_arc(np.pi * (1 - np.linspace(1, 0, 193) ** 1.5), 32)
     ball = revolved(inputs.number("radius") * arc, 32)
     return Surroundings(ball.vertices - ball.vertices[-1], ball.triangles)
 
 
 def plate(inputs: Inputs) -> Surroundings:
-    """An infinite plate parallel to the floor; side walls stand where it is cut off."""
+    """An infinite plate parallel to the floor, with side walls where it is cut off."""
     h = inputs.number("height")
     half = max(WIDE * h, 3 * (inputs.number_or_none("d_max") or 0))
     return on_floor(h, _room(-half, half, -half, half, h))
@@ -224,11 +224,11 @@ def _room(x0: float, x1: float, y0: float, y1: float, height: float) -> Surround
 
 
 def _ball(radius: float, centre: NDArray[np.float64]) -> Surroundings:
-    """A ball whose outline, seen from the origin, is a polygon with the area of its true outline.
+    """A sphere whose silhouette from the origin is a polygon with the area of the true silhouette.
 
     The axis points at the receiver; one ring of corners is where tangents from the receiver touch the ball.
     """
-    # Rings from the pole that faces the receiver, one of them on the outline.
+    # Rings from the pole that faces the receiver, one of them on the silhouette.
     away = float(np.linalg.norm(centre))
     tangent = max(float(np.arccos(min(radius / away, 1.0))), 1e-3)
     angles = np.unique(np.concatenate([[0, tangent], np.linspace(tangent, np.pi, 12)]))
@@ -246,7 +246,7 @@ def _height_or_none(inputs: Inputs) -> float | None:
 
 
 def _reach(distance: float, height: float | None) -> tuple[float, float]:
-    """How far a wall goes to either side, and how high it is."""
+    """Half length and height of a wall."""
     if height is None:
         return ENDLESS * distance, ENDLESS * distance
     return LONG * max(distance, height), height

@@ -1,8 +1,8 @@
 """Reads reference vectors: cases of inputs, expected values and tolerances, from JSON.
 
-A file is a list of objects with the keys ``id, model, inputs, expected, rtol, atol``, besides what is for
-readers (``source, note, quantity``). `model` is the case type. Directions in `inputs` need not have unit
-length. A result x passes when max_i |x_i - e_i| <= atol + rtol * max_i |e_i|.
+A file is a list of objects with the keys ``id, model, inputs, expected, rtol, atol``; the keys ``source``,
+``note`` and ``quantity`` are documentation. `model` is the case type. Directions in `inputs` need not have
+unit length. A result x passes if max_i |x_i - e_i| <= atol + rtol * max_i |e_i|.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from illumcli.records import Record
 from illumcli.schema.messages import suggestion
 
 PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
-"""The vectors that come with the package, computed at 50 digits."""
+"""The vectors of the package, computed with 50 digits."""
 
 KEYS = ("id", "model", "inputs", "expected", "rtol", "atol")
 MAX_SHOWN = 10
-"""Problems, or cases, that a message lists."""
+"""Most problems or cases in a message."""
 MAX_BYTES = 1 << 28
-"""Largest size of a file once it is unpacked."""
+"""Largest unpacked size of a file."""
 OPENERS: dict[str, Callable[..., Any]] = {".xz": lzma.open, ".gz": gzip.open}
 
 
 class Case(Record):
-    """One set of inputs and what is expected of them."""
+    """A set of inputs with the expected values."""
 
     id: str
     type: str
@@ -45,7 +45,7 @@ class Case(Record):
 
     @property
     def scale(self) -> float:
-        """max |e_i|, the denominator of relative errors; 1 where only 0 is expected."""
+        """max |e_i|, the denominator of relative errors; 1 if all expected values are 0."""
         return float(np.abs(self.expected).max()) or 1.0
 
     @property
@@ -125,7 +125,7 @@ def _refused(word: str) -> float:
 
 
 def _case(path: Path, number: int, entry: Any, problems: list[str]) -> Case | None:
-    """The case of one entry; None after adding what is wrong with it to `problems`."""
+    """The case of one entry; None if it is malformed, which is added to `problems`."""
     place = f"{path}: case {number}"
     if not isinstance(entry, dict):
         problems.append(f"{place}: must be an object, is {_kind(entry)}")
@@ -170,7 +170,7 @@ def _unknown(path: Path, cases: Iterable[Case], known: list[str]) -> list[str]:
 
 
 def shorten(names: list[str], count: int) -> str:
-    """The first `count` names and how many more there are."""
+    """The first `count` names, and the number of further ones."""
     more = f" and {len(names) - count} more" if len(names) > count else ""
     return ", ".join(names[:count]) + more
 

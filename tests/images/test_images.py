@@ -13,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from illumcli.color import Texels
 from illumcli.errors import IllumError, InputError, OutputError
 from illumcli.film.channels import bits_of, channel_types, group_by_layer
 from illumcli.images import exr, png, reader
-from illumcli.images.reader import read_image, read_metadata, read_texture
+from illumcli.images.reader import read_image, read_metadata, read_texture, texture_bytes
 from illumcli.images.writer import ImageWriter
 
 LAYERED = ("R", "G", "B", "A", "Z", "P.X", "P.Y", "P.Z", "N.X", "key.R", "objectId")
@@ -32,6 +33,13 @@ def write(path, pixels, types, rows=None, metadata=None):
         for y in range(0, height, rows or height):
             writer.write_band(y, pixels[y : y + (rows or height)])
     return writer.close()
+
+
+def linear(path, space=None):
+    """(H, W, C) the values of a texture."""
+    texels = read_texture(path, space)
+    every = np.arange(texels.height * texels.width)
+    return texels.at(every).reshape(texels.height, texels.width, -1)
 
 
 def stored(pixels, kind):
@@ -495,7 +503,7 @@ def test_whole_numbers_of_32_bits_are_exact(tmp_path, colour):
 def test_a_texture_of_whole_numbers_has_their_values(tmp_path):
     with ImageWriter(tmp_path / "a.exr", 2, 1, {"Y": "uint"}) as writer:
         writer.write_band(0, bits_of(np.array([[[3], [70000]]], np.uint32)))
-    assert read_texture(tmp_path / "a.exr").ravel().tolist() == [3, 70000]
+    assert linear(tmp_path / "a.exr").ravel().tolist() == [3, 70000]
 
 
 def test_colour_beside_whole_numbers_must_be_finite(tmp_path):
@@ -514,12 +522,12 @@ def test_colour_beside_whole_numbers_must_be_finite(tmp_path):
 def test_srgb_textures_become_linear_and_alpha_stays(tmp_path):
     texels = np.array([[[0, 10, 11, 128], [188, 255, 127, 64]]], np.uint8)
     write(tmp_path / "a.png", texels, dict.fromkeys("RGBA", "uint8"))
-    linear = read_texture(tmp_path / "a.png", "srgb")
-    assert linear.dtype == np.float32
+    decoded = linear(tmp_path / "a.png", "srgb")
+    assert decoded.dtype == np.float32
     expected = [[0, 10 / 255 / 12.92, 0.0033465358], [0.5028864580, 1, 0.2122307573]]
-    np.testing.assert_allclose(linear[0, :, :3], expected, rtol=1e-6)
-    np.testing.assert_array_equal(linear[0, :, 3], np.array([128, 64], np.float32) / np.float32(255))
-    np.testing.assert_allclose(read_texture(tmp_path / "a.png", "linear"), texels / 255, rtol=1e-7)
+    np.testing.assert_allclose(decoded[0, :, :3], expected, rtol=1e-6)
+    np.testing.assert_array_equal(decoded[0, :, 3], np.array([128, 64], np.float32) / np.float32(255))
+    np.testing.assert_allclose(linear(tmp_path / "a.png", "linear"), texels / 255, rtol=1e-7)
 
 
 def test_deep_textures_are_decoded_alike(tmp_path):
@@ -527,14 +535,14 @@ def test_deep_textures_are_decoded_alike(tmp_path):
     write(tmp_path / "a.png", steps, {"Y": "uint8"})
     write(tmp_path / "b.png", steps.astype(np.uint16) * 257, {"Y": "uint16"})
     np.testing.assert_allclose(
-        read_texture(tmp_path / "b.png", "srgb"), read_texture(tmp_path / "a.png", "srgb"), rtol=2e-6
+        linear(tmp_path / "b.png", "srgb"), linear(tmp_path / "a.png", "srgb"), rtol=2e-6
     )
 
 
 def test_linear_textures_in_single_precision_are_as_they_are(tmp_path):
     texels = np.abs(noise(6, 5, 3))
     write(tmp_path / "a.exr", texels, dict.fromkeys("RGB", "float"))
-    np.testing.assert_array_equal(read_texture(tmp_path / "a.exr", "linear"), texels)
+    np.testing.assert_array_equal(linear(tmp_path / "a.exr", "linear"), texels)
 
 
 @pytest.mark.parametrize(
@@ -553,9 +561,9 @@ def test_the_type_of_its_pixels_says_how_a_texture_codes_light(tmp_path, name, k
     buffer = oiio.ImageBuf(oiio.ImageSpec(4, 4, 3, kind))
     buffer.set_pixels(oiio.ROI(), np.full((4, 4, 3), 0.5, np.float32))
     assert buffer.write(str(tmp_path / name))
-    np.testing.assert_allclose(read_texture(tmp_path / name), expected, rtol=1e-4)
+    np.testing.assert_allclose(linear(tmp_path / name), expected, rtol=1e-4)
     other = {0.5: ("srgb", 0.2140411)}.get(expected, ("linear", 0.5))
-    np.testing.assert_allclose(read_texture(tmp_path / name, other[0]), other[1], rtol=5e-3)
+    np.testing.assert_allclose(linear(tmp_path / name, other[0]), other[1], rtol=5e-3)
 
 
 def test_textures_that_are_not_finite_are_refused(tmp_path):
@@ -565,4 +573,27 @@ def test_textures_that_are_not_finite_are_refused(tmp_path):
     buffer.set_pixels(oiio.ROI(), texels)
     assert buffer.write(str(tmp_path / "a.exr"))
     with pytest.raises(InputError, match="1 texels are NaN or infinite"):
-        read_texture(tmp_path / "a.exr", "linear")
+        linear(tmp_path / "a.exr", "linear")
+
+
+def test_textures_of_8_bits_stay_so_in_memory(tmp_path):
+    texels = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    write(tmp_path / "a.png", texels, dict.fromkeys("RGB", "uint8"))
+    assert read_texture(tmp_path / "a.png").stored.dtype == np.uint8
+    assert texture_bytes(tmp_path / "a.png") == texels.size
+    write(tmp_path / "a.exr", texels.astype(np.float32), dict.fromkeys("RGB", "float"))
+    assert texture_bytes(tmp_path / "a.exr") == 4 * texels.size
+
+
+@pytest.mark.parametrize("as_integers", [True, False])
+def test_channels_of_textures_are_selected_and_clipped(as_integers):
+    table = np.linspace(0, 2, 256, dtype=np.float32)
+    numbers = np.random.default_rng(1).integers(0, 256, (5, 4, 4), dtype=np.uint8)
+    tables = np.stack([table, table * 2, table, table * 3])
+    values = np.stack([tables[c][numbers[..., c]] for c in range(4)], axis=-1)
+    whole = Texels(numbers, (0, 1, 2, 3), tables) if as_integers else Texels(values, (0, 1, 2, 3))
+    image, outside = whole.select((3, 1, 1)).clipped(0.5, 1.5)
+    expected = values[..., [3, 1, 1]]
+    assert outside == np.count_nonzero((expected < 0.5) | (expected > 1.5))
+    index = np.array([3, 19, 0])
+    np.testing.assert_array_equal(image.at(index), np.clip(expected, 0.5, 1.5).reshape(-1, 3)[index])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from illumcli.cache import policy as artifacts
-from illumcli.color import from_srgb
+from illumcli.color import Texels, from_srgb
 from illumcli.commands.check import check_scenes
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
@@ -24,7 +24,7 @@ from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
 from planned import planned
 
 F = np.float32
-FOUR = np.array([[[1.0], [2.0]], [[3.0], [4.0]]], F)  # the row of 3 and 4 is the bottom one
+FOUR = Texels(np.array([[[1.0], [2.0]], [[3.0], [4.0]]], F), (0,))  # the row of 3 and 4 is the bottom one
 
 
 def at(*uv):
@@ -53,7 +53,7 @@ def test_bilinear_at_the_centres_is_the_texels_and_halfway_their_mean():
 def test_a_linear_ramp_comes_back_as_it_is(lookup):
     width, height = 64, 16
     centre = (np.arange(width, dtype=F) + F(0.5)) / width
-    ramp = np.broadcast_to(centre[None, :, None], (height, width, 1))
+    ramp = Texels(np.broadcast_to(centre[None, :, None], (height, width, 1)), (0,))
     u = np.random.default_rng(1).uniform(0.02, 0.98, 500).astype(F)
     found = lookup(ramp, np.stack([u, u], axis=1), "clamp")[:, 0]
     np.testing.assert_allclose(found, u, atol=1e-6 if lookup is bilinear else 0.5 / width + 1e-6)

@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.color import Space, from_srgb
+from illumcli.color import Space, Texels, from_srgb
 from illumcli.errors import InputError, OutputError
 from illumcli.film.channels import bits_of, numbers_of
 from illumcli.images.names import NO_UTF8, no_utf8, printable
@@ -21,7 +21,7 @@ from illumcli.memory import refuse_beyond
 from illumcli.records import Record
 
 READ_ROWS = 64  # rows held at once while reading in bands
-PLANE_BYTES, TEXTURE_BYTES = 6, 12  # of each channel of a pixel while an image, or a texture, is read
+PLANE_BYTES = 6  # of each channel of a pixel while an image is read
 
 _SIGNATURES = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"RIFF": ".webp"}
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
@@ -71,8 +71,9 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
         return source.metadata()
 
 
-def texel_count(path: Path) -> int:
-    """Numbers in the image at `path`, by its header alone, which is read once while the file stays the same.
+def texture_bytes(path: Path) -> int:
+    """Bytes of the texture at `path` in memory, by its header alone, which is read once while the file stays
+    the same.
 
     Raises
     ------
@@ -83,17 +84,17 @@ def texel_count(path: Path) -> int:
         facts = path.stat()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from error
-    return _texel_count(path, facts.st_mtime_ns, facts.st_size)
+    return _texture_bytes(path, facts.st_mtime_ns, facts.st_size)
 
 
 @lru_cache(maxsize=256)
-def _texel_count(path: Path, modified: int, length: int) -> int:
+def _texture_bytes(path: Path, modified: int, length: int) -> int:
     with ImageSource(path) as source:
-        return source.texel_count
+        return source.texel_count * _stored_type(source).itemsize
 
 
-def read_texture(path: str | os.PathLike[str], space: Space = None) -> NDArray[np.float32]:
-    """(H, W, C) float32, linear; the first row is the top of the image.
+def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
+    """The image with linear values; those of 8 bits stay as they are, beside a table.
 
     Parameters
     ----------
@@ -107,29 +108,41 @@ def read_texture(path: str | os.PathLike[str], space: Space = None) -> NDArray[n
         As `read_image`; NaN or Inf.
     """
     with ImageSource(Path(path)) as source:
-        source.refuse_large(TEXTURE_BYTES)
+        stored = _stored_type(source)
+        source.refuse_large(stored.itemsize + 1)
         colours = [c for c, name in enumerate(source.names) if name.rpartition(".")[2] != "A"]
-        small = source.dtype == np.uint8
-        space = space or ("srgb" if source.encoded else "linear")
-        texels = np.concatenate(list(source.bands(np.uint8 if small else np.float32)))
-        for c in source.numbers:
-            texels[..., c] = numbers_of(texels[..., c])
+        is_curved = (space or ("srgb" if source.encoded else "linear")) == "srgb"
+        texels = np.empty((source.height, source.width, len(source.names)), stored)
+        y = invalid = 0
+        for band in source.bands(stored.type):
+            own = texels[y : y + len(band)]
+            own[:] = band
+            y += len(band)
+            if stored == np.uint8:
+                continue
+            for c in source.numbers:
+                own[..., c] = numbers_of(own[..., c])
+            invalid += int(np.count_nonzero(~np.isfinite(own).all(axis=-1)))
+            if is_curved:
+                own[..., colours] = from_srgb(own[..., colours])
+    if invalid:
+        raise InputError(f"{os.fspath(path)}: {invalid} texels are NaN or infinite; mend the texture")
+    channels = tuple(range(texels.shape[2]))
+    if stored != np.uint8:
+        return Texels(texels, channels)
     steps = np.arange(256) / 255
-    if small:
-        straight, curved = steps.astype(np.float32), from_srgb(steps).astype(np.float32)
-        linear = straight[texels]
-        if space == "srgb":
-            linear[..., colours] = curved[texels[..., colours]]
-        return linear
-    if not np.isfinite(texels).all():
-        count = int(np.count_nonzero(~np.isfinite(texels).all(axis=-1)))
-        raise InputError(f"{os.fspath(path)}: {count} texels are NaN or infinite; mend the texture")
-    if space == "srgb":
-        texels[..., colours] = from_srgb(texels[..., colours])
-    return texels
+    tables = np.tile(steps.astype(np.float32), (len(channels), 1))
+    if is_curved:
+        tables[colours] = from_srgb(steps).astype(np.float32)
+    return Texels(texels, channels, tables)
 
 
-def read_embedded_texture(data: bytes, name: str, space: Space) -> NDArray[np.float32]:
+def _stored_type(source: ImageSource) -> np.dtype[Any]:
+    """The type that the texels of an image have in memory."""
+    return np.dtype(np.uint8 if source.dtype == np.uint8 else np.float32)
+
+
+def read_embedded_texture(data: bytes, name: str, space: Space) -> Texels:
     """`read_texture` of an image that lies within another file; `name` is what it is called in messages.
 
     OpenImageIO reads files alone: the image stands in a temporary one meanwhile.

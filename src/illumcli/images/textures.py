@@ -6,10 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from illumcli.color import Space
+from illumcli.color import Space, Texels
 from illumcli.files.located import Located
 from illumcli.records import Value
 
@@ -21,15 +18,15 @@ class Images(Value):
     """The textures that the scene itself names, by path."""
     resolve: Callable[[str], Path] = field(repr=False)
     """The file that the scene means by any other path."""
-    known: dict[tuple[str, Space], NDArray[np.float32]] = field(default_factory=dict, repr=False)
+    known: dict[tuple[str, Space], Texels] = field(default_factory=dict, repr=False)
 
-    def __call__(self, path: str, space: Space) -> NDArray[np.float32]:
-        """(H, W, C) linear image of a texture of the scene, or of a mesh file's library."""
+    def __call__(self, path: str, space: Space) -> Texels:
+        """The linear image of a texture of the scene, or of a mesh file's library."""
         if (path, space) not in self.known:
             self.known[path, space] = self._read(path, space)
         return self.known[path, space]
 
-    def _read(self, path: str, space: Space) -> NDArray[np.float32]:
+    def _read(self, path: str, space: Space) -> Texels:
         from illumcli.images.reader import read_embedded_texture, read_texture
         from illumcli.mesh_files import embedded_image, image_within
 

@@ -23,10 +23,6 @@ BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
 """Memory of a mesh per byte of its file; a triangle takes 80 bytes of text, or 43 of binary."""
 BYTES_OF_OTHER_FILES = 6
 """The same for glTF, where images are part of the file."""
-TEXEL_BYTES = 8
-"""Memory of a texture per texel and channel: the image, and the channel that a parameter reads."""
-WHILE_READ = 4
-"""Additional bytes per texel and channel while a texture is read."""
 LARGEST_SIDE = 1 << 16
 MOST_RAYS = 10**11
 DENSEST = 20
@@ -51,8 +47,7 @@ def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
             factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
             of_file[path] = factor * path.stat().st_size if path.is_file() else 0
         sizes["meshes"] += of_file[path]
-    texels = [_texels(loaded, texture) for texture in _textures(scene)]
-    sizes["textures"] = TEXEL_BYTES * sum(texels) + WHILE_READ * max(texels, default=0)
+    sizes["textures"] = sum(_texture_bytes(loaded, texture) for texture in _textures(scene))
     return {name: count for name, count in sizes.items() if count}
 
 
@@ -70,12 +65,12 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
     yield from dict.fromkeys((value.texture, value.space) for value in values if isinstance(value, Texture))
 
 
-def _texels(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
-    """Texels times channels of an image, from its header; 0 if it is unreadable, which its reader reports."""
-    from illumcli.images.reader import texel_count
+def _texture_bytes(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
+    """Memory of a texture, from its header; 0 if it is unreadable, which its reader reports."""
+    from illumcli.images.reader import texture_bytes
 
     try:
-        return texel_count(resolve(loaded, texture[0]))
+        return texture_bytes(resolve(loaded, texture[0]))
     except InputError:
         return 0
 

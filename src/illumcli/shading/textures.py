@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Ids, Vectors, column_major, take_rows
-from illumcli.color import Space
+from illumcli.color import Space, Texels
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
@@ -31,12 +31,11 @@ from illumcli.shading.materials import Materials, colors_at
 Floats: TypeAlias = NDArray[np.float32]
 
 
-def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
+def bilinear(image: Texels, uv: Floats, wrap: str) -> Floats:
     """(N, C) bilinear interpolation between the centres of the four texels around each uv.
 
     Parameters
     ----------
-    image : (H, W, C) float32, from the top
     uv : (N, 2) float32, v upwards
     wrap : {'repeat', 'clamp', 'mirror'}
         Outside of the image: it is repeated, its border is extended, or it is repeated mirrored in turn.
@@ -44,23 +43,23 @@ def bilinear(image: Floats, uv: Floats, wrap: str) -> Floats:
     x, y = _texels(image, uv, wrap)
     left, low = np.floor(x - F(0.5)), np.floor(y - F(0.5))
     right_share, upper_share = (x - F(0.5) - left)[:, None], (y - F(0.5) - low)[:, None]
-    x0, x1 = _inside(left, image.shape[1], wrap), _inside(left + 1, image.shape[1], wrap)
-    y0, y1 = _inside(low, image.shape[0], wrap), _inside(low + 1, image.shape[0], wrap)
+    x0, x1 = _inside(left, image.width, wrap), _inside(left + 1, image.width, wrap)
+    y0, y1 = _inside(low, image.height, wrap), _inside(low + 1, image.height, wrap)
     lower = _mixed(_at(image, y0, x0), _at(image, y0, x1), right_share)
     upper = _mixed(_at(image, y1, x0), _at(image, y1, x1), right_share)
     return _mixed(lower, upper, upper_share)
 
 
-def nearest(image: Floats, uv: Floats, wrap: str) -> Floats:
+def nearest(image: Texels, uv: Floats, wrap: str) -> Floats:
     """(N, C) the texel that each uv lies in; parameters as of `bilinear`."""
     x, y = _texels(image, uv, wrap)
-    return _at(image, _inside(np.floor(y), image.shape[0], wrap), _inside(np.floor(x), image.shape[1], wrap))
+    return _at(image, _inside(np.floor(y), image.height, wrap), _inside(np.floor(x), image.width, wrap))
 
 
-FILTERS: dict[str, Callable[[Floats, Floats, str], Floats]] = {"bilinear": bilinear, "nearest": nearest}
+FILTERS: dict[str, Callable[[Texels, Floats, str], Floats]] = {"bilinear": bilinear, "nearest": nearest}
 
 
-def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
+def _texels(image: Texels, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
     """Distance from the left and from the bottom of the image, in texels."""
     if wrap == "clamp":
         inside = np.clip(uv, 0, 1)
@@ -68,8 +67,7 @@ def _texels(image: Floats, uv: Floats, wrap: str) -> tuple[Floats, Floats]:
         inside = uv - np.floor(uv)
         if wrap == "mirror":
             inside = np.where(np.floor(uv) % 2 == 1, 1 - inside, inside)
-    height, width = image.shape[:2]
-    return inside[:, 0] * F(width), inside[:, 1] * F(height)
+    return inside[:, 0] * F(image.width), inside[:, 1] * F(image.height)
 
 
 def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
@@ -80,10 +78,9 @@ def _inside(number: Floats, count: int, wrap: str) -> NDArray[np.int64]:
     return whole + count * (whole < 0) - count * (whole >= count)
 
 
-def _at(image: Floats, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
+def _at(image: Texels, y: NDArray[np.int64], x: NDArray[np.int64]) -> Floats:
     """(N, C) texels of columns `x` from the left, rows `y` from the bottom."""
-    height, width, channels = image.shape
-    return column_major(image.reshape(-1, channels).take((height - 1 - y) * width + x, axis=0))
+    return image.at((image.height - 1 - y) * image.width + x)
 
 
 def _mixed(a: Floats, b: Floats, share: Floats) -> Floats:
@@ -124,7 +121,7 @@ class Attribute(Record):
 class Map(Record):
     """An image that a parameter is looked up in, clipped to the parameter's range."""
 
-    image: Floats  # (H, W, C)
+    image: Texels
     filter: str
     wrap: str
     within: Range
@@ -153,7 +150,7 @@ def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexV
 
 def textures(
     object_names: Sequence[str],
-    read: Callable[[str, Space], Floats],
+    read: Callable[[str, Space], Texels],
     purpose: str,
     geometry: SceneGeometry,
     materials: Materials,
@@ -163,7 +160,7 @@ def textures(
     Parameters
     ----------
     read : callable
-        Path and colour space of a texture -> (H, W, C) linear image. Without a colour space the type of the
+        Path and colour space of a texture -> its linear image. Without a colour space the type of the
         pixels decides.
 
     Raises
@@ -192,8 +189,10 @@ def textures(
         if isinstance(value, VertexValues):
             assert table is not None
             return Attribute(table, within, factor)
-        image = _channels(read(value.texture, value.space), value, within.width, where)
-        image = _clipped(image, within, f"texels beyond {where}", repairs)
+        whole = read(value.texture, value.space)
+        channels = _channels(len(whole.channels), value, within.width, where)
+        image, outside = whole.select(channels).clipped(within.low, within.high)
+        _note_clipped(outside, within, f"texels beyond {where}", repairs)
         return Map(image, value.filter, value.wrap, within, factor, table, uv)
 
     # Read those of each material in turn; faults of the scene's own materials are reported together.
@@ -223,7 +222,8 @@ def textures(
 def _uniform(value: Sequence[float], within: Range) -> Map:
     """A texture of one texel."""
     texel = np.clip(np.asarray(value[: within.width], F), F(within.low), F(within.high))
-    return Map(texel.reshape(1, 1, -1), "nearest", "repeat", within)
+    image = Texels(texel.reshape(1, 1, -1), tuple(range(within.width)))
+    return Map(image, "nearest", "repeat", within)
 
 
 def _objects_of(geometry: SceneGeometry, materials: Materials) -> list[list[int]]:
@@ -277,11 +277,10 @@ def _table(geometry: SceneGeometry, attribute: str, objects: Sequence[int], widt
     return out
 
 
-def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats:
-    """The channels of an image that a colour or number is read from; grey is three equal channels."""
-    count = image.shape[2]
+def _channels(count: int, texture: Texture, width: int, where: str) -> tuple[int, ...]:
+    """Those of an image's channels that a colour or number is read from; grey is three equal channels."""
     if width == 3:
-        return image[..., :3] if count >= 3 else np.repeat(image[..., :1], 3, axis=2)
+        return (0, 1, 2) if count >= 3 else (0, 0, 0)
     number = "rgba".index(texture.channel)
     if texture.channel == "a" and count in (2, 4):
         number = count - 1
@@ -289,16 +288,19 @@ def _channels(image: Floats, texture: Texture, width: int, where: str) -> Floats
         number = 0
     elif number >= count:
         raise InputError(f"{where}: {texture.texture} has no channel '{texture.channel}'; choose r, g or b")
-    return image[..., number : number + 1]
+    return (number,)
 
 
 def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, Repair]) -> Floats:
-    """`values` clipped to the range, contiguous; `repairs` notes how many were outside."""
-    beyond = int(np.count_nonzero((values < F(within.low)) | (values > F(within.high))))
-    if beyond:
-        note(repairs, f"{what} clipped to {within.low:g}..{within.high:g}", count=beyond)
-        values = np.clip(values, F(within.low), F(within.high))
-    return np.ascontiguousarray(values)
+    """`values` clipped to the range; `repairs` notes how many were outside."""
+    outside = int(np.count_nonzero((values < F(within.low)) | (values > F(within.high))))
+    _note_clipped(outside, within, what, repairs)
+    return np.clip(values, F(within.low), F(within.high)) if outside else values
+
+
+def _note_clipped(outside: int, within: Range, what: str, repairs: dict[str, Repair]) -> None:
+    if outside:
+        note(repairs, f"{what} clipped to {within.low:g}..{within.high:g}", count=outside)
 
 
 # --- at points ------------------------------------------------------------------------------------------

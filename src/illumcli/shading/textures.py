@@ -398,14 +398,13 @@ def texel_positions(
         at = np.flatnonzero(material == number) if maps else np.zeros(0, np.int64)
         if not at.size:
             continue
-        largest = max(maps, key=lambda each: each.image.shape[0] * each.image.shape[1])
+        largest = max(maps, key=lambda each: each.image.height * each.image.width)
         corners = TriangleCorners(None, hits.triangle.take(at), hits.u.take(at), hits.v.take(at))
         if largest.uv is None:
             place = uv_at(geometry, uvs, CornerWeights(corners, (corners,)))
         else:
             place = CornerWeights(corners, (corners,)).interpolate_vertices(geometry, largest.uv)
-        height, width = largest.image.shape[:2]
-        out[at] = place * np.array([width, height], F)
+        out[at] = place * np.array([largest.image.width, largest.image.height], F)
     return out
 
 

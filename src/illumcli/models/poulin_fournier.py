@@ -117,7 +117,7 @@ def _excess(x: Floats, sine: Floats) -> Floats:
     """x - sin(x), by its series below 1/2."""
     small = x < 0.5
     x2 = np.square(np.minimum(x, 0.5))
-    series: Floats = np.ones_like(x2)
+    series: Floats | float = 1.0
     for k in (12, 10, 8, 6, 4):
         series = 1 - series * x2 / (k * (k + 1))
     return x * x2 / 6 * series * small + (x - sine) * ~small

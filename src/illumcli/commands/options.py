@@ -30,6 +30,8 @@ class RenderOptions(Value):
     """Refuse meshes and textures that need repairs."""
     keep_going: bool = True
     """Go on with other scenes or variants after one that failed."""
+    audit: bool = True
+    """State the error of what is reconstructed."""
     target_error: float | None = None
     """RMSE that sample counts are chosen for; by default the scene's counts."""
 

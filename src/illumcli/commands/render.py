@@ -78,6 +78,7 @@ def rendered(
     reused: dict[str, Mapping[str, str]] = {}
     repaired: Repairs = {}
     standard_error: dict[str, dict[str, float]] = {}
+    audited_error: dict[str, dict[str, str | float]] = {}
     warnings: Sequence[str] = ()
     clamped = 0
     for view in graph.views:
@@ -95,10 +96,12 @@ def rendered(
             warnings = disproportion_lines(work.loaded, graph, shared.get("object_bounds"))
         if options.strict:
             refuse_repairs(path, repaired)
-        clamped_values, sums = write_view(work, plan, shared, targets, run, progress)
-        clamped += clamped_values
-        if sums.pixels:
-            standard_error[view.name] = sums.as_data()
+        outcome = write_view(work, plan, shared, targets, run, progress)
+        clamped += outcome.clamped
+        if outcome.sums.pixels:
+            standard_error[view.name] = outcome.sums.as_data()
+        if outcome.audited is not None:
+            audited_error[view.name] = outcome.audited.as_data()
 
     kept = [target.path for target in work.targets if target not in due]
     for image in kept:
@@ -116,6 +119,7 @@ def rendered(
         warnings=tuple(warnings),
         clamped=clamped,
         standard_error=standard_error,
+        audited_error=audited_error,
     )
     return replace(report.with_counts(run.stats), total_seconds=time.perf_counter() - start)
 

@@ -45,6 +45,8 @@ class Report(Value):
     """Asked for, reached, and by which counts, where an error was asked for."""
     standard_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Camera -> mean and root mean square of its layer `error`, where that was rendered."""
+    audited_error: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
+    """Camera -> RMSE of its layer with reconstructed obscurance, from rays that are used nowhere else."""
     total_seconds: float = 0.0
 
     def with_counts(self, stats: RenderStats) -> Report:

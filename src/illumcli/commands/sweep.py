@@ -79,9 +79,8 @@ def _prepared(
 
     def planned(outcome: Outcome) -> Outcome:
         overrides = tuple(outcome.variant.overrides)
-        job = RenderJob(
-            path, replace(options, pattern=pattern, overrides=overrides), {"frame": outcome.variant.frame}
-        )
+        own = replace(options, pattern=pattern, overrides=overrides, audit=False)
+        job = RenderJob(path, own, {"frame": outcome.variant.frame})
         work = prepared(job)
         return replace(outcome, work=work, is_due=bool(work.due()))
 

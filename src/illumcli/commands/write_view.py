@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -15,11 +15,26 @@ from illumcli.film.develop import ErrorSums, Target, how_to_read
 from illumcli.film.tiles import Tile
 from illumcli.graph import Buffers
 from illumcli.progress import Progress
+from illumcli.records import Value
 from illumcli.render_graph.execute import Planes, Run, bands
 from illumcli.render_graph.needs import reconstructs
 from illumcli.render_graph.schedule import Plan
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Scene
+
+if TYPE_CHECKING:
+    from illumcli.accuracy.audit import Audit, AuditedError
+
+
+class ViewOutcome(Value):
+    """What became of a view, beside its files."""
+
+    clamped: int
+    """Values beyond the range of half."""
+    sums: ErrorSums
+    """Of the layer `error`."""
+    audited: AuditedError | None = None
+    """The error of what is reconstructed."""
 
 
 def write_view(
@@ -29,8 +44,8 @@ def write_view(
     targets: Sequence[Target],
     run: Run,
     progress: Progress,
-) -> tuple[int, ErrorSums]:
-    """Write one view's files band by band; how many values were beyond half's range, and the errors."""
+) -> ViewOutcome:
+    """Write one view's files band by band."""
     from illumcli.images.writer import ImageWriter
 
     view, space, development = plan.view, shared["render_space"], work.development
@@ -41,7 +56,11 @@ def write_view(
         done += count
         progress(view.name, done, pixels)
 
+    audit = _audit(work, plan)
+
     def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
+        if audit is not None:
+            audit.take(tile, layers)
         files = {str(target.path): development.pixels(target, tile, layers, space) for target in targets}
         return files | ({"error": layers["error"]} if "error" in layers else {})
 
@@ -69,7 +88,22 @@ def write_view(
         start = time.perf_counter()
         clamped = sum(writer.close().clamped for writer in writers)
         run.stats.add({"write": time.perf_counter() - start}, {})
-    return clamped, sums
+    if audit is None:
+        return ViewOutcome(clamped, sums)
+    start, auditing = time.perf_counter(), Run(threads=run.threads)
+    error = audit.error(shared, auditing)
+    run.stats.add({"audit": time.perf_counter() - start}, {"audit": sum(auditing.stats.rays.values())})
+    return ViewOutcome(clamped, sums, error)
+
+
+def _audit(work: Work, plan: Plan) -> Audit | None:
+    """The audit of a view; None where nothing is reconstructed, or the job asks for none."""
+    if not (work.job.options.audit and reconstructs(work.scene)):
+        return None
+    from illumcli.accuracy.audit import Audit, audited_layer
+
+    layer = audited_layer(plan)
+    return Audit.of(plan, layer, work.scene.seed) if layer is not None else None
 
 
 def metadata(scene: Scene, target: Target, space: RenderSpace) -> Mapping[str, Any]:

@@ -1,0 +1,136 @@
+"""The audit of reconstructed pictures: right on average, the same for any tiles, never 0 by chance."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from illumcli.accuracy.audit import (
+    CANDIDATES,
+    Audit,
+    AuditedError,
+    Candidates,
+    audited_layer,
+    counts_by_block,
+)
+from illumcli.film.view import View
+from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.scene.load import load
+from planned import planned
+
+SCENE = """
+version: 1
+camera: {position: [1.5, 1.6, 3], target: [0, 0.4, 0], fov: 40}
+film: {width: 96, height: 72, samples: 1}
+ambient: [0.3, 0.4, 0.5]
+obscurance: {samples: 2, reconstruct: true}
+meshes: {ball: {shape: sphere, radius: 0.5, segments: 20, rings: 10}}
+objects:
+  - {mesh: {shape: plane, size: [6, 6]}}
+  - {mesh: ball, transform: {translate: [0, 0.5, 0]}}
+  - {mesh: ball, transform: {translate: [1, 0.5, 0]}}
+lights: [{light: directional, direction: [1, -2, -1]}]
+"""
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def audited(path, *overrides, only="beauty", threads=1, side=None):
+    """The picture of a layer, and its audit."""
+    steps = planned(load(path, overrides), [only])
+    shared = run_once(steps, Run(threads=threads))
+    layer = audited_layer(steps)
+    assert layer is not None
+    audit = Audit.of(steps, layer, steps.graph.scene.seed)
+
+    def develop(tile, layers):
+        audit.take(tile, layers)
+        return layers
+
+    made = list(bands(steps, shared, Run(threads=threads), side=side, develop=develop))
+    picture = np.concatenate([band.layers[only] for band in made]).astype(np.float64)
+    return picture, audit.error(shared, Run(threads=threads))
+
+
+def test_every_pixel_of_a_block_is_as_likely():
+    view = View("main", None, 250, 130, 1)
+    counts = np.zeros((130, 250))
+    for seed in range(60):
+        made = Candidates.of(view, seed)
+        np.add.at(counts, (made.y, made.x), 1)
+    assert made.share.sum() == pytest.approx(1)
+    expected = 60 * CANDIDATES * len(made.share) / counts.size  # of blocks that are whole: 3 x 3 pixels
+    for part in (counts[:129:3, :249], counts[2:129:3, :249], counts[:129, 1:249:3], counts[:40, :40]):
+        assert abs(part.mean() / expected - 1) < 0.02 + 5 / np.sqrt(expected * part.size)
+
+
+def test_more_pixels_where_products_vary():
+    square = np.concatenate([np.full(900, 1e-12), np.full(100, 1e-8)])
+    share = np.full(1000, 1e-3)
+    few, many = (counts_by_block(square, share, error, 10**6) for error in (1e-6, 3e-7))
+    assert few[:900].max() == 1
+    assert few[900:].min() > 2
+    assert many.sum() > few.sum()
+    assert counts_by_block(square, share, 0.0, 3000).sum() <= 3000
+
+
+def test_what_is_lost_in_its_own_error_is_not_stated_as_0():
+    share = np.full(5, 0.2)
+    lost = AuditedError.of_products("beauty", np.array([-1.0, 0.5, 0.2, -0.1, 0.1]) * 1e-6, share)
+    assert lost.low == 0
+    assert 0 < lost.rmse <= lost.high
+    assert AuditedError.of_products("beauty", np.zeros(5), share).rmse == 0
+    assert AuditedError.of_products("beauty", np.full(5, 4e-6), share).rmse == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize(("samples", "only"), [(1, "obscurance"), (3, "beauty")])
+def test_the_stated_error_is_the_true_one(path, samples, only):
+    """Against pictures of many rays, antialiased far better; over some seeds, by the stated errors."""
+    finer = 1 if samples == 1 else 16
+    off = ["obscurance={samples: 256, sampler: owen}" if samples == 1 else "obscurance={samples: 32}"]
+    truth = []
+    for seed in (91, 92):
+        steps = planned(load(path, [f"film.samples={finer}", *off, f"seed={seed}"]), [only])
+        made = bands(steps, run_once(steps, Run()), Run(threads=2))
+        truth.append(np.concatenate([band.layers[only] for band in made]).astype(np.float64))
+    ratios, spreads = [], []
+    for seed in range(4):
+        picture, stated = audited(path, f"film.samples={samples}", f"seed={seed}", only=only)
+        true = np.sqrt(np.mean((picture - truth[0]) * (picture - truth[1])))
+        ratios.append(stated.rmse / true)
+        spreads.append(stated.standard_error / stated.rmse)
+    error = np.sqrt(np.square(spreads).sum()) / len(spreads)
+    assert abs(np.mean(ratios) - 1) < 3.5 * error + 0.02, ratios
+
+
+def test_tiles_and_threads_do_not_change_the_stated_error(path):
+    picture, stated = audited(path)
+    again, other = audited(path, threads=2, side=24)
+    np.testing.assert_array_equal(picture, again)
+    assert stated == other
+
+
+def test_the_report_and_the_terminal_state_it(path, illum, tmp_path):
+    done = illum("render", path, "-o", "out.exr", "--report", "report.json", "-v", cwd=tmp_path)
+    report = json.loads((tmp_path / "report.json").read_text())
+    stated = report["audited_error"]["main"]
+    assert stated["layer"] == "beauty"
+    assert 0 < stated["low"] < stated["rmse"] < stated["high"]
+    assert report["rays"]["audit"] == stated["rays"]
+    assert f"RMSE of beauty of main: {stated['rmse']:.3g}" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "overrides", [("obscurance.reconstruct=false",), ("obscurance=null",), ("outputs.layers=[depth]",)]
+)
+def test_nothing_is_stated_where_nothing_is_reconstructed(path, illum, tmp_path, overrides):
+    words = [word for override in overrides for word in ("-D", override)]
+    illum("render", path, "-o", "out.exr", "--report", "report.json", *words, cwd=tmp_path)
+    assert json.loads((tmp_path / "report.json").read_text())["audited_error"] == {}

@@ -64,7 +64,8 @@ def scene():
 
 
 def assert_same(loop, single, o, d, limits=UNLIMITED):
-    assert np.array_equal(loop.occluded(o, d, limits), single.occluded(o, d, limits))
+    for coherent in (False, True):
+        assert np.array_equal(loop.occluded(o, d, limits, coherent), single.occluded(o, d, limits))
     hits, expected = loop.closest(o, d), single.closest(o, d)
     hit = expected.triangle >= 0
     assert np.array_equal(hits.triangle, expected.triangle)

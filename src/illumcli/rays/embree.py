@@ -74,11 +74,12 @@ class Tracer:
         return far
 
     def occluded(
-        self, origins: Vectors, directions: Vectors, limits: Floats | float = np.inf
+        self, origins: Vectors, directions: Vectors, limits: Floats | float = np.inf, coherent: bool = False
     ) -> NDArray[np.bool_]:
         """(N,) True where a triangle lies between a ray's origin and `limits` along its direction.
 
-        The result is False for a limit of 0 or less, where Embree would say True.
+        The result is False for a limit of 0 or less, where Embree would say True. Rays that are `coherent`
+        have origins and directions like those before and after them; this changes the time only.
         """
         self._admit(origins, directions)
         reach = np.asarray(limits, F)
@@ -87,7 +88,8 @@ class Tracer:
         lowest = reach.min(initial=np.inf)
         if np.isnan(lowest):
             raise IllumError("a ray's limit is not a number")
-        out = self._loop.occluded(origins, directions, np.asarray(np.minimum(reach, NO_LIMIT)))
+        far = np.asarray(np.minimum(reach, NO_LIMIT))
+        out = self._loop.occluded(origins, directions, far, coherent)
         return out if lowest > 0 else out & (reach > 0)
 
     def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:

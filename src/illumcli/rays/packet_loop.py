@@ -3,8 +3,8 @@
 The loop is a shared library beside this file. An installation compiles it if there is a C compiler
 (`hatch_build.py`). Its results have the same bits as those of embreex's loop, which is used without it.
 
-Closest hits use Embree's incoherent mode, which traverses each ray of a packet alone: hits at equal distances
-would depend on the other rays otherwise.
+Closest hits use Embree's incoherent mode, which traverses each ray of a packet alone. Its coherent mode takes
+a third of the time for camera rays, but hits at equal distances then depend on the other rays.
 """
 
 from __future__ import annotations
@@ -29,6 +29,17 @@ INTERFACE = 2
 LIBRARY = Path(__file__).with_name("_packets.dll" if os.name == "nt" else "_packets.so")
 
 _NO_LIMIT = np.asarray(NO_LIMIT)
+
+
+class _Arguments(ctypes.Structure):
+    """RTCOccludedArguments, with room for what other versions of Embree add."""
+
+    _fields_ = (("flags", ctypes.c_uint), ("feature_mask", ctypes.c_uint), ("rest", ctypes.c_void_p * 6))
+
+
+COHERENT = _Arguments(1 << 16, 0xFFFFFFFF)
+"""RTC_RAY_QUERY_FLAG_COHERENT, for occlusion alone. Rays from a picture's points to a light take 40 % less
+time with it, rays in all directions up to twice as long."""
 
 
 class _Vectors(ctypes.Structure):
@@ -147,9 +158,13 @@ class PacketLoop:
         build_tree(device, scene, vertices, triangles)
         self._scene: Handle = scene
 
-    def occluded(self, origins: Vectors, directions: Vectors, limits: Floats) -> NDArray[np.bool_]:
+    def occluded(
+        self, origins: Vectors, directions: Vectors, limits: Floats, coherent: bool = False
+    ) -> NDArray[np.bool_]:
         out = np.empty(len(directions), np.bool_)
         rays = self._rays("rtcOccluded", origins, directions, limits)
+        if coherent and self.width > 1:
+            rays.query.arguments = ctypes.addressof(COHERENT)
         for part in batches(len(directions)):
             rays.first, rays.end = part.start, part.stop
             packet_library().illum_occluded(rays, out.ctypes.data)

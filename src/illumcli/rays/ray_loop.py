@@ -41,13 +41,17 @@ class RayLoop(Protocol):
     All loops give the same bits. The distance of a miss is `NO_LIMIT`.
     """
 
-    def occluded(self, origins: Vectors, directions: Vectors, limits: Floats) -> NDArray[np.bool_]:
+    def occluded(
+        self, origins: Vectors, directions: Vectors, limits: Floats, coherent: bool = False
+    ) -> NDArray[np.bool_]:
         """(N,) True where a triangle lies between a ray's origin and its limit, or the limit is below 0.
 
         Parameters
         ----------
         limits : (N,) or () float32
             Along the directions, at most `NO_LIMIT`.
+        coherent : bool
+            True if consecutive rays have like origins and directions; changes the time only.
         """
         ...
 

@@ -43,7 +43,9 @@ class SingleRayLoop:
         if errors.texts:
             raise IllumError(f"Embree could not build its tree: {'; '.join(errors.texts)}")
 
-    def occluded(self, origins: Vectors, directions: Vectors, limits: Floats) -> NDArray[np.bool_]:
+    def occluded(
+        self, origins: Vectors, directions: Vectors, limits: Floats, coherent: bool = False
+    ) -> NDArray[np.bool_]:
         origins = _per_ray(origins, directions)
         out = np.empty(len(directions), np.bool_)
         for part in batches(len(directions)):

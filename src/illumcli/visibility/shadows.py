@@ -67,7 +67,8 @@ def shadow(
     # One shadow ray for each sample that the light may reach.
     lit, smooth = shadow_candidates, smooth_surface
     delta = np.zeros(lit.count, F)
-    hidden = tracer.occluded(column_major(take_rows(ray_origins, lit.index)), lit.l, lit.distance)
+    origins = column_major(take_rows(ray_origins, lit.index))
+    hidden = tracer.occluded(origins, lit.l, lit.distance, coherent=True)
 
     # A second one, from the implied surface, where it is blocked.
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
@@ -97,7 +98,7 @@ def _lit_on_implied_surface(
     # Keep the samples whose shadow ray from there is unoccluded, as is the segment to the ray's origin.
     ng, edge = take_rows(interaction.ng, sample.take(curved)), interaction.edge.take(sample.take(curved))
     starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
-    curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved))]
+    curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved), coherent=True)]
     height = length(_at(offset, curved))
     on_polygon = column_major(take_rows(origins, sample.take(curved)))
     curved = curved[~tracer.occluded(on_polygon, column_major(_at(offset, curved) / height[:, None]), height)]

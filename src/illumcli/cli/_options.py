@@ -79,7 +79,7 @@ allow_option = click.option(
     callback=_allow,
     type=click.Path(exists=True, file_okay=False),
     metavar="DIR",
-    help="Let scenes read files and write images below DIR too (also: ILLUM_ALLOW).",
+    help="Let scenes read files and write images below DIR, too (also: ILLUM_ALLOW).",
 )
 
 
@@ -107,13 +107,13 @@ def studio_options(command: C) -> C:
         "--view",
         metavar="AZIMUTH,ELEVATION",
         callback=_view,
-        help="Where a mesh without a scene is seen from [degrees]: 0,0 the front, 90,0 the side of +x, 0,90 "
+        help="View of a mesh without a scene [degrees]: 0,0 is the front, 90,0 the side of +x, 0,90 from "
         "above. By default 24,13.",
     )
     turn = click.option(
         "--up",
         type=click.Choice(["x", "y", "z", "-x", "-y", "-z"]),
-        help="The axis of a mesh without a scene that points up; by default y.",
+        help="The up axis of a mesh without a scene; by default y.",
     )
     return cast(C, look(turn(arranged)))
 
@@ -122,13 +122,17 @@ pattern_option = click.option(
     "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."
 )
 
-only_option = click.option("--only", multiple=True, metavar="LAYER", help="Render these layers alone.")
-
-threads_option = click.option(
-    "-t", "--threads", type=click.IntRange(1, 1024), help="By default one per core."
+only_option = click.option(
+    "--only", multiple=True, metavar="LAYER", help="Render only this layer; may be repeated."
 )
 
-report_option = click.option("--report", type=FILE, metavar="FILE.json", help="Write what happened, as JSON.")
+threads_option = click.option(
+    "-t", "--threads", type=click.IntRange(1, 1024), help="Number of threads; by default one per core."
+)
+
+report_option = click.option(
+    "--report", type=FILE, metavar="FILE.json", help="Write a report of the run as JSON."
+)
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 
@@ -138,7 +142,7 @@ def seed_option(text: str, default: int | None = None) -> Callable[[C], C]:
     return click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=default, help=text)
 
 
-def force_option(text: str = "Replace files that differ, write those that do not anew.") -> Callable[[C], C]:
+def force_option(text: str = "Replace different files, and write equal ones again.") -> Callable[[C], C]:
     """Adds `--force`."""
     return click.option("--force", is_flag=True, help=text)
 
@@ -147,21 +151,21 @@ keep_going_option = click.option(
     "--keep-going/--stop-at-first",
     default=True,
     show_default=True,
-    help="Where one of several fails: do the others all the same, or stop. The exit code is the first one's.",
+    help="If one of several fails, finish the others, or stop. The exit code is that of the first failure.",
 )
 
 quiet_option = click.option(
     "-q",
     "--quiet",
     is_flag=True,
-    help="Say nothing but results and what is wrong: no progress, no counts.",
+    help="Print only results and problems: no progress, no counts.",
 )
 
 verbose_option = click.option(
     "-v",
     "--verbose",
     is_flag=True,
-    help="Say more, where there is more: what was skipped, repaired, reused, and where time went.",
+    help="Print more: what was skipped, repaired and reused, and where time was spent.",
 )
 
 
@@ -188,7 +192,7 @@ no_cache_option = click.option(
     "cache",
     flag_value=False,
     default=True,
-    help="Neither use nor keep artifacts of other runs; see illum cache.",
+    help="Neither read nor write the cache; see illum cache.",
 )
 
 

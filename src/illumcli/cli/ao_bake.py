@@ -137,35 +137,35 @@ def _options(options: dict[str, Any]) -> BakeOptions:
     type=click.Choice(["count", "ignore", "one-sided"]),
     default="count",
     show_default=True,
-    help="Faces met from behind count, are passed through, or let the ray go.",
+    help="Back faces occlude (count), are transparent (ignore), or end the ray unoccluded (one-sided).",
 )
 @click.option(
     "--method",
     type=click.Choice(["vertex", "fit"]),
     default="vertex",
     show_default=True,
-    help="Ask at the vertices, or all over the surface and fit.",
+    help="Evaluate at the vertices, or sample the surface and fit vertex values by least squares.",
 )
 @click.option(
     "--occluders",
     multiple=True,
     metavar="scene|own|NAME",
-    help="What hides an object's vertices: the whole scene, itself, or itself and objects by name.",
+    help="Occluders of an object's vertices: the whole scene, itself, or itself and objects by name.",
 )
-@click.option("--ground", type=click.Choice(["x", "y", "z"]), help="Add a ground plane; the axis that is up.")
-@click.option("--bent-normal", is_flag=True, help="Also the mean direction of what is open.")
+@click.option("--ground", type=click.Choice(["x", "y", "z"]), help="Add a ground plane below; the up axis.")
+@click.option("--bent-normal", is_flag=True, help="Also compute the mean unoccluded direction.")
 @click.option(
     "--color",
     "channel",
     type=click.Choice(["r", "g", "b", "a", "rgb"]),
-    help="Also as 8-bit vertex colour in this channel of .ply and .glb.",
+    help="Also write values as 8-bit vertex colour, into this channel of .ply and .glb.",
 )
 @click.option(
     "--split",
     is_flag=True,
-    help="Split vertices of .ply with several normals, uv or values, as .glb has them; copies come last.",
+    help="In .ply, too, split vertices with several normals, uv or values, as in .glb; copies come last.",
 )
-@seed_option("Of every random number.", default=0)
+@seed_option("Random seed.", default=0)
 @threads_option
 @overrides_option
 @report_option
@@ -188,9 +188,9 @@ def ao_bake(
 ) -> None:
     """Bake obscurance at every vertex of each INPUT, a mesh file or a scene; print the path of every file.
 
-    1 is open. The values keep the order of the file's own vertices, and each says its standard error. A
-    vertex with several normals has their mean, and one value for each where the file can hold it. An
-    interrupted bake goes on where it stopped when the same command is given again.
+    1 is open. Values are in the order of the file's vertices, each with its standard error. A vertex with
+    several normals has the mean of their values, and all of them if the file format allows. An interrupted
+    bake resumes when the same command is given again.
     """
     from illumcli.cli._progress import reporter
     from illumcli.commands.bake import BakeRequest, bake_inputs

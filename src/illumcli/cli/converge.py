@@ -49,10 +49,10 @@ def _settings(options: dict[str, Any]) -> ConvergenceSettings:
 @click.option(
     "--vary",
     type=click.Choice(["obscurance", "pixels", "both"]),
-    help="What is doubled: obscurance rays, samples per pixel, or the two in turn. By default obscurance.",
+    help="What is varied: obscurance rays, samples per pixel, or the two in turn. By default obscurance.",
 )
-@click.option("--from", "first", type=click.IntRange(1, 65536), help="The fewest per pixel.")
-@click.option("--to", "last", type=click.IntRange(2, 65536), help="The most per pixel.")
+@click.option("--from", "first", type=click.IntRange(1, 65536), help="Least count per pixel; it is doubled.")
+@click.option("--to", "last", type=click.IntRange(2, 65536), help="Greatest count per pixel.")
 @click.option("--layer", metavar="NAME", help="By default obscurance, or beauty where samples vary.")
 @click.option(
     "--sampler",
@@ -61,14 +61,20 @@ def _settings(options: dict[str, Any]) -> ConvergenceSettings:
     type=SAMPLER,
     help="Only this sampler of obscurance rays; may be repeated.",
 )
-@click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Other seeds.")
 @click.option(
-    "--width", type=click.IntRange(1, 65536), default=320, show_default=True, help="Of the film, at most."
+    "--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Number of seeds."
+)
+@click.option(
+    "--width",
+    type=click.IntRange(1, 65536),
+    default=320,
+    show_default=True,
+    help="Greatest width of the film.",
 )
 @click.option("--camera", metavar="NAME", help="By default the first.")
 @seed_option("By default the scene's.")
 @threads_option
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE.csv", help="A line per picture rendered.")
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE.csv", help="Write a line per image.")
 @click.option("-o", "--output", type=FILE, metavar="FILE.png", help="The curves as .png or .svg.")
 @json_option
 @force_option()
@@ -84,11 +90,12 @@ def converge(
     force: bool,
     quiet: bool,
 ) -> None:
-    """Measure run time against error of SCENE: seconds and rays beside the RMSE to a reference.
+    """Measure the run time and error of SCENE at increasing sample counts: seconds, rays and RMSE.
 
-    The reference comes from other random numbers and many more samples, in two halves whose difference states
-    its own error; it is kept between runs. `random needs` is how many times as many samples plain random
-    sampling takes for the same error. Seconds are those of casting and shading, without reading the scene.
+    The reference has other random numbers and many more samples, in two halves whose difference estimates its
+    own error; it is cached between runs. `random needs` is the factor by which independent random samples
+    need more samples for the same error. Seconds are those of ray casting and shading, without reading the
+    scene.
     """
     import json
     import sys

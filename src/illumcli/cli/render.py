@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     "--target-error",
     type=click.FloatRange(0, min_open=True),
     metavar="E",
-    help="Choose samples per pixel and obscurance rays for this RMSE, by pilots on other random numbers.",
+    help="Choose sample counts that reach this RMSE, using pilot renders with separate seeds.",
 )
-@seed_option("Of every random number; by default the scene's.")
+@seed_option("Random seed; by default the scene's.")
 @threads_option
 @report_option
 @force_option()

@@ -97,8 +97,8 @@ def sweep(
 ) -> None:
     """Render the variants of SCENE in one process; print the path of every image.
 
-    What no override touches is made once. A sweep that was stopped goes on where it was: images that are
-    there with the same content are kept.
+    Buffers that no override affects are computed once. An interrupted sweep resumes when it is started again:
+    images with the same content are kept.
 
     \b
     Every value with every other, the last path fastest:

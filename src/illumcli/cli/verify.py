@@ -24,16 +24,16 @@ Examples:
     type=click.Choice(["double", "single"]),
     default="double",
     show_default=True,
-    help="`single` runs the formulas in float32 and tells where digits are lost, and why.",
+    help="`single` runs the formulas in float32 and reports where digits are lost, with the cause.",
 )
 @click.option("--only", multiple=True, metavar="TYPE", help="Only cases of this type; may be repeated.")
 @json_option
 def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bool) -> None:
     """Check the renderer's formulas against the vectors in FILE (.json, .json.xz or .json.gz).
 
-    By default the vectors that come with the package, computed at 50 digits. A case passes when its largest
-    deviation is at most atol + rtol * the largest expected value, both of which it says itself. Obscurance
-    is estimated by casting rays at real geometry; an estimate passes within 4.5 of its own standard errors.
+    By default the vectors of the package, computed with 50 digits. A case passes if its largest deviation is
+    at most atol + rtol * the largest expected value, with its own atol and rtol. Obscurance is estimated by
+    casting rays at real geometry; an estimate passes within 4.5 of its own standard errors.
 
     \b
     worst error  largest deviation over the largest expected value; `se` counts standard errors

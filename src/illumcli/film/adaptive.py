@@ -1,15 +1,15 @@
-"""Adaptive antialiasing: which pixels one sample is not enough for.
+"""Adaptive antialiasing: decides which pixels need more than one sample.
 
-Every pixel gets one sample at its centre. The value there misses the mean over the pixel by about
-s^2 f'' / 2, where s is the deviation of the pixel filter: where light is straight from centre to centre, all
-other samples would tell the same. So a pixel gets all samples where around it
+Every pixel gets one sample at its centre. Its value differs from the mean over the pixel by about s^2 f'' /
+2, where s is the deviation of the pixel filter: where light is linear from centre to centre, one sample is
+enough. So a pixel gets all samples if around it
 
-- the centres, or the first hits of some samples (`Probes`), see different objects,
-- surfaces turn, or leap in depth,
-- light bends from centre to centre, or a texture has more texels than there are pixels.
+- the centres, or the first hits of some samples (`Probes`), are on different objects,
+- normals or depth have a step,
+- light has a second difference, or a texture has more texels than there are pixels.
 
-A refined pixel is the same as without it. What lies between centres and probes, such as the shadow of a wire,
-is missed: adaptive pictures are biased, towards smoothness.
+A refined pixel is the same as without adaptive sampling. Features between centres and probes, such as the
+shadow of a wire, are missed: adaptive images are biased towards smoothness.
 
 References
 ----------
@@ -38,20 +38,20 @@ from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
-TURN = 0.3
-"""Components of unit normals that lie farther apart differ: directions 17 degrees apart or more."""
-LEAP = 2.0
-"""Depth leaps where it departs from a plane by more than so many widths of a pixel."""
+NORMAL_STEP = 0.3
+"""Greatest difference between components of unit normals that count as equal: about 17 degrees."""
+DEPTH_STEP = 2.0
+"""Greatest difference of depth from a plane that does not count as a step, in widths of a pixel."""
 DARK = 0.05
-"""Light below this counts as this much when differences are weighed."""
+"""Least radiance that differences are relative to."""
 
 
 class Probes(Record):
-    """What the first hits of some samples of every pixel lie on, nothing else of which is computed."""
+    """The objects and depths of the first hits of some samples of every pixel; nothing else is computed."""
 
-    lowest: NDArray[np.int32]  # (P,) least number of an object among them, from 1, 0 where one hits nothing
+    lowest: NDArray[np.int32]  # (P,) least object number among them, from 1; 0 if one misses
     highest: NDArray[np.int32]  # (P,)
-    farthest: NDArray[np.float64]  # (P,) least `nearness` among them, 0 where one hits nothing
+    farthest: NDArray[np.float64]  # (P,) least `nearness` among them, 0 if one misses
     nearest: NDArray[np.float64]  # (P,)
 
 
@@ -81,7 +81,7 @@ def probes(
 
 
 def nearness(view: View, render_space: RenderSpace, interaction: SurfaceInteraction) -> NDArray[np.float64]:
-    """(M,) what grows evenly over the picture of a plane: 1 / depth, or depth where rays are parallel."""
+    """(M,) 1 / depth, or depth if rays are parallel: on a plane it is linear over the image."""
     eye = render_space.from_world(view.camera.position)
     return _nearness(view, dot(interaction.position - eye, axes(view.camera)[2][None, :]))
 
@@ -103,36 +103,38 @@ def edges(
     nearness: NDArray[np.float64],
     probes: Probes,
 ) -> NDArray[np.bool_]:
-    """(P,) True where centres and probes see different objects, surfaces that turn, or depths that leap.
+    """(P,) True where centres and probes hit different objects, or normals or depths have a step.
 
-    Pixels at the tile's border, except at that of the film, lack neighbours: theirs is not decided.
+    The result is not valid at the tile's border, where neighbours are missing, except at the film's.
     """
     shape, reach = (tile.height, tile.width), view.reach
 
-    # different objects
+    # Different objects.
     number = on_film(object_id.astype(np.int32), hits.sample, shape)[0]
     low = around(np.minimum(number, probes.lowest.reshape(shape)), np.minimum, reach)
     differ = around(np.maximum(number, probes.highest.reshape(shape)), np.maximum, reach) > low
 
-    # turned
+    # Different normals.
     for normal in on_film(interaction.ng, hits.sample, shape):
-        differ |= around(normal, np.maximum, reach) - around(normal, np.minimum, reach) > F(TURN)
+        differ |= around(normal, np.maximum, reach) - around(normal, np.minimum, reach) > F(NORMAL_STEP)
 
-    # a leap from centre to centre, or from a probe to the centres around
+    # A step in depth between centres, or between a probe and the centres around it.
     near = on_film(nearness, hits.sample, shape)[0]
-    leap = _leap(view, render_space, near)
-    far = around(near, np.minimum, 1, straight=True) - leap
-    close = around(near, np.maximum, 1, straight=True) + leap
-    leaps = bend(near) > leap
-    leaps |= (probes.farthest.reshape(shape) < far) | (probes.nearest.reshape(shape) > close)
-    return np.asarray(differ | around(leaps, np.maximum, reach)).ravel()
+    step = _nearness_step(view, render_space, near)
+    far = around(near, np.minimum, 1, straight=True) - step
+    close = around(near, np.maximum, 1, straight=True) + step
+    steps = bend(near) > step
+    steps |= (probes.farthest.reshape(shape) < far) | (probes.nearest.reshape(shape) > close)
+    return np.asarray(differ | around(steps, np.maximum, reach)).ravel()
 
 
-def _leap(view: View, render_space: RenderSpace, near: NDArray[np.float64]) -> NDArray[np.float64] | float:
-    """By how much `nearness` differs between depths that are a leap apart."""
+def _nearness_step(
+    view: View, render_space: RenderSpace, near: NDArray[np.float64]
+) -> NDArray[np.float64] | float:
+    """The difference of `nearness` at a step of `DEPTH_STEP`."""
     if view.camera.projection == "orthographic":
-        return LEAP * view.camera.extent / render_space.radius / view.height
-    return LEAP * 2 * float(np.tan(np.radians(view.camera.fov) / 2)) / view.height * near
+        return DEPTH_STEP * view.camera.extent / render_space.radius / view.height
+    return DEPTH_STEP * 2 * float(np.tan(np.radians(view.camera.fov) / 2)) / view.height * near
 
 
 def refined(
@@ -144,16 +146,16 @@ def refined(
     values: NDArray[np.float32],
     minified: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
-    """(P,) pixels of a layer that want all samples: at edges, and where its values bend.
+    """(P,) True for pixels of a layer that need all samples: at edges and large second differences.
 
     Parameters
     ----------
     difference : float
-        How far values may bend, as a share of the greatest around.
+        Greatest second difference, relative to the greatest value around.
     values : (M,) or (M, k) float32
-        Of the samples at the centres that see something; 0 stands for the others.
+        At the hits of the centres; centres that miss count as 0.
     minified : (P,) bool, optional
-        Pixels that want all samples for their textures.
+        True for pixels that need all samples because of their textures.
     """
     shape = (tile.height, tile.width)
     planes = on_film(values, hits.sample, shape)
@@ -168,8 +170,7 @@ def refined(
 def minified(
     view: View, tile: Tile, hits: Hits, texels: NDArray[np.float32], material_id: NDArray[np.uint32]
 ) -> NDArray[np.bool_]:
-    """(P,) True where textures have more than a texel from centre to centre: the centres may then skip whole
-    periods of a pattern.
+    """(P,) True where textures have more than one texel from centre to centre, and details may be missed.
 
     Parameters
     ----------
@@ -194,7 +195,7 @@ def minified(
 
 
 def on_film(values: NDArray[Any], sample: Ids, shape: tuple[int, int]) -> NDArray[Any]:
-    """(k, h, w) values of the samples that see something, one to a pixel, and 0 elsewhere."""
+    """(k, h, w) values at the hits of a single sample per pixel, 0 at pixels whose sample misses."""
     columns = values.T if values.ndim == 2 else values[None]
     if len(sample) == shape[0] * shape[1]:
         return np.ascontiguousarray(columns).reshape(len(columns), *shape)
@@ -205,9 +206,9 @@ def on_film(values: NDArray[Any], sample: Ids, shape: tuple[int, int]) -> NDArra
 
 
 def around(values: NDArray[Any], extreme: np.ufunc, reach: int, straight: bool = False) -> NDArray[Any]:
-    """(h, w) the least or greatest of each value and those up to `reach` pixels across and down from it.
+    """(h, w) the least or greatest value within `reach` pixels across and down.
 
-    Beyond the film there is nothing, or, if `straight`, what the two values beside it lead to.
+    Values outside of the film do not count, or, if `straight`, are extrapolated from the two nearest.
     """
     for axis in (0, 1):
         source, values = values, values.copy()
@@ -230,10 +231,7 @@ def _along(axis: int, *part: int | None) -> tuple[slice | int, ...]:
 
 
 def bend(plane: NDArray[Any]) -> Floats:
-    """(h, w) second differences of each value and those beside it, across or down, whichever is greater.
-
-    0 at the borders, where a neighbour is missing.
-    """
+    """(h, w) the greater of the second differences across and down; 0 at borders."""
     out = np.zeros_like(plane)
     for axis in (0, 1):
         first, middle, last = (plane[_along(axis, k, k - 2 or None)] for k in range(3))

@@ -19,18 +19,18 @@ from illumcli.render_space import RenderSpace
 
 
 class Adaptive(Value):
-    """How the pixels are found that one sample is not enough for (`film.adaptive`)."""
+    """How adaptive sampling decides which pixels get all samples (`film.adaptive`)."""
 
     probes: int
-    """Samples whose first hits are looked at."""
+    """Samples per pixel whose first hits are compared."""
     reach: int
-    """Pixels across and down that the pixel filter reaches from a pixel."""
+    """Reach of the pixel filter from a pixel [pixels]."""
     spread: float
     """Variance of the pixel filter, as a multiple of a box's of one pixel."""
 
 
 class View(Value):
-    """One picture: a camera and the size and sampling of its film."""
+    """One image: a camera, with the size and sampling of its film."""
 
     name: str
     camera: Camera
@@ -38,22 +38,22 @@ class View(Value):
     height: int
     samples: int
     adaptive: Adaptive | None = None
-    """Set where pixels get one sample or all."""
+    """Not None if pixels get one sample or all."""
     stands_for: int = 1
-    """Samples that each sample stands for: it casts the obscurance rays of so many."""
+    """Number of samples whose obscurance rays each sample casts."""
 
     @property
     def reach(self) -> int:
-        """Pixels across and down that the pixel filter of an adaptive picture reaches from a pixel."""
+        """Reach of the pixel filter of an adaptive image [pixels]."""
         return self.adaptive.reach if self.adaptive else 0
 
     @property
     def border(self) -> int:
-        """Pixels around a tile of an adaptive picture that decide about those within."""
+        """Width of the border around a tile that decides about the tile's pixels [pixels]."""
         return self.reach + 1
 
     def centres(self) -> View:
-        """An adaptive view with the one sample that every pixel gets."""
+        """The adaptive view with one sample per pixel."""
         return replace(self, samples=1, stands_for=self.samples)
 
     def all_samples(self) -> View:
@@ -61,13 +61,13 @@ class View(Value):
         return replace(self, adaptive=None)
 
     def probing(self) -> View:
-        """The view with the samples whose first hits are looked at."""
+        """The view with the samples whose first hits are compared."""
         assert self.adaptive is not None
         return replace(self, samples=self.adaptive.probes, adaptive=None, stands_for=1)
 
 
 def samples(seed: int, view: View, tile: Tile) -> Samples:
-    """Where the tile's samples lie, keyed by pixel number."""
+    """Sample positions of the tile, keyed by pixel number."""
     x, y = tile.pixels()
     pixel = (y * view.width + x).astype(np.uint32)
     points = sampling.pixel_points(sampling.stream(seed, "pixel"), pixel, view.samples)
@@ -75,7 +75,7 @@ def samples(seed: int, view: View, tile: Tile) -> Samples:
 
 
 def rays(film_filter: PixelFilter, render_space: RenderSpace, view: View, samples: Samples) -> Rays:
-    """A ray per sample; a single sample looks through its pixel's centre whatever the filter."""
+    """A ray per sample; a single sample is at its pixel's centre, whatever the filter."""
     several = samples.per_pixel > 1
     points = film_points(samples.x, samples.y, samples.points, film_filter if several else None)
     return camera_rays(view.camera, render_space, view.width, view.height, points)
@@ -90,7 +90,7 @@ def view_vectors(view: View, render_space: RenderSpace, points: Placed) -> Vecto
 
 
 def depth(view: View, render_space: RenderSpace, interaction: SurfaceInteraction) -> Floats:
-    """(M,) distance from the eye's plane along the line of sight, at least 0 [scene units]."""
+    """(M,) distance from the plane through the eye, along the view direction, at least 0 [scene units]."""
     forward = axes(view.camera)[2]
     eye = render_space.from_world(view.camera.position)
     along = np.maximum(dot(interaction.position - eye, forward[None, :]), 0)

@@ -65,7 +65,7 @@ class PlanarPolygons(Record):
 def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of a scene; None if there are none.
 
-    Corners are those of the meshes in double precision, before they are rounded for the ray core. Polygons
+    Corners are those of the meshes in double precision, before they are rounded for Embree. Polygons
     that cross themselves, or have no area, are left out.
 
     Parameters

@@ -40,7 +40,7 @@ class SceneGeometry(Record):
 
     render_space: RenderSpace
     placed: tuple[PlacedMesh, ...]
-    vertices: NDArray[np.float32]  # (V, 3), exactly what the ray core sees
+    vertices: NDArray[np.float32]  # (V, 3), exactly as Embree has them
     triangles: NDArray[np.int32]  # (T, 3) vertex numbers
     corners: NDArray[np.int32]  # (T, 3) corner numbers, for normals and uv
     polygons: NDArray[np.int32]  # (T,) polygon numbers

@@ -1,7 +1,7 @@
-"""Nodes of adaptive pictures: which pixels of each layer want all samples.
+"""Nodes of adaptive sampling: they decide which pixels of each layer need all samples.
 
-Pixels get one sample at their centre first. What decides about the others must not be random, so light is
-looked at as if nothing were obscured: buffers that depend on traced obscurance have copies with w = 1.
+Pixels first get one sample at their centre. The decision must not be random, so it is based on light without
+obscurance: buffers that depend on traced obscurance have copies with w = 1.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from illumcli.scene.spec import Scene
 from illumcli.visibility.obscurance import baked_or_open
 
 OPEN = "open."
-"""Before the name of every buffer that is computed with w = 1 where obscurance is traced."""
+"""Prefix of the names of buffers that are computed with w = 1 in place of traced obscurance."""
 REFINED = "refined:"
-"""Before the name of every layer that pixels are refined for."""
+"""Prefix of the names of buffers that say which pixels of a layer are refined."""
 MIXED = ("obscurance", "ambient", "beauty")
 """Buffers of layers that may depend on obscurance."""
 
 
 def adaptive_nodes(scene: Scene, nodes: Mapping[str, Node], given: Iterable[str]) -> dict[str, Node]:
-    """The nodes that decide about each layer's pixels, by buffer; none where no view is adaptive."""
+    """The nodes that decide about each layer's pixels, by buffer; none if no view is adaptive."""
     settings = scene.film.adaptive
     if settings is None or all(view.adaptive is None for view in needs.views(scene)):
         return {}
     purposes = [each for each in ("lobes", "ambient", "emission") if needs.may_vary(scene, each)]
     textures = {f"{purpose}_textures": f"{purpose}_textures" for purpose in purposes}
-    made = [
+    decisions = [
         Node.of(probe_view),
         Node.of(partial(samples, scene.seed), "probe_samples", view="probe_view"),
         Node.of(partial(rays, scene.film.filter), "probe_rays", view="probe_view", samples="probe_samples"),
@@ -48,8 +48,8 @@ def adaptive_nodes(scene: Scene, nodes: Mapping[str, Node], given: Iterable[str]
         values = f"{OPEN}{layer.buffer}" if f"{OPEN}{layer.buffer}" in opened else layer.buffer
         coarse = {"minified": "minified"} if textures and layer.kind == "light" else {}
         bound = partial(refined, settings.difference)
-        made.append(Node.of(bound, decision(layer), values=values, **coarse))
-    return opened | {node.output: node for node in made}
+        decisions.append(Node.of(bound, decision(layer), values=values, **coarse))
+    return opened | {node.output: node for node in decisions}
 
 
 def means(scene: Scene) -> list[Layer]:
@@ -59,22 +59,22 @@ def means(scene: Scene) -> list[Layer]:
 
 
 def decision(layer: Layer) -> str:
-    """The buffer that says which pixels of a layer want all samples."""
+    """Name of the buffer that says which pixels of a layer need all samples."""
     return f"{REFINED}{layer.name}"
 
 
 def _opened(nodes: Mapping[str, Node], given: Iterable[str]) -> dict[str, Node]:
-    """Copies of what depends on traced obscurance, computed with w = 1 there."""
-    made: dict[str, Node] = {}
+    """Copies of the nodes that depend on traced obscurance, with w = 1."""
+    copies: dict[str, Node] = {}
     for node in topological_order(nodes, [name for name in MIXED if name in nodes], given):
         name = f"{OPEN}{node.output}"
         if node.output == "obscurance" and "obscurance_draws" in node.inputs.values():
             baked = "baked_obscurance" in node.inputs.values()
-            made[name] = Node.of(baked_or_open if baked else stages.alpha, name)
-        elif any(f"{OPEN}{need}" in made for need in node.inputs.values()):
+            copies[name] = Node.of(baked_or_open if baked else stages.alpha, name)
+        elif any(f"{OPEN}{need}" in copies for need in node.inputs.values()):
             inputs = {
-                parameter: f"{OPEN}{need}" if f"{OPEN}{need}" in made else need
+                parameter: f"{OPEN}{need}" if f"{OPEN}{need}" in copies else need
                 for parameter, need in node.inputs.items()
             }
-            made[name] = Node(name, node.function, inputs)
-    return made
+            copies[name] = Node(name, node.function, inputs)
+    return copies

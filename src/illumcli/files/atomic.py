@@ -193,7 +193,7 @@ def claim(path: Path, create: bool = True) -> int | None:
         The file cannot be opened for another reason.
     """
     flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | (os.O_CREAT if create else 0)
-    while True:
+    while True:  # until the locked file is one that still has its name
         try:
             handle = os.open(path, flags, 0o600)
         except OSError as error:
@@ -206,11 +206,13 @@ def claim(path: Path, create: bool = True) -> int | None:
             is_ours = stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and about.st_nlink < 2
             if not is_ours or _lock(handle) != 0:
                 return None
+            # Between opening and locking, another process may have removed the file.
             about = os.fstat(handle)
-            if about.st_nlink == 0:  # removed before it was locked
+            if about.st_nlink == 0:
                 if not create:
                     return None
                 continue
+            # Others could have written into it, or hold it open: it is not used.
             if about.st_mode & 0o022:
                 os.unlink(path)
                 return None

@@ -56,6 +56,7 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
                 problems.append(f"{shown}: {fact}; leave it out or use a form of its kind, as 04d or .3f")
         return ""
 
+    # `value` collects the faults, so that one error lists all of them.
     name = _FIELD.sub(value, pattern)
     if len(name) > LONGEST and not problems:
         problems.append(f"{shown}: makes a name of {len(name)} letters; no system takes more than {LONGEST}")

@@ -66,6 +66,7 @@ def difference(reference: NDArray[Any], other: NDArray[Any], peak: float | None 
     shape = (*reference.shape, 1)[:3]
     reference, other = reference.reshape(shape), other.reshape(shape)
     height, width, channels = shape
+    # Bands of rows, so that float64 copies of the whole images are never in memory.
     rows = max(1, _BAND // max(1, width * channels))
     count = not_finite = 0
     absolute = square = relative = top = 0.0
@@ -73,6 +74,7 @@ def difference(reference: NDArray[Any], other: NDArray[Any], peak: float | None 
     for y in range(0, height, rows):
         r = reference[y : y + rows].astype(np.float64)
         d = absolute_difference(r, other[y : y + rows])
+        # Values that are not finite are counted, and contribute 0 to the sums.
         use = np.isfinite(d)
         used = int(np.count_nonzero(use))
         not_finite += use.size - used

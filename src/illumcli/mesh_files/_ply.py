@@ -247,6 +247,7 @@ def _lines_of(block: Block, element: Element, repairs: dict[str, Repair]) -> Tab
             row = int(np.argmax(wrong))
             raise InputError(f"{block.place(row)}: {element.name} {row} {fact}; export the mesh again")
 
+    # `at` is each row's next word; a list advances it by a different number of words in each row.
     table: Table = {}
     for each in element.properties:
         check(at >= ends, f"has no value for '{each.name}'")
@@ -353,6 +354,7 @@ def _ragged_rows(path: Path, data: bytes, element: Element, start: int) -> tuple
 
 def _row_starts(path: Path, data: bytes, element: Element, start: int) -> tuple[Ints, int]:
     """(count,) offset of each row, and of the end of the last; the only loop over rows."""
+    # A row's layout: each list with the bytes of the scalars before it, and the bytes after the last.
     steps: list[tuple[int, struct.Struct, int]] = []  # bytes before a list, its length, bytes of an item
     gap = 0
     for each in element.properties:
@@ -361,6 +363,7 @@ def _row_starts(path: Path, data: bytes, element: Element, start: int) -> tuple[
         else:
             steps.append((gap, _struct(each.count_type), each.type.itemsize))
             gap = 0
+    # The size of a row is known only after reading the lengths of its lists.
     starts = []
     at = start
     for row in range(element.count):

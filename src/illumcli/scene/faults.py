@@ -36,7 +36,7 @@ def _faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterat
         kind, loc, value, context = fault["type"], fault["loc"], fault["input"], fault.get("ctx", {})
         path, annotation = _located(loc, cls, tree)
         match kind:
-            case "missing" if isinstance(loc[-1], int):
+            case "missing" if isinstance(loc[-1], int):  # a vector with too few components
                 yield path, wrong_length(part_at(path, tree), lengths[loc[:-1]])
             case "missing":
                 yield path, f"missing key '{loc[-1]}'"
@@ -58,6 +58,7 @@ def _faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterat
                 yield path, f"missing key '{_key(annotation)}'"
             case _:  # errors that validators of this package raise already have their message
                 yield path, sentence(kind, context, value) or fault["msg"]
+        # With an unknown tag pydantic stops: the other keys are validated as those of a likely member.
         if isinstance(unknown := context.get("error"), UnknownMember):
             mapping = part_at(path[:-1], tree)
             for inner, fact in _other_faults(unknown.family, mapping):

@@ -173,12 +173,14 @@ def _gaps(count: int) -> CheckResult:
     square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], np.float64)
     quads = [[0, 2, 1], [0, 3, 2]]
     for gap in GAPS:
+        # A floor and, parallel above it, a plate of half its size; the scene's radius is the root of 2.
         floor = Mesh.of_triangles(square + np.array([0.2, 0.7, 0.1]), quads)
         plate = Mesh.of_triangles(square * 0.5 + [0.2, 0.7 + gap * 2**0.5, 0.1], quads)
         geometry = world_of(Mesh.of_triangles(
             np.concatenate([floor.vertices, plate.vertices]), [*quads, *(np.array(quads) + 4)]
         ))  # fmt: skip
         tracer = Tracer(geometry.vertices, geometry.triangles)
+        # Rays from random points of the floor under the plate, along its normal: each must hit the plate.
         weight = random.uniform(0.3, 0.7, (count, 2))  # of the floor's square, under the plate
         corner = [geometry.vertices[k].astype(np.float64) for k in range(4)]
         position = column_major(
@@ -229,6 +231,7 @@ def _terminators(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
     results = []
     film = {"width": 48, "height": 48, "samples": 1} if quick else {"width": 256, "height": 256, "samples": 1}
     for divisions in (1, 3) if quick else (1, 2, 3, 5):
+        # A ball whose vertex normals are those of the sphere.
         mesh = icosphere(divisions)
         text = "".join(f"v {x!r} {y!r} {z!r}\nvn {x!r} {y!r} {z!r}\n" for x, y, z in mesh.vertices.tolist())
         text += "".join(
@@ -241,6 +244,7 @@ def _terminators(sandbox: Sandbox, quick: bool) -> list[CheckResult]:
             scene(ball, lights=[sun], film=film, camera={"position": [0, 0.5, 4], "target": [0, 0, 0]}),
             ("shadows", "normal", "obscurance", "alpha"),
         )
+        # Where the shading normal faces the light, a convex body is neither in shadow nor obscured.
         n_l = sum(channels[f"N.{axis}"] * component for axis, component in zip("XYZ", to_light, strict=True))
         lit = (channels["A"] == 1) & (n_l > 1e-5)
         false = int(np.count_nonzero(channels["shadow.sun.Y"][lit] != 1))

@@ -130,12 +130,14 @@ def _case(path: Path, number: int, entry: Any, problems: list[str]) -> Case | No
     if not isinstance(entry, dict):
         problems.append(f"{place}: must be an object, is {_kind(entry)}")
         return None
+    # Messages name the case by its id as well, where it has one.
     if isinstance(entry.get("id"), str):
         place += f" ({entry['id']})"
     missing = [key for key in KEYS if key not in entry]
     if missing:
         problems.append(f"{place}: lacks {', '.join(missing)}")
         return None
+    # All wrong values of the entry are reported at once.
     values = entry["expected"] if isinstance(entry["expected"], list) else [entry["expected"]]
     wrong = [
         f"{place}: {key}: must be {kind}, is {_kind(entry[key])}"

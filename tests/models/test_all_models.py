@@ -16,8 +16,10 @@ from numpy.polynomial.legendre import leggauss
 from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema_generator import schema_of
 from illumcli.models._base import IlluminationModel
+from illumcli.models._parameters import may_vary
 from illumcli.schema.description import Description
 from illumcli.schema.families import member, members, tags
+from illumcli.shading.batches import batches
 from illumcli.shading.terms import evaluate, given_terms
 
 MODELS = members("illumcli.models")
@@ -254,12 +256,45 @@ def test_one_value_per_lane_equals_one_value_for_all(Model, data, seed):
             np.testing.assert_allclose(values, evaluate(model.lobes(), given)[name], rtol=1e-5, err_msg=path)
 
 
+@every_model
+@settings(max_examples=40, deadline=None)
+@given(data=st.data(), seed=seeds)
+def test_materials_that_are_evaluated_together_have_the_bits_of_each_alone(Model, data, seed):
+    drawn = [data.draw(parameters(Model)) for _ in range(3)]
+    # others with the same choices, so that some share a batch
+    models = [
+        *drawn,
+        *(each.model_copy(update=numbers(drawn[0], data.draw(parameters(Model)))) for each in drawn[:2]),
+    ]
+    given = directions(seed, 40, np.float32)
+    together = batches(models)
+    which = np.random.default_rng(seed).integers(0, len(models), len(given["l"]))
+    for number, batch in enumerate(together.every):
+        at = np.flatnonzero(together.batch[which] == number)
+        here = {name: x if x.ndim == 1 else column_major(x[at]) for name, x in given.items()}
+        lobes = batch.at(together.row[which[at]]).lobes()
+        values = evaluate(lobes, here)
+        for k, material in enumerate(which[at]):
+            alone = evaluate(models[material].lobes(), given)
+            assert alone.keys() == values.keys()
+            for name, value in values.items():
+                np.testing.assert_array_equal(value[k], alone[name][at[k]], err_msg=name)
+
+
+def numbers(model, other):
+    """The numbers and colours of another material, of parameters that both have."""
+    return {
+        name: value
+        for name, value in other
+        if may_vary(type(model), name) and value is not None and dict(model)[name] is not None
+    }
+
+
 def varied(part, count, prefix=""):
     """Path -> the parameter once per lane, of every parameter that may vary over the surface."""
     found = {}
     for name, value in part:
-        annotation = str(type(part).model_fields[name].annotation)
-        if isinstance(value, float | tuple) and "VertexValues" in annotation:
+        if isinstance(value, float | tuple) and may_vary(type(part), name):
             found[prefix + name] = (
                 column_major(np.tile(value, (count, 1)))
                 if isinstance(value, tuple)

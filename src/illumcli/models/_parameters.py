@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import Discriminator, Field, Tag
 
+from illumcli.schema.annotations import field_annotation, split
 from illumcli.schema.description import Description
 from illumcli.schema.fields import Color, Shorthand, Triple, spread
 
@@ -56,6 +58,14 @@ Varying: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
     Discriminator(_kind),
 ]
+
+
+@cache
+def may_vary(cls: type[Description], name: str) -> bool:
+    """True if a parameter of this name takes a texture or vertex values."""
+    _, marks = split(field_annotation(cls, name))
+    return any(isinstance(mark, Discriminator) and mark.discriminator is _kind for mark in marks)
+
 
 # a slope; a lobe narrower than 1e-4 cannot be resolved in single precision
 Roughness: TypeAlias = Annotated[float, Field(ge=1e-4, le=10)]

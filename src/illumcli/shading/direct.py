@@ -15,6 +15,9 @@ from illumcli.shading.rates import ShadingPoints
 from illumcli.shading.terms import evaluate, given_terms
 from illumcli.shading.textures import PointMaterials
 
+FEW_GROUPS = 8
+"""So many groups are found one by one; a sort finds more of them faster."""
+
 
 def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
     """Indices by their number in 0..count-1: pairs (number, indices), only for numbers that occur."""
@@ -22,8 +25,13 @@ def groups(number: Ids, count: int) -> list[tuple[int, Ids | slice]]:
         return [(0, slice(None))] if len(number) else []
     if len(number) and (only := number.min()) == number.max():
         return [(int(only), slice(None))]
-    present = np.flatnonzero(np.bincount(number, minlength=count))
-    return [(int(k), np.flatnonzero(number == k).astype(np.int32)) for k in present]
+    sizes = np.bincount(number, minlength=count)
+    present = np.flatnonzero(sizes)
+    if len(present) <= FEW_GROUPS:
+        return [(int(k), np.flatnonzero(number == k).astype(np.int32)) for k in present]
+    order = np.argsort(number.astype(np.min_scalar_type(count)), kind="stable").astype(np.int32)
+    ends = np.cumsum(sizes[present])
+    return [(int(k), order[end - sizes[k] : end]) for k, end in zip(present, ends, strict=True)]
 
 
 def take_group(values: NDArray[Any], index: Ids | slice) -> NDArray[Any]:
@@ -80,7 +88,7 @@ def response(
         `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
     """
     models, lobes = materials.materials.models, materials.materials.lobes
-    material, parameters = materials.number, materials.parameters
+    batches, parameters = materials.materials.batches, materials.parameters
     names = sorted({name for each in lobes for name in each})
     count = len(incident.index)
 
@@ -89,15 +97,19 @@ def response(
     column = np.full(incident.count, count, np.intp)  # of each point
     light = np.asarray(color, F)
     first = 0
-    for number, group in groups(take_or_all(material, incident.index), len(models)):
-        if not lobes[number]:
+    material = take_or_all(materials.number, incident.index)
+    batch = material if len(batches.every) == len(models) else batches.batch.take(material)
+    for number, group in groups(batch, len(batches.every)):
+        # The lobes of these materials, with their parameters at these points if they vary.
+        points, of_group = take_group(incident.index, group), take_group(material, group)
+        one = int(of_group[0])
+        if not lobes[one]:
             continue
-
-        # The material's lobes, with its parameters at these points if they vary.
-        points = take_group(incident.index, group)
-        own_lobes = dict(lobes[number])
-        if parameters is not None and parameters.of_material[number]:
-            own_lobes = parameters.model(models[number], number, points).lobes()
+        own_lobes = dict(lobes[one])
+        if batches.every[number].differing:
+            own_lobes = batches.every[number].at(batches.row.take(of_group)).lobes()
+        elif parameters is not None and parameters.of_material[one]:
+            own_lobes = parameters.model(models[one], one, points).lobes()
 
         # The given terms that they need.
         needed = given_terms(own_lobes)

@@ -18,6 +18,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import VertexValues
 from illumcli.rays.corner_weights import OnTriangles
 from illumcli.records import Record, Value
+from illumcli.shading.batches import Batches, batches
 
 Token: TypeAlias = tuple[str, ...]
 """Identity of a material, independent of its parameters: `("material", name)` of the scene, `("object",
@@ -119,6 +120,7 @@ class Materials(Record):
     names: tuple[str, ...]
     numbering: Numbering
     lobes: tuple[Mapping[str, Any], ...]
+    batches: Batches
     repairs: Repairs = field(default_factory=dict)
     """Deviations from the material libraries of mesh files."""
     substitutes: tuple[Mapping[str, Substitute] | None, ...] = ()
@@ -154,7 +156,7 @@ def materials(
     lobes = tuple(model.lobes() for model in models)
     used = dict.fromkeys(own[1] for own in imported if own is not None)
     repairs = joined(located(libraries[name].material_repairs, name) for name in used)
-    return Materials(models, names, numbering, lobes, repairs, tuple(substitutes))
+    return Materials(models, names, numbering, lobes, batches(models), repairs, tuple(substitutes))
 
 
 def _model_of(

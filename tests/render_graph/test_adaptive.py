@@ -7,11 +7,17 @@ import json
 import numpy as np
 import pytest
 
+from illumcli.cache import policy
+from illumcli.cache.memory import MemoryCache
+from illumcli.cache.recorder import Cache
+from illumcli.cache.store import Store
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
 from illumcli.errors import InputError
 from illumcli.layers import NAMES
+from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.schedule import outputs_of, shared_keys
 from illumcli.scene.load import load
 from planned import planned
 
@@ -249,3 +255,98 @@ def test_the_job_reports_it_and_keeps_its_bytes_in_a_cache(scene, tmp_path, monk
     render_scene(RenderJob(scene, RenderOptions(pattern="again.exr")))
     assert (tmp_path / "again.exr").read_bytes() == pictures[0] == pictures[1] == pictures[2]
     assert (tmp_path / "plain.exr").read_bytes() != pictures[0]
+
+
+# --- buffers kept between runs ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def keeps_everything(monkeypatch):
+    monkeypatch.setattr(policy, "worth", lambda seconds, size: True)
+
+
+def cached(path, *overrides, store=None, memory=None, only=ALL, threads=1, side=None):
+    """Layers, rays by node, and what was loaded from the cache."""
+    loaded = load(path, overrides)
+    run = Run(RenderStats(), Cache(store, memory), threads)
+    plan = planned(loaded, only, run.cache)
+    parts = list(bands(plan, run_once(plan, run), run, side=side))
+    layers = {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}
+    others = plan.all_samples.lookup.reused if plan.all_samples else {}
+    return layers, dict(run.stats.rays), {**plan.lookup.reused, **others}
+
+
+def same(a, b):
+    assert a.keys() == b.keys()
+    for name, values in a.items():
+        assert values.tobytes() == b[name].tobytes(), name
+
+
+CHANGES = [
+    "materials.red.diffuse=[0.1,0.2,0.9]", "materials.red.exponent=200", "lights.key.intensity=1",
+    "ambient=0.9",
+    "lights.key.position=[1,3,2]", "camera.position=[1.4,1.6,3]", "obscurance.samples=3", "film.samples=6",
+    "film.adaptive={difference: 0.2}", "film.adaptive={difference: 0.001}", "film.adaptive={probes: 9}",
+    "film.adaptive=false", "objects.1.shading=gouraud", "seed=4",
+]  # fmt: skip
+
+
+def test_a_second_run_takes_no_ray_and_gives_the_same_bits(scene, whole, tmp_path, keeps_everything):
+    store = Store(tmp_path / "kept")
+    same(whole[0], cached(scene, store=store)[0])
+    for threads, side in ((1, None), (2, 13), (2, 59)):
+        layers, rays, reused = cached(scene, store=store, threads=threads, side=side)
+        same(whole[0], layers)
+        assert rays == {}
+        assert {"hits", "shadow:key", "obscurance", "edges", "geometry"} <= reused.keys()
+        assert "tracer" not in reused
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_changes_find_only_what_is_their_own(scene, whole, tmp_path, change, keeps_everything):
+    """On disk and in memory, over and over: what one picture lacks, the other may have."""
+    expected = cached(scene, change)[0]
+    store = Store(tmp_path / "kept")
+    first, second = load(scene), load(scene, [change])
+    graphs = [build(each.scene, each) for each in (first, second)]
+    memory = MemoryCache(shared_keys(*graphs, outputs_of(second.scene, ALL)))
+    cached(scene, store=store)
+    cached(scene, memory=memory)
+    same(expected, cached(scene, change, store=store)[0])
+    same(expected, cached(scene, change, memory=memory)[0])
+    same(whole[0], cached(scene, store=store)[0])
+    same(expected, cached(scene, change, store=store, threads=2, side=16)[0])
+
+
+@pytest.mark.parametrize("kind", ["store", "memory"])
+def test_a_change_of_material_traces_only_where_it_wants_samples(scene, tmp_path, kind, keeps_everything):
+    change = "materials.grey.diffuse=0.02"
+    plain = sum(cached(scene, change, only=["beauty"])[1].values())
+    first, second = load(scene), load(scene, [change])
+    graphs = [build(each.scene, each) for each in (first, second)]
+    wanted = shared_keys(*graphs, outputs_of(second.scene, ["beauty"]))
+    where = {kind: Store(tmp_path / "kept") if kind == "store" else MemoryCache(wanted)}
+    cached(scene, only=["beauty"], **where)
+    rays = cached(scene, change, only=["beauty"], **where)[1]
+    assert 0 < sum(rays.values()) < 0.15 * plain
+    exposed = cached(scene, "film.background=0.3", only=["beauty"], **where)[1]
+    assert exposed == {}
+
+
+def test_what_was_not_read_before_is_traced_when_it_is(scene, tmp_path, keeps_everything):
+    """Obscurance at the centres of refined pixels, of which another difference refines fewer."""
+    store, fewer = Store(tmp_path / "kept"), "film.adaptive={difference: 1}"
+    cached(scene, "film.adaptive={difference: 0.0001}", store=store, only=["beauty"])
+    layers, rays, reused = cached(scene, fewer, store=store, only=["beauty"])
+    same(cached(scene, fewer, only=["beauty"])[0], layers)
+    assert "obscurance" in reused
+    assert rays["obscurance"] > 0
+
+
+def test_damaged_entries_of_some_pixels_are_made_again(scene, whole, tmp_path, keeps_everything):
+    store = Store(tmp_path / "kept")
+    cached(scene, store=store)
+    for entry in store.entries():
+        entry.path.write_bytes(entry.path.read_bytes()[:-3])
+    same(whole[0], cached(scene, store=store)[0])
+    assert cached(scene, store=store)[1] == {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +59,12 @@ class BufferCodec(Value):
     """Buffer, all buffers of the tile -> (planes, M) at the hits; None where it cannot be kept."""
     unpack: Callable[[NDArray[Any], Hits], Any]
     """(planes, M) and the hits -> buffer."""
+    of_pixels: bool = False
+    """Does it have a value for every pixel, hit or not? (planes, P) take the place of (planes, M)."""
 
     def layout(self, view: View) -> tuple[tuple[int, ...], type[np.generic]]:
         """Shape and type of what is stored for a view; truth values take a bit."""
-        row = view.width * view.samples
+        row = view.width * (1 if self.of_pixels else view.samples)
         if self.dtype is np.bool_:
             return (view.height, self.planes, -(-row // 8)), np.uint8
         return (view.height, self.planes, row), self.dtype
@@ -100,8 +102,10 @@ CODECS = {
     "shadow": BufferCodec(
         np.bool_, 1, lambda delta, buffers: delta[None] != 0, lambda planes, hits: planes[0].astype(F)
     ),
+    "edges": BufferCodec(np.bool_, 1, lambda edges, buffers: edges[None], _first, of_pixels=True),
 }
-"""Buffers of a view that are kept: primary hits, where and on what they lie, w, delta of each light."""
+"""Buffers of a view that are kept: primary hits, where and on what they lie, w, delta of each light; edges of
+adaptive sampling."""
 
 
 def codec_of(name: str) -> BufferCodec | None:
@@ -129,7 +133,17 @@ class StoredBuffer(Record):
         return block.transpose(1, 0, 2).reshape(self.codec.planes, -1)
 
 
-def load_hits(stored: StoredBuffer, tile: Tile) -> Hits:
+class Loads(Protocol):
+    """A stored buffer, of a whole view or of some of its pixels."""
+
+    @property
+    def codec(self) -> BufferCodec: ...
+
+    def tile(self, tile: Tile) -> NDArray[Any]:
+        """(planes, N) of the samples of a tile."""
+
+
+def load_hits(stored: Loads, tile: Tile) -> Hits:
     """The stored hits of a tile."""
     triangle, u, v = stored.tile(tile)
     sample = np.flatnonzero(triangle >= 0).astype(np.int32)
@@ -141,7 +155,12 @@ def load_hits(stored: StoredBuffer, tile: Tile) -> Hits:
     )
 
 
-def load_tile(stored: StoredBuffer, tile: Tile, hits: Hits) -> Any:
+def load_pixels(stored: Loads, tile: Tile) -> Any:
+    """A stored buffer of a tile with a value for every pixel."""
+    return stored.tile(tile)[0].astype(stored.codec.dtype)
+
+
+def load_tile(stored: Loads, tile: Tile, hits: Hits) -> Any:
     """A stored buffer of a tile, at its hits."""
     return stored.codec.unpack(take_or_all(stored.tile(tile).T, hits.sample).T, hits)
 
@@ -153,9 +172,9 @@ def pack_tile(name: str, buffers: Buffers, tile: Tile, per_pixel: int) -> NDArra
     packed = None if codec is None else codec.pack(buffers[name], buffers)
     if codec is None or packed is None:
         return None
-    row = tile.width * per_pixel
+    row = tile.width * (1 if codec.of_pixels else per_pixel)
     out = np.full((codec.planes, tile.height * row), -1 if codec.dtype is np.int32 else 0, codec.dtype)
-    out[:, buffers["hits"].sample] = packed
+    out[:, slice(None) if codec.of_pixels else buffers["hits"].sample] = packed
     return out.reshape(codec.planes, tile.height, row).transpose(1, 0, 2)
 
 

@@ -25,6 +25,8 @@ class MemoryCache:
         self.limit = limit
         self.once: dict[str, Any] = {}
         """Buffers of the whole scene."""
+        self.pixels: dict[str, Any] = {}
+        """Buffers of some pixels of a view (`cache.pixels`)."""
         self.needed: frozenset[int] = frozenset()
         """Numbers of the objects that some variant so far needed."""
         self._tiles: dict[str, dict[Tile, Any]] = {}
@@ -59,6 +61,7 @@ class MemoryCache:
             self._drop(key)
             self._complete.discard(key)
         self.once = {key: value for key, value in self.once.items() if key in self.wanted}
+        self.pixels = {key: value for key, value in self.pixels.items() if key in self.wanted}
 
     def _drop(self, key: str) -> None:
         dropped = self._tiles.pop(key, {})

@@ -62,11 +62,19 @@ class BufferRecorder:
         )
         """The buffers that every tile hands over."""
 
-    def take(self, name: str, buffers: Buffers, tile: Tile) -> NDArray[Any] | None:
-        """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread."""
+    def take(self, name: str, buffers: Buffers, tile: Tile, own: Tile | None = None) -> NDArray[Any] | None:
+        """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread.
+
+        Where the buffers are those of a larger `tile`, `own` is the part of it that is kept on disk.
+        """
         if self._memory is not None:
             self._memory.add(self._keys[name], tile, buffers[name])
-        return pack_tile(name, buffers, tile, self._view.samples) if name in self._writers else None
+        packed = pack_tile(name, buffers, tile, self._view.samples) if name in self._writers else None
+        if packed is None or own is None:
+            return packed
+        rows, columns = own.within(tile)
+        each = packed.shape[2] // tile.width
+        return packed[rows, :, columns.start * each : columns.stop * each]
 
     def write(self, row: Mapping[str, list[NDArray[Any] | None]]) -> None:
         """The next row of tiles, from left to right."""

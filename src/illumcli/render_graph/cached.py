@@ -7,7 +7,16 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
-from illumcli.cache.codec import Misfit, codec_of, decode_entry, load_hits, load_tile, stored_buffer
+from illumcli.cache.codec import (
+    Misfit,
+    codec_of,
+    decode_entry,
+    load_hits,
+    load_pixels,
+    load_tile,
+    stored_buffer,
+)
+from illumcli.cache.pixels import PixelBuffer, pixel_buffer, pixel_key
 from illumcli.cache.policy import SCENE_BUFFERS, is_kept
 from illumcli.cache.recorder import Cache
 from illumcli.film.tiles import Tile
@@ -25,10 +34,12 @@ class Lookup(Value):
     """Buffer -> where it is loaded from: `memory` or `store`."""
     keeps: Mapping[str, str] = field(default_factory=dict)
     """Buffers that are computed and may be kept -> their keys."""
+    pixels: Mapping[str, PixelBuffer] = field(default_factory=dict, repr=False)
+    """Buffers that are kept for some pixels only."""
 
 
 def substitute_cached(
-    graph: Graph, buffers: Iterable[str], view: View, cache: Cache, look: bool = False
+    graph: Graph, buffers: Iterable[str], view: View, cache: Cache, look: bool = False, some: bool = False
 ) -> tuple[Graph, Lookup]:
     """The graph with nodes that load the cached buffers among all that `buffers` need, and which these are.
 
@@ -36,11 +47,14 @@ def substitute_cached(
     ----------
     look : bool
         Read nothing: an entry that exists counts as valid, and the graph cannot run.
+    some : bool
+        Buffers of tiles are kept for some pixels only; the graph loads those of pixels that all of them have.
     """
     keys = Keys(graph.nodes, view, code())
     loaders: dict[str, Node] = {}
     reused: dict[str, str] = {}
     keeps: dict[str, str] = {}
+    pixels: dict[str, PixelBuffer] = {}
 
     # Depth first; the inputs of loaded buffers are not visited.
     pending, visited = list(buffers)[::-1], set(GIVEN)
@@ -57,14 +71,44 @@ def substitute_cached(
                 reused[name] = known.source
         elif cache.memory is not None or is_kept(name):
             key = keys(name)
-            source, loader = _loader(name, key, view, cache, look)
+            if some and codec_of(name) is not None:
+                keeps[name] = key
+                source, loader, found = _pixel_loader(name, key, view, cache, look)
+                pixels |= {name: found} if found is not None else {}
+            else:
+                source, loader = _loader(name, key, view, cache, look)
             if loader is not None:
                 node = loaders[name] = loader
                 reused[name] = source
             elif cache.accepts(name):
                 keeps[name] = key
         pending += list(node.inputs.values())[::-1]
-    return replace(graph, loaders=loaders), Lookup(reused, keeps)
+    return replace(graph, loaders=loaders), Lookup(reused, keeps, pixels)
+
+
+def _pixel_loader(
+    name: str, key: str, view: View, cache: Cache, look: bool
+) -> tuple[str, Node | None, PixelBuffer | None]:
+    """Where a buffer of some pixels is loaded from, the node that does so and what it reads."""
+    load = load_hits if name == "hits" else load_tile
+    if cache.memory is not None and key in cache.memory.pixels:
+        found = cache.memory.pixels[key]
+        return "memory", Node(name, partial(load, found), _inputs(name)), found
+    store, codec = cache.store, codec_of(name)
+    if store is None or codec is None:
+        return "", None, None
+    if look:
+        known = store.has(pixel_key(key))
+        return "store", Node(name, _constant, _inputs(name)) if known else None, None
+    stored = store.read(pixel_key(key))
+    if stored is None:
+        return "", None, None
+    try:
+        found = pixel_buffer(codec, stored, view)
+    except Misfit:
+        store.reject(pixel_key(key), f"holds something else than {name.partition(':')[0]} of some pixels")
+        return "", None, None
+    return "store", Node(name, partial(load, found), _inputs(name)), found
 
 
 def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[str, Node | None]:
@@ -94,7 +138,7 @@ def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[
             if memory is not None:
                 memory.once[key] = value
             return "store", Node(name, partial(_constant, value), {})
-        load = load_hits if name == "hits" else load_tile
+        load = load_hits if name == "hits" else load_pixels if codec.of_pixels else load_tile
         return "store", Node(name, partial(load, stored_buffer(codec, stored, view)), _inputs(name))
     except Misfit:
         store.reject(key, f"holds something else than {name.partition(':')[0]}")
@@ -103,9 +147,10 @@ def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[
 
 def _inputs(name: str) -> dict[str, str]:
     """The inputs of a node that loads the buffer `name`."""
-    if codec_of(name) is None:
+    codec = codec_of(name)
+    if codec is None:
         return {}
-    return {"tile": "tile"} if name == "hits" else {"tile": "tile", "hits": "hits"}
+    return {"tile": "tile"} if name == "hits" or codec.of_pixels else {"tile": "tile", "hits": "hits"}
 
 
 def _constant(value: Any) -> Any:

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.cache.pixels import PixelRecorder, common_pixels
 from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
@@ -25,7 +26,7 @@ from illumcli.rays.embree import Interrupted
 from illumcli.records import Record, Value
 from illumcli.render_graph.build import READ, SURROUNDINGS
 from illumcli.render_graph.build_adaptive import decision
-from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.schedule import Plan, without_cached_tiles
 from illumcli.visibility.object_pixels import ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
 
@@ -91,12 +92,45 @@ class _Common(Record):
     stop: threading.Event
     recorder: BufferRecorder
     develop: Develop
+    pixel_recorder: PixelRecorder | None = None
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
-    def last_use(self) -> tuple[Mapping[str, int], Mapping[str, int]]:
-        """`Plan.last_use` of the plan, and of that of all samples."""
+    def last_use(self) -> dict[int, Mapping[str, int]]:
+        """`Plan.last_use` of plans by their identity."""
+        return {}
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Numbers of the pixels whose buffers of all samples are cached, ascending."""
         others = self.plan.all_samples
-        return self.plan.last_use(), others.last_use() if others else {}
+        return common_pixels([*others.lookup.pixels.values()] if others else [])
+
+    def uncached(self) -> tuple[Plan, Plan, Buffers]:
+        """Plans that load no buffer of a tile, for one sample of some pixels and for all, and the buffers of the
+        whole scene for them; what of these was not needed so far is computed when it is asked for first.
+        """
+        with self.lock:
+            return self._uncached
+
+    @cached_property
+    def _uncached(self) -> tuple[Plan, Plan, Buffers]:
+        centres, all_samples = without_cached_tiles(self.plan)
+        shared = dict(self.shared)
+        for node in (*centres.once, *all_samples.once):
+            if node.output not in shared:
+                start = time.perf_counter()
+                shared[node.output] = node.run(shared)
+                self.stats.add({node.output: time.perf_counter() - start}, {})
+        return centres, all_samples, shared
+
+
+def _pixel_recorder(plan: Plan, cache: Cache) -> PixelRecorder | None:
+    """What keeps the pixels of an adaptive picture that have all samples, where something is kept."""
+    others = plan.all_samples
+    if others is None or (cache.store is None and cache.memory is None):
+        return None
+    return PixelRecorder(cache.store, cache.memory, others.lookup.keeps, others.lookup.pixels, others.view)
 
 
 def _unchanged(tile: Tile, layers: Planes) -> Planes:
@@ -117,6 +151,7 @@ def run_once(plan: Plan, run: Run) -> dict[str, Any]:
         run.stats.add({node.output: time.perf_counter() - start}, {})
         return value
 
+    keeps = {**(plan.all_samples.lookup.keeps if plan.all_samples else {}), **plan.lookup.keeps}
     buffers: dict[str, Any] = {}
     pool = ThreadPoolExecutor(run.threads, thread_name_prefix="once")
     try:
@@ -124,8 +159,8 @@ def run_once(plan: Plan, run: Run) -> dict[str, Any]:
             pending[node.output] = pool.submit(compute, node)
         for name, future in pending.items():
             buffers[name] = future.result()
-            if name in plan.lookup.keeps:
-                run.cache.keep(name, plan.lookup.keeps[name], buffers[name], _cost(plan, name, run.stats))
+            if name in keeps:
+                run.cache.keep(name, keeps[name], buffers[name], _cost(plan, name, run.stats))
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     return buffers
@@ -159,9 +194,9 @@ def bands(
     """
     view = plan.view
     rows = tiles(view.width, view.height, plan.tile_side(view, side), view.samples)
-    keeps = {} if plan.all_samples else plan.lookup.keeps
+    keeps = plan.lookup.keeps
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
-    common = _Common(plan, shared, run.stats, stop, recorder, develop)
+    common = _Common(plan, shared, run.stats, stop, recorder, develop, _pixel_recorder(plan, run.cache))
     compute = _adaptive_tile if plan.all_samples else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
@@ -198,6 +233,9 @@ def bands(
                 recorder.write(kept)
                 yield Band(row[0].y, band)
             recorder.finish({name: _cost(plan, name, run.stats) for name in keeps})
+            if plan.all_samples is not None and common.pixel_recorder is not None:
+                names = plan.all_samples.lookup.keeps
+                common.pixel_recorder.finish({name: _cost(plan, name, run.stats) for name in names})
         finally:
             stop.set()
             recorder.discard()
@@ -218,6 +256,8 @@ class _Started(Record):
     tile: Tile
     buffers: dict[str, Any]
     kept: Kept
+    own: Tile | None = None
+    """The part of the tile whose buffers are cached."""
 
 
 class _Ahead:
@@ -321,19 +361,25 @@ def _buffers(common: _Common, plan: Plan, tile: Tile) -> tuple[dict[str, Any], K
     return started.buffers, started.kept
 
 
-def _given(common: _Common, plan: Plan, tile: Tile) -> dict[str, Any]:
+def _given(common: _Common, plan: Plan, tile: Tile, shared: Buffers | None = None) -> dict[str, Any]:
     """The buffers that the nodes of a tile start from."""
-    buffers: dict[str, Any] = {**common.shared, "view": plan.view, "tile": tile, READ: None}
-    if "tracer" in common.shared:
-        buffers["tracer"] = common.shared["tracer"].counting(common.stop)
+    shared = common.shared if shared is None else shared
+    buffers: dict[str, Any] = {**shared, "view": plan.view, "tile": tile, READ: None}
+    if "tracer" in shared:
+        buffers["tracer"] = shared["tracer"].counting(common.stop)
     return buffers
 
 
-def _run_nodes(common: _Common, started: _Started, numbers: range) -> None:
+def _run_nodes(
+    common: _Common, started: _Started, numbers: range, pixel_recorder: PixelRecorder | None = None
+) -> None:
     """Run the nodes of these numbers on the buffers of a tile."""
     buffers, tracer = started.buffers, started.buffers.get("tracer")
     seconds, rays, unlit = {}, {}, {}
-    plan, last_use = started.plan, common.last_use[started.plan is common.plan.all_samples]
+    plan = started.plan
+    if id(plan) not in common.last_use:
+        common.last_use[id(plan)] = plan.last_use()
+    last_use = common.last_use[id(plan)]
     for number in numbers:
         node = plan.tile[number]
         if common.stop.is_set():
@@ -349,8 +395,11 @@ def _run_nodes(common: _Common, started: _Started, numbers: range) -> None:
             unlit[node.output] = value.count - len(value.index)
 
         # Hand it to the cache, and drop the buffers that no later node needs.
-        if node.output in common.recorder.names:
-            started.kept[node.output] = common.recorder.take(node.output, buffers, started.tile)
+        if plan is common.plan and node.output in common.recorder.names:
+            tile, own = started.tile, started.own
+            started.kept[node.output] = common.recorder.take(node.output, buffers, tile, own)
+        elif pixel_recorder is not None and node.output in pixel_recorder.names:
+            pixel_recorder.take(node.output, buffers, started.tile)
         for name in node.inputs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)
@@ -366,9 +415,10 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     assert all_samples is not None
 
     # What decides about the pixels, with a border, so that a pixel has the same neighbours in any tile.
-    bordered = tile.grown(plan.view.border, plan.view.width, plan.view.height)
+    view = plan.view
+    bordered = tile.grown(view.border, view.width, view.height)
     own, shape = tile.within(bordered), (bordered.height, bordered.width)
-    started = _Started(plan, bordered, _given(common, plan, bordered), {})
+    started = _Started(plan, bordered, _given(common, plan, bordered), {}, tile)
     _run_nodes(common, started, range(plan.decided_by))
     buffers = started.buffers
     means = [*all_samples.outputs, FIXED["alpha"]]
@@ -385,27 +435,68 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
     _run_nodes(common, started, range(plan.decided_by, len(plan.tile)))
     start = time.perf_counter()
     layers = {name: np.array(values[own]) for name, values in _pixels(plan, buffers, bordered).items()}
-    down, across = np.nonzero(np.logical_or.reduce([*refined.values()]))
     stats.add({"film": time.perf_counter() - start}, {})
 
-    # All samples of the pixels that some layer needs them for.
-    at_once = max(1, MAX_TILE_SAMPLES // all_samples.view.samples)
-    for first in range(0, len(down), at_once):
-        y, x = down[first : first + at_once], across[first : first + at_once]
-        pixels = Scattered.at(x + tile.x, y + tile.y)
-        others, _ = _buffers(common, all_samples, pixels)
-        start = time.perf_counter()
-        for name, values in _pixels(all_samples, others, pixels).items():
-            mine = refined[name][y, x]
-            layers[name][y[mine], x[mine]] = values[0][mine]
-        stats.add({"film": time.perf_counter() - start}, {})
+    # Pixels that an earlier picture did not read the obscurance of.
+    everywhere = np.ones((tile.height, tile.width), np.bool_)
+    lacks = _lacking(buffers, read)[own]
+    _at(common, tile, lacks, layers, dict.fromkeys(layers, everywhere), "centres")
 
-    saved = (tile.width * tile.height - len(down)) * (all_samples.view.samples - 1)
-    stats.add({}, {}, {"samples": saved}, len(down))
+    # All samples of the pixels that some layer needs them for, cached or not.
+    wanted = np.logical_or.reduce([*refined.values()])
+    y, x = np.indices(wanted.shape)
+    cached = np.isin((y + tile.y) * view.width + x + tile.x, common.held)
+    _at(common, tile, wanted & cached, layers, refined, "cached")
+    _at(common, tile, wanted & ~cached, layers, refined, "computed")
+
+    count = int(np.count_nonzero(wanted))
+    stats.add({}, {}, {"samples": (wanted.size - count) * (all_samples.view.samples - 1)}, count)
     start = time.perf_counter()
     developed = common.develop(tile, layers)
     stats.add({"film": time.perf_counter() - start}, {})
     return developed, started.kept
+
+
+def _lacking(buffers: Buffers, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the pixels that are read have no obscurance: NaN was cached."""
+    out = np.zeros(read.size, np.bool_)
+    if "obscurance" in buffers:
+        out[buffers["hits"].sample] = np.isnan(buffers["obscurance"])
+    return out.reshape(read.shape) & read
+
+
+def _at(
+    common: _Common,
+    tile: Tile,
+    which: NDArray[np.bool_],
+    layers: Planes,
+    masks: Mapping[str, NDArray[np.bool_]],
+    kind: Literal["centres", "cached", "computed"],
+) -> None:
+    """Set layers at some pixels of a tile, each where its mask is True.
+
+    `centres`: computed anew at one sample. All samples: of `cached` buffers, or `computed`.
+    """
+    down, across = np.nonzero(which)
+    if not len(down):
+        return
+    plan, shared = common.plan.all_samples, common.shared
+    if kind != "cached":
+        centres, all_samples, shared = common.uncached()
+        plan = centres if kind == "centres" else all_samples
+    assert plan is not None
+    recorder = common.pixel_recorder if kind == "computed" else None
+    at_once = max(1, MAX_TILE_SAMPLES // plan.view.samples)
+    for first in range(0, len(down), at_once):
+        y, x = down[first : first + at_once], across[first : first + at_once]
+        pixels = Scattered.at(x + tile.x, y + tile.y)
+        started = _Started(plan, pixels, _given(common, plan, pixels, shared), {})
+        _run_nodes(common, started, range(len(plan.tile)), recorder)
+        start = time.perf_counter()
+        for name, values in _pixels(plan, started.buffers, pixels).items():
+            mine = masks[name][y, x]
+            layers[name][y[mine], x[mine]] = values[0][mine]
+        common.stats.add({"film": time.perf_counter() - start}, {})
 
 
 def _pixels(plan: Plan, buffers: Buffers, tile: Tile) -> Planes:

@@ -37,5 +37,16 @@ def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached
 def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, look: bool = False) -> Plan:
     """The plan of one view, in which cached buffers are loaded; with `look` nothing is read."""
     buffers = needed_buffers(graph, outputs, [view])
-    graph, lookup = substitute_cached(graph, buffers, view, cache, look)
-    return schedule(graph, outputs, view, lookup)
+    if view.adaptive is None:
+        graph, lookup = substitute_cached(graph, buffers, view, cache, look)
+        return schedule(graph, outputs, view, lookup)
+
+    # An adaptive picture: the centres of all pixels, and all samples of some.
+    all_samples = None
+    if means := [layer for layer in outputs if not layer.data]:
+        of_all = view.all_samples()
+        needed = needed_buffers(graph, means, [of_all])
+        loaded, lookup = substitute_cached(graph, needed, of_all, cache, look, some=True)
+        all_samples = schedule(loaded, means, of_all, lookup)
+    graph, lookup = substitute_cached(graph, buffers, view.centres(), cache, look)
+    return schedule(graph, outputs, view, lookup, all_samples)

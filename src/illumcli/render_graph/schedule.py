@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from illumcli.cache.codec import codec_of
 from illumcli.errors import InputError
 from illumcli.film.tiles import min_tile_samples, tile_side
 from illumcli.film.view import View
@@ -55,7 +57,8 @@ class Plan(Value):
     def last_use(self) -> dict[str, int]:
         """Number of the last tile node that reads each buffer of a tile; the film's buffers have none."""
         kept = {layer.buffer for layer in self.outputs} | COVERAGE
-        kept |= {decision(layer) for layer in self.outputs} if self.all_samples else set()
+        if self.all_samples:
+            kept |= {"obscurance", *(decision(layer) for layer in self.outputs)}
         of_tile = {node.output for node in self.tile}
         last: dict[str, int] = {}
         for number, node in enumerate(self.tile):
@@ -169,6 +172,16 @@ def schedule(
     return Plan(graph, own, centres, tuple(once), tuple(tile), lookup, 0, decided_by, all_samples)
 
 
+def without_cached_tiles(plan: Plan) -> tuple[Plan, Plan]:
+    """Plans of an adaptive picture that load no buffer of a tile: for one sample of pixels, and for all."""
+    others = plan.all_samples
+    assert others is not None
+    loaders = {**plan.graph.loaders, **others.graph.loaders}
+    graph = replace(plan.graph, loaders={name: node for name, node in loaders.items() if not node.inputs})
+    centres = schedule(graph, plan.outputs, replace(plan.view, adaptive=None))
+    return centres, schedule(graph, others.outputs, others.view) if others.lookup.pixels else others
+
+
 def _split(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
     """Nodes that run once, and those that run for each tile."""
     of_tile = set(GIVEN)
@@ -190,14 +203,19 @@ def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> fro
     shared: set[str] = set()
     for view in following.views:
         plan = schedule(following, outputs, view)
-        second = Keys(following.nodes, view, code())
+        second = Keys(following.nodes, plan.view, code())
         shared |= {second(name) for name in ("implied_widths", *(node.output for node in plan.once))}
         if view not in graph.views:
             continue
-        first = Keys(graph.nodes, view, code())
+        first = Keys(graph.nodes, plan.view, code())
         common = {node.output for node in plan.tile if node.output in graph.nodes}
         common = {name for name in common if first(name) == second(name)}
         read = {name for node in plan.tile if node.output not in common for name in node.inputs.values()}
         read |= {layer.buffer for layer in outputs} | COVERAGE
         shared |= {second(name) for name in common & read}
+        if (
+            plan.all_samples is not None
+        ):  # of some pixels, in the form that the store has, whatever reads them
+            second = Keys(following.nodes, plan.all_samples.view, code())
+            shared |= {second(name) for name in common if codec_of(name) is not None}
     return frozenset(shared)

@@ -107,8 +107,8 @@ class _Common(Record):
         return common_pixels([*others.lookup.pixels.values()] if others else [])
 
     def uncached(self) -> tuple[Plan, Plan, Buffers]:
-        """Plans that load no buffer of a tile, for one sample of some pixels and for all, and the buffers of the
-        whole scene for them; what of these was not needed so far is computed when it is asked for first.
+        """Plans that load no buffer of a tile, for one sample of some pixels and for all; and the buffers of the
+        scene that they need, those that were not needed so far computed now.
         """
         with self.lock:
             return self._uncached

@@ -107,7 +107,7 @@ class _Common(Record):
         return common_pixels([*others.lookup.pixels.values()] if others else [])
 
     def uncached(self) -> tuple[Plan, Plan, Buffers]:
-        """Plans that load no buffer of a tile, for one sample of some pixels and for all of them, and the scene
+        """Plans that load no buffer of a tile, for one sample of some pixels and for all, and the scene
         buffers that they need, some of which may be computed only now.
         """
         with self.lock:

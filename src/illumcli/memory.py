@@ -19,7 +19,7 @@ def keep_freed_memory() -> None:
     """Tell glibc to keep what numpy frees for the next array, once per process; nothing elsewhere.
 
     By default every temporary array above 128 KiB goes back to the system and is faulted in again, page
-    by page: that is more than half the time of a pass over 16384 lanes (camera rays: 2.1 ms against 0.9 ms).
+    by page: that is more than half the time of a pass over 16384 rays (camera rays: 2.1 ms against 0.9 ms).
     """
     import ctypes  # a start that needs none of this does not wait for it
 

@@ -40,9 +40,9 @@ from illumcli.visibility.obscurance import obscurance_method
 BLOCKS = 3600
 """A picture is divided into about so many blocks."""
 CANDIDATES = 16
-"""Pixels of each block that may be looked at."""
+"""Pixels of each block that may be audited."""
 PILOT = 2
-"""Those of them that say how many more are looked at in each block, and with how many rays."""
+"""The first of them: their errors determine how many more of each block are audited, with how many rays."""
 PRECISION = 0.04
 """Relative standard error of the stated error that the number of pixels is chosen for."""
 RAYS = 128
@@ -59,7 +59,7 @@ class AuditedError(Value):
 
     layer: str
     rmse: float
-    """0 only where no pixel that was looked at errs."""
+    """0 only if every audited pixel is exact."""
     standard_error: float
     """Of `rmse`."""
     low: float
@@ -71,7 +71,7 @@ class AuditedError(Value):
 
     @classmethod
     def of_products(cls, layer: str, products: Floats, weights: Floats) -> AuditedError:
-        """From (K,) products (F - C)(F - D), and the share of the picture that each stands for."""
+        """From (K,) products (F - C)(F - D), and the share of the image that each represents."""
         mean = float(products @ weights)
         error = math.sqrt(float(np.square((products - mean) * weights).sum()))
         rmse = math.sqrt(max(mean, error))  # where the mean is lost in its own error, that bounds it
@@ -109,7 +109,7 @@ class Audit(Record):
     def error(self, shared: Mapping[str, Any], run: Run) -> AuditedError:
         """The error of the picture, of which every tile was taken.
 
-        Pixels that say how many are looked at do not state the error.
+        Pilot pixels only determine how many others are audited; they are not part of the estimate.
 
         Parameters
         ----------

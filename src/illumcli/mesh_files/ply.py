@@ -320,7 +320,7 @@ def read_about(path: Path) -> dict[str, Any]:
     Raises
     ------
     StopIteration, ValueError
-        A file of others.
+        The file was not written by `write`.
     """
     with path.open("rb") as file:
         header = file.read(1 << 16).partition(b"end_header")[0].decode("latin-1")

@@ -77,7 +77,7 @@ class Graph(Value):
     culled: tuple[int, ...] = ()
     """Numbers of the culled objects, which cannot affect any view."""
     reasons: Mapping[str, str] = field(default_factory=dict, repr=False)
-    """Buffer -> why this scene does not need it; it is still computed if an output needs it."""
+    """Buffer -> why this scene does not need it; it is computed all the same if an output needs it."""
 
     def topological_order(self, buffers: Iterable[str]) -> list[Node]:
         """The nodes that some buffers need, each after its inputs; cached buffers have loaders."""

@@ -38,7 +38,8 @@ class Plan(Value):
     tile: tuple[Node, ...]
     lookup: Lookup = NOTHING_CACHED
     before: int = 0
-    """How many of the steps of a tile run before the others read what these made of the tiles around."""
+    """Number of a tile's first steps: the later steps read the results of these from the tiles around,
+    too."""
     decided_by: int = 0
     """How many of the steps of a tile decide which pixels of an adaptive picture need all samples."""
     all_samples: Plan | None = None

@@ -124,7 +124,7 @@ def obscurance(
     read_pixels: NDArray[np.bool_] | None,
     baked_obscurance: Floats | None = None,
 ) -> NDArray[np.float32]:
-    """(M,) w of every hit, by the rays of all samples that each sample stands for.
+    """(M,) w of every hit, by the rays of all samples that each sample represents.
 
     Parameters
     ----------

@@ -241,13 +241,14 @@ class Filter(Description):
 
 class Adaptive(Description):
     """Adaptive sampling: one sample at the centre of every pixel, and all of them only where one is not
-    enough: where objects meet, surfaces turn or leap in depth, light bends, textures are finer than pixels.
+    enough: at the edges of objects, where normal, depth or light change abruptly, where textures are finer
+    than pixels.
 
-    It is biased: features between the samples that are looked at, such as the shadow of a wire, stay missed.
+    It is biased: features between the samples that are tested, such as the shadow of a wire, are missed.
     """
 
     probes: Count | None = None
-    """Samples of every pixel whose first hits are looked at; by default a quarter of them, but at least 2."""
+    """Samples of every pixel whose first hits are tested; by default a quarter of them, but at least 2."""
     difference: Annotated[float, Field(gt=0, le=1)] = 0.02
     """Greatest second difference of light over three pixels, as a share of the brightest around."""
 
@@ -268,8 +269,8 @@ class Film(Description):
     adaptive: Annotated[
         Adaptive | None, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool | None)
     ] = None
-    """Adaptive sampling: all samples only where one is not enough; `true`, or how that is found out. By
-    default every pixel has all samples."""
+    """Adaptive sampling: all samples only where one is not enough; `true`, or the settings of the test for
+    it. By default every pixel has all samples."""
     filter: Filter = DEFAULTS
     """The pixel filter."""
     background: Color | None = None

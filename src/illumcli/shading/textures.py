@@ -38,7 +38,7 @@ def bilinear(image: Texels, uv: Floats, wrap: str) -> Floats:
     ----------
     uv : (N, 2) float32, v upwards
     wrap : {'repeat', 'clamp', 'mirror'}
-        Outside of the image: it is repeated, its border is extended, or it is repeated mirrored in turn.
+        Outside of the image: it is repeated, its border is extended, or every other copy is mirrored.
     """
     x, y = _texels(image, uv, wrap)
     left, low = np.floor(x - F(0.5)), np.floor(y - F(0.5))
@@ -278,7 +278,7 @@ def _table(geometry: SceneGeometry, attribute: str, objects: Sequence[int], widt
 
 
 def _channels(count: int, texture: Texture, width: int, where: str) -> tuple[int, ...]:
-    """Those of an image's channels that a colour or number is read from; grey is three equal channels."""
+    """The channels of an image that a colour or number is read from; grey is three equal channels."""
     if width == 3:
         return (0, 1, 2) if count >= 3 else (0, 0, 0)
     number = "rgba".index(texture.channel)
@@ -388,7 +388,7 @@ def texel_positions(
     material : (M,) int32
         Material number of each hit.
     varying : sequence of Varying
-        What the materials' parameters vary by.
+        The textures and vertex values of the materials.
     """
     out = np.zeros((len(material), 2), F, order="F")
     for number in range(max((len(each.of_material) for each in varying), default=0)):

@@ -49,7 +49,7 @@ class Inputs(Value):
         return self._array(key, ()).reshape(1)
 
     def color(self, key: str) -> tuple[float, float, float]:
-        """Three numbers; one number stands for three equal ones."""
+        """Three numbers; a single number is repeated."""
         value = np.broadcast_to(self._array(key, (), (3,)), 3)
         return float(value[0]), float(value[1]), float(value[2])
 

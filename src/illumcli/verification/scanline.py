@@ -1,7 +1,7 @@
 """Evaluators of interpolated shading.
 
 The scanline forms of the texts, edges first and then the span, live here: the renderer interpolates over
-triangles, which agrees with them except on four-sided polygons and where edges are made unit first.
+triangles, which agrees with them except on four-sided polygons and where edges are normalized first.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ def read_about(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError, KeyError, TypeError
-        A file of others.
+        The file was not written by `write_glb` or `add_to_glb`.
     """
     return dict(open_document(path).json["asset"]["extras"]["illum"])
 

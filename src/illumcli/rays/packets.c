@@ -178,13 +178,15 @@ INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
 
 /* Directions of `count` consecutive rays of a point into lanes of a packet; each product and sum is rounded. */
 INLINE void turn(const Patterns *of, int64_t point, int64_t ray, int64_t count, int64_t width, Cell *lanes) {
-  const float *x = of->patterns + of->row[point] * 3 * of->samples + ray;
-  const float *y = x + of->samples, *z = y + of->samples, *frame = of->frames + 9 * point;
-  for (int k = 0; k < 3; k++) {
-    float *__restrict d = &lanes[(DIR_X + k) * width].real;
-    float tangent = frame[k], bitangent = frame[3 + k], normal = frame[6 + k];
-    for (int64_t j = 0; j < count; j++)
-      d[j] = tangent * x[j] + bitangent * y[j] + normal * z[j];
+  const float *__restrict x = of->patterns + of->row[point] * 3 * of->samples + ray;
+  const float *__restrict y = x + of->samples, *__restrict z = y + of->samples;
+  const float *t = of->frames + 9 * point, *b = t + 3, *n = t + 6;
+  float t_x = t[0], t_y = t[1], t_z = t[2], b_x = b[0], b_y = b[1], b_z = b[2], n_x = n[0], n_y = n[1], n_z = n[2];
+  float *__restrict d_x = &lanes[DIR_X * width].real, *__restrict d_y = d_x + width, *__restrict d_z = d_y + width;
+  for (int64_t j = 0; j < count; j++) {
+    d_x[j] = t_x * x[j] + b_x * y[j] + n_x * z[j];
+    d_y[j] = t_y * x[j] + b_y * y[j] + n_y * z[j];
+    d_z[j] = t_z * x[j] + b_z * y[j] + n_z * z[j];
   }
 }
 

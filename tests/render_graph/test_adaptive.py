@@ -13,11 +13,12 @@ from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
-from illumcli.errors import InputError
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
-from illumcli.render_graph.schedule import outputs_of, shared_keys
+from illumcli.render_graph.explain import expected_rays
+from illumcli.render_graph.replicates import LUMINANCE
+from illumcli.render_graph.schedule import outputs_of, reached, shared_keys
 from illumcli.scene.load import load
 from planned import planned
 
@@ -236,9 +237,45 @@ def test_a_wide_filter_is_refined_as_far_from_edges(tmp_path):
     assert own["beauty"].tobytes() == many["beauty"].tobytes()
 
 
-def test_the_error_of_a_fixed_count_is_refused(scene):
-    with pytest.raises(InputError, match=r"leave it out, or film\.adaptive"):
-        rendered(scene, ["error"])
+def shown(layers):
+    """(H, W) luminance."""
+    return layers["beauty"].astype(float) @ LUMINANCE
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [(), ("ambient=0",), ("film.adaptive={difference: 1}", "ambient=0")],
+    ids=["rays and edges", "edges", "much that is missed"],
+)
+def test_the_error_is_that_of_adaptive_pixels(scene, overrides):
+    """Against pictures of all samples: (F - C) (F - D) is on average the square error of F, noise and bias."""
+    full = (*overrides, "film.adaptive=false", "film.samples=48")
+    others = [shown(rendered(scene, ["beauty"], overrides=(*full, f"seed={k}"))[0]) for k in (1, 2, 3, 4)]
+    c, d = others[0] + others[1], others[2] + others[3]
+    true, stated = [], []
+    for seed in range(20, 26):
+        made, _ = rendered(scene, ["beauty", "error"], overrides=(*overrides, f"seed={seed}"))
+        true.append(((shown(made) - c / 2) * (shown(made) - d / 2)).mean())
+        stated.append(np.square(made["error"], dtype=float).mean())
+    ratio = np.sqrt(np.mean(stated) / np.mean(true))
+    # half the squared difference to a replicate has but half of the bias
+    assert 0.71 < ratio < 1.2 if "difference" in "".join(overrides) else 0.85 < ratio < 1.15
+
+
+def test_the_error_changes_no_other_layer_and_comes_alone(scene, whole):
+    with_error, stats = rendered(scene, [*ALL, "error"], side=16)
+    for name, values in whole[0].items():
+        assert values.tobytes() == with_error[name].tobytes(), name
+    alone, _ = rendered(scene, ["error"], threads=2)
+    assert alone.keys() == {"error"}
+    assert alone["error"].tobytes() == with_error["error"].tobytes()
+    replicated = 30 * 22 * 12
+    assert stats.rays["replicate.hits"] == pytest.approx(replicated, rel=0.5)
+    loaded = load(scene)
+    plan = planned(loaded, ("error",))
+    expected = expected_rays(loaded.scene, [plan.view], plan.computed)
+    assert expected["replicate.primary"] == replicated
+    assert {"replicate.samples", "replicate.luminance"} <= {*reached(plan.graph, plan.outputs)}
 
 
 def test_the_job_reports_it_and_keeps_its_bytes_in_a_cache(scene, tmp_path, monkeypatch):

@@ -26,6 +26,7 @@ from illumcli.rays.embree import Interrupted
 from illumcli.records import Record, Value
 from illumcli.render_graph.build import READ, SURROUNDINGS
 from illumcli.render_graph.build_adaptive import decision
+from illumcli.render_graph.replicates import REPLICATED, pixel_luminance, standard_error
 from illumcli.render_graph.schedule import Plan, without_cached_tiles
 from illumcli.visibility.object_pixels import ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
@@ -451,10 +452,24 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
 
     count = int(np.count_nonzero(wanted))
     stats.add({}, {}, {"samples": (wanted.size - count) * (all_samples.view.samples - 1)}, count)
+    if plan.replicates is not None:
+        layers["error"] = _error(common, plan.replicates, tile, layers)
+        if FIXED["beauty"] not in plan.outputs:  # it was computed for its error alone
+            layers = {layer.name: layers[layer.name] for layer in plan.outputs}
     start = time.perf_counter()
     developed = common.develop(tile, layers)
     stats.add({"film": time.perf_counter() - start}, {})
     return developed, started.kept
+
+
+def _error(common: _Common, plan: Plan, tile: Tile, layers: Planes) -> NDArray[np.float32]:
+    """The layer `error` of a tile, from replicates with all samples, which see what one sample misses."""
+    buffers, _ = _buffers(common, plan, tile)
+    samples, second = (buffers[name] for name in REPLICATED)
+    background = plan.graph.scene.film.background or (0.0, 0.0, 0.0)
+    first = pixel_luminance(background, layers["beauty"], layers["alpha"])
+    error = standard_error(plan.view, tile, samples, first, second)
+    return error.reshape(tile.height, tile.width, 1)
 
 
 def _lacking(buffers: Buffers, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -505,7 +520,7 @@ def _pixels(plan: Plan, buffers: Buffers, tile: Tile) -> Planes:
     sample = buffers["hits"].sample
     pixels = tile.width * tile.height
     out = {}
-    for layer in plan.outputs:
+    for layer in plan.sampled:
         values = buffers[layer.buffer]
         if layer.per_pixel:
             by_pixel = values

@@ -24,6 +24,8 @@ from illumcli.rays.interaction import Hits
 
 REPLICATE = "replicate."
 """Prefix of the names of all buffers of the replicates."""
+REPLICATED = (f"{REPLICATE}samples", f"{REPLICATE}luminance")
+"""The buffers of the replicates that the error reads."""
 CELL = 2
 """Side of a cell, of which one pixel is replicated [pixels]."""
 BLOCK = 8
@@ -71,7 +73,7 @@ def error_nodes(
         copies.append(Node(f"{REPLICATE}{node.output}", function, inputs))
 
     # The error compares both luminances.
-    second = {"replicated": f"{REPLICATE}samples", "second": f"{REPLICATE}luminance"}
+    second = dict(zip(("replicated", "second"), REPLICATED, strict=True))
     copies.append(Node.of(standard_error, "error", first="luminance", **second))
     return {node.output: node for node in copies}
 
@@ -159,6 +161,14 @@ def standard_error(
     column, row = tile.pixels()
     block_of_pixel = (row - tile.y) // BLOCK * across + (column - tile.x) // BLOCK
     return np.sqrt(variance).astype(F)[block_of_pixel]
+
+
+def pixel_luminance(
+    background: tuple[float, float, float], beauty: NDArray[np.float32], alpha: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """(P,) the same of finished pixels, (h, w, 3) and (h, w, 1)."""
+    weights = np.array(LUMINANCE)
+    return np.asarray(beauty @ weights - alpha[..., 0] * (weights @ background)).ravel()
 
 
 def luminance(

@@ -17,7 +17,7 @@ from illumcli.render_graph.build_adaptive import decision
 from illumcli.render_graph.cached import Lookup
 from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.needs import layers, reconstructs, views
-from illumcli.render_graph.replicates import BLOCK
+from illumcli.render_graph.replicates import BLOCK, REPLICATED
 from illumcli.scene.spec import Scene
 
 REPAIRS = ("repairs", "undirected", "unnamed")
@@ -44,11 +44,19 @@ class Plan(Value):
     """How many of the steps of a tile decide which pixels of an adaptive picture need all samples."""
     all_samples: Plan | None = None
     """The nodes that run for those pixels."""
+    replicates: Plan | None = None
+    """The nodes that run for the replicates of an adaptive picture whose error is asked for."""
 
     @property
     def buffers(self) -> set[str]:
         """The names of all buffers that are computed or loaded."""
-        return {node.output for node in (*self.once, *self.tile)}
+        replicates = self.replicates.tile if self.replicates else ()
+        return {node.output for node in (*self.once, *self.tile, *replicates)}
+
+    @property
+    def sampled(self) -> tuple[Layer, ...]:
+        """The layers that are made of samples."""
+        return sampled_outputs(self.outputs) if self.view.adaptive else self.outputs
 
     @property
     def computed(self) -> set[str]:
@@ -57,9 +65,9 @@ class Plan(Value):
 
     def last_use(self) -> dict[str, int]:
         """Number of the last tile node that reads each buffer of a tile; the film's buffers have none."""
-        kept = {layer.buffer for layer in self.outputs} | COVERAGE
+        kept = {layer.buffer for layer in self.sampled} | COVERAGE | {*REPLICATED}
         if self.all_samples:
-            kept |= {"obscurance", *(decision(layer) for layer in self.outputs)}
+            kept |= {"obscurance", *(decision(layer) for layer in self.sampled)}
         of_tile = {node.output for node in self.tile}
         last: dict[str, int] = {}
         for number, node in enumerate(self.tile):
@@ -104,10 +112,6 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
             "the layer error is that of samples which are not reconstructed; leave it out, or "
             "obscurance.reconstruct"
         )
-    if any(layer.per_pixel for layer in outputs) and any(view.adaptive for view in views(scene)):
-        raise InputError(
-            "the layer error is that of a fixed number of samples; leave it out, or film.adaptive"
-        )
     return outputs
 
 
@@ -115,6 +119,7 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
     """The buffers that the film reads to reconstruct layers of some views."""
     buffers: dict[str, None] = {}
     if any(view.adaptive for view in shown):
+        outputs = sampled_outputs(outputs)
         buffers |= dict.fromkeys(decisions(outputs))
     buffers |= dict.fromkeys(layer.buffer for layer in outputs)
     if any(layer.buffer == "beauty" for layer in outputs):
@@ -123,6 +128,13 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
         buffers["samples"] = None
     repairs = (name for name in REPAIRS if name in graph.nodes)
     return [*(buffers | dict.fromkeys(["hits", "render_space", *repairs]))]
+
+
+def sampled_outputs(outputs: Sequence[Layer]) -> tuple[Layer, ...]:
+    """The layers that an adaptive picture makes of samples; the error is made of the beauty's pixels."""
+    sampled = [layer for layer in outputs if not layer.per_pixel]
+    needs_beauty = len(sampled) < len(outputs) and FIXED["beauty"] not in sampled
+    return (*sampled, *([FIXED["beauty"]] if needs_beauty else []))
 
 
 def decisions(outputs: Sequence[Layer]) -> list[str]:
@@ -135,6 +147,8 @@ def decisions(outputs: Sequence[Layer]) -> list[str]:
 def reached(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
     """The buffers that layers of all views need, in the order in which they are computed."""
     needed = needed_buffers(graph, outputs, graph.views)
+    if any(layer.per_pixel for layer in outputs) and REPLICATED[0] in graph.nodes:
+        needed += REPLICATED
     return [node.output for node in graph.topological_order(needed)]
 
 
@@ -162,24 +176,36 @@ def schedule(
         return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
 
     # An adaptive picture: first what decides, at the centres of pixels.
-    means = [layer for layer in outputs if not layer.data]
+    own = sampled_outputs(outputs)
+    means = [layer for layer in own if not layer.data]
     if means and all_samples is None:
         all_samples = schedule(graph, means, view.all_samples())
-    if all_samples is not None:
-        known = {node.output for node in once}
-        once += [node for node in all_samples.once if node.output not in known]
-    decided_by = len(_split(graph.topological_order(decisions(outputs)))[1])
-    own, centres = tuple(outputs), view.centres()
-    return Plan(graph, own, centres, tuple(once), tuple(tile), lookup, 0, decided_by, all_samples)
+    decided_by = len(_split(graph.topological_order(decisions(own)))[1])
+
+    # The error compares finished pixels with replicates, which have all samples.
+    replicates = None
+    if any(layer.per_pixel for layer in outputs):
+        first, rest = _split(without_tile_loaders(graph).topological_order(REPLICATED))
+        replicates = Plan(graph, (), view.all_samples(), tuple(first), tuple(rest))
+    known = {node.output for node in once}
+    for other in (all_samples, replicates):
+        once += [node for node in (other.once if other else ()) if node.output not in known]
+        known |= {node.output for node in once}
+    plan = Plan(graph, tuple(outputs), view.centres(), tuple(once), tuple(tile), lookup, 0, decided_by)
+    return replace(plan, all_samples=all_samples, replicates=replicates)
+
+
+def without_tile_loaders(graph: Graph) -> Graph:
+    """The graph in which buffers of tiles are computed."""
+    return replace(graph, loaders={name: node for name, node in graph.loaders.items() if not node.inputs})
 
 
 def without_cached_tiles(plan: Plan) -> tuple[Plan, Plan]:
     """Plans of an adaptive picture that load no buffer of a tile: for one sample of pixels, and for all."""
     others = plan.all_samples
     assert others is not None
-    loaders = {**plan.graph.loaders, **others.graph.loaders}
-    graph = replace(plan.graph, loaders={name: node for name, node in loaders.items() if not node.inputs})
-    centres = schedule(graph, plan.outputs, replace(plan.view, adaptive=None))
+    graph = without_tile_loaders(replace(plan.graph, loaders={**plan.graph.loaders, **others.graph.loaders}))
+    centres = schedule(graph, plan.sampled, replace(plan.view, adaptive=None))
     return centres, schedule(graph, others.outputs, others.view) if others.lookup.pixels else others
 
 

@@ -248,7 +248,7 @@ def shown(layers):
     ids=["rays and edges", "edges", "much that is missed"],
 )
 def test_the_error_is_that_of_adaptive_pixels(scene, overrides):
-    """Against pictures of all samples: (F - C) (F - D) is on average the square error of F, noise and bias."""
+    """Against pictures of all samples: (F - C) (F - D) is on average the squared error of F, bias too."""
     full = (*overrides, "film.adaptive=false", "film.samples=48")
     others = [shown(rendered(scene, ["beauty"], overrides=(*full, f"seed={k}"))[0]) for k in (1, 2, 3, 4)]
     c, d = others[0] + others[1], others[2] + others[3]

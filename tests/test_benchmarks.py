@@ -81,3 +81,10 @@ def test_pictures_with_baked_values_agree_with_those_without(root, tmp_path, tor
     assert float(row[1]) >= 0.7  # of 20
     assert float(row[2]) < 1.8
     assert float(row[4]) < 0.05
+
+
+def test_the_error_of_reconstructed_values_is_stated(root, tmp_path, torus):
+    options = ["--seeds", "2", "--reference", "256", "--rays", "16"]
+    row = printed(root, tmp_path, "ao_reconstruction", str(torus), *options).splitlines()[-1].split()
+    assert row[0] == "16"
+    assert 0.7 < float(row[3]) < 1.4

@@ -123,6 +123,39 @@ def test_a_target_error_is_reached_without_bias(tmp_path):
     assert abs(off.mean()) < 3 * off.std() / len(off) ** 0.5
 
 
+def test_reconstructed_values_err_less_and_state_it(tmp_path):
+    path = wavy(tmp_path, 64)
+    bake(path, tmp_path / "truth.npz", samples=8192, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    stated, error, covered = [], [], []
+    for seed in range(4):
+        _, raw = bake(path, tmp_path / f"raw{seed}.npz", samples=16, seed=seed)
+        _, report = bake(path, tmp_path / f"{seed}.npz", samples=16, seed=seed, reconstruct=True)
+        found = read_npz(tmp_path / f"{seed}.npz")
+        off = found.obscurance - truth
+        cast = found.standard_error > 0
+        stated.append(report.rmse)
+        error.append(np.sqrt(np.mean(off**2)))
+        covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
+        assert report.rmse < raw.rmse / 2
+        assert report.reconstruction is not None
+    assert 0.9 < np.mean(np.array(stated) / error) < 1.1
+    assert 0.92 < np.mean(covered) < 0.98
+    assert np.mean(np.array(error)) < 0.02
+
+
+def test_a_target_error_is_reached_by_reconstruction(tmp_path):
+    path = wavy(tmp_path, 64)
+    bake(path, tmp_path / "truth.npz", samples=8192, seed=99)
+    truth = read_npz(tmp_path / "truth.npz").obscurance
+    _, raw = bake(path, tmp_path / "raw.npz", target_error=0.01)
+    _, report = bake(path, tmp_path / "out.npz", target_error=0.01, reconstruct=True)
+    off = read_npz(tmp_path / "out.npz").obscurance - truth
+    assert report.rmse <= 0.01
+    assert 0.004 < np.sqrt(np.mean(off**2)) < 0.0115
+    assert sum(report.rays.values()) < sum(raw.rays.values())
+
+
 def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
     path = wavy(tmp_path)
     bake(path, tmp_path / "out.ply", channel="g")
@@ -329,10 +362,13 @@ def test_smooth_falloffs_see_distance(text_mesh, tmp_path):
     assert bent[2, 2] < -0.1  # away from the wall
 
 
-def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "settings", [BakeSettings(), BakeSettings(reconstruct=True)], ids=["raw", "reconstructed"]
+)
+def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch, settings):
     path, out = wavy(tmp_path), tmp_path / "out.npz"
     monkeypatch.setattr("illumcli.baking.sampling.UNIT_RAYS", 1 << 12)
-    bake_mesh(path, [tmp_path / "one.npz"], BakeSettings(), BakeOptions(threads=1))
+    bake_mesh(path, [tmp_path / "one.npz"], settings, BakeOptions(threads=1))
     cast, rays, two = BakeSampler._run, [], BakeOptions(threads=2)
 
     def breaks(self, what, pieces, ask):
@@ -344,12 +380,12 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch):
 
     monkeypatch.setattr(BakeSampler, "_run", breaks)
     with pytest.raises(KeyboardInterrupt):
-        bake_mesh(path, [out], BakeSettings(), two)
+        bake_mesh(path, [out], settings, two)
     assert not out.exists()
     assert len(list(tmp_path.glob(".*.unfinished"))) == len(list(tmp_path.glob(".*"))) == 1
     monkeypatch.setattr(BakeSampler, "_run", cast)
-    _, report = bake_mesh(path, [out], BakeSettings(), two)
-    _, whole = bake_mesh(path, [tmp_path / "two.npz"], BakeSettings(), two)
+    _, report = bake_mesh(path, [out], settings, two)
+    _, whole = bake_mesh(path, [tmp_path / "two.npz"], settings, two)
     assert (report.resumed, whole.resumed) == (11 * (1 << 12), 0)
     assert report.rays == whole.rays
     assert out.read_bytes() == (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
@@ -395,6 +431,28 @@ def test_the_command_prints_files_and_writes_a_report(text_mesh, tmp_path):
     assert said["unreferenced"] == 1
     about = read_npz(out).about
     assert about["parameters"]["falloff"] == {"falloff": "step", "max_distance": "0.5r"}
+
+
+@pytest.mark.parametrize(
+    ("options", "is_reconstructed"),
+    [
+        (["--target-error", "0.05"], True),
+        (["--target-error", "0.05", "--no-reconstruct"], False),
+        (["--samples", "16"], False),
+        (["--samples", "16", "--reconstruct"], True),
+    ],
+)
+def test_the_command_reconstructs_where_a_target_or_the_user_asks(
+    text_mesh, tmp_path, options, is_reconstructed
+):
+    out, report = tmp_path / "out.npz", tmp_path / "report.json"
+    arguments = ["ao-bake", str(text_mesh(STEP)), "-o", str(out), "--report", str(report), *options]
+    done = CliRunner().invoke(illum, arguments)
+    assert done.exit_code == 0
+    assert ("audited" in done.stderr) == is_reconstructed
+    for data in (json.loads(report.read_text()), read_npz(out).about):
+        assert (data["reconstruction"] is not None) == is_reconstructed
+    assert read_npz(out).about["parameters"]["reconstruct"] == is_reconstructed
 
 
 # A floor and a wall that share the edge x = 0, smooth over it: the normal there leans by 45 degrees.

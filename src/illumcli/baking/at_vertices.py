@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from illumcli.arrays import F
-from illumcli.baking.context import BakeContext, PointValues, SampleStatistics
+from illumcli.baking.context import BakeContext, PointValues, SampledValues, SampleStatistics
+from illumcli.baking.reconstructed import reconstructed_values
 from illumcli.baking.sampling import BakeSampler, ChosenSamples, RayCounts
 from illumcli.baking.vertex_points import vertex_points
 
@@ -26,10 +28,35 @@ def sampled_at_vertices(context: BakeContext) -> PointValues:
     # open points need no rays
     is_open = sampler.open_points()
     closed = np.flatnonzero(~is_open)
-    share = len(closed) / max(len(is_open), 1)
     clock.lap("horizon")
 
-    # how many rays each of the others casts
+    # values of the others
+    sampled = (reconstructed_values if settings.reconstruct else raw_values)(context, sampler, closed)
+    w, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
+    w[closed], error[closed] = sampled.w, sampled.error
+    bent = None
+    if sampled.bent is not None:
+        bent = points.n.copy()
+        bent[closed] = sampled.bent
+    count, number = np.unique(sampled.samples, return_counts=True)
+    statistics = SampleStatistics(
+        int(is_open.sum()),
+        len(closed),
+        sampled.rmse,
+        {purpose: cast for purpose, cast in sampled.rays.items() if cast},
+        sampled.resumed,
+        dict(zip(count.tolist(), number.tolist(), strict=True)),
+        sampled.reconstruction,
+    )
+    return PointValues(vertices, w, error, bent, statistics)
+
+
+def raw_values(context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64]) -> SampledValues:
+    """Values of the points that are not open, each from its own rays alone."""
+    settings, clock = context.settings, context.clock
+    share = len(closed) / max(len(sampler.points.key), 1)
+
+    # how many rays each of them casts
     if settings.target_error is None:
         chosen = ChosenSamples(np.full(len(closed), settings.samples), 0, 0)
     else:
@@ -42,27 +69,14 @@ def sampled_at_vertices(context: BakeContext) -> PointValues:
     clock.lap("cast")
     errors = sampler.errors(counts, FINAL_PAIRS)
     clock.lap("errors")
-
-    # values of all points
     values = estimates.values
-    w, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
-    w[closed], error[closed] = values.w, errors.law.at(values.neighbor_variation, counts.samples)
-    bent = None
-    if values.bent is not None:
-        bent = points.n.copy()
-        bent[closed] = values.bent
-    rays = {
-        "pilot": chosen.pilot_rays,
-        "values": estimates.rays,
-        "errors": chosen.error_rays + errors.rays,
-    }
-    count, number = np.unique(counts.samples, return_counts=True)
-    statistics = SampleStatistics(
-        int(is_open.sum()),
-        len(closed),
+    rays = {"pilot": chosen.pilot_rays, "values": estimates.rays, "errors": chosen.error_rays + errors.rays}
+    return SampledValues(
+        values.w,
+        errors.law.at(values.neighbor_variation, counts.samples),
+        values.bent,
         errors.law.rmse * share**0.5,
-        {purpose: cast for purpose, cast in rays.items() if cast},
+        counts.samples,
+        rays,
         estimates.resumed,
-        dict(zip(count.tolist(), number.tolist(), strict=True)),
     )
-    return PointValues(vertices, w, error, bent, statistics)

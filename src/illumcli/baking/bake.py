@@ -109,6 +109,7 @@ def description(work: BakeWork, statistics: SampleStatistics) -> dict[str, Any]:
         "seed": work.settings.seed,
         "rmse": statistics.rmse,
         "rays": sum(statistics.rays.values()),
+        "reconstruction": statistics.reconstruction,
     }
 
 
@@ -167,6 +168,7 @@ def bake_report(
         ray_loop=ray_loop_name() if any(statistics.rays.values()) else None,
         resumed=statistics.resumed,
         samples=statistics.samples,
+        reconstruction=statistics.reconstruction,
         repairs=work.repairs,
         left_out=list(left_out),
         warnings=warnings,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from illumcli.visibility.obscurance import Method
 
 
 class StageClock:
-    """Seconds of one stage after the other."""
+    """Seconds of one stage after the other; a stage that comes again is added to."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -30,7 +31,7 @@ class StageClock:
     def lap(self, stage: str) -> None:
         """Say that a stage is over."""
         now = time.perf_counter()
-        self.seconds[stage] = now - self._last
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
         self._last = now
 
 
@@ -56,6 +57,20 @@ class SampleStatistics(Record):
     rays: Mapping[str, int] = field(default_factory=dict)  # purpose -> rays
     resumed: int = 0  # of these, rays that an earlier run cast
     samples: Mapping[int, int] = field(default_factory=dict)  # rays per point -> points
+    reconstruction: Mapping[str, Any] | None = None  # how values were reconstructed, and their audit
+
+
+class SampledValues(Record):
+    """Values of K points that are not open, and what they took."""
+
+    w: NDArray[np.float32]  # (K,)
+    error: NDArray[np.float32]  # (K,) standard error
+    bent: Vectors | None  # (K, 3) float32
+    rmse: float  # root mean square error over all points, the open ones among them
+    samples: NDArray[np.int64]  # (K,) rays of each
+    rays: Mapping[str, int]  # purpose -> rays
+    resumed: int  # of these, rays that an earlier run cast
+    reconstruction: Mapping[str, Any] | None = None
 
 
 class PointValues(Record):

@@ -32,6 +32,7 @@ class BakeReport(Record):
     ray_loop: str | None  # how rays were traced, if any were
     resumed: int  # of these, rays that an earlier run cast
     samples: Mapping[int, int]  # rays per point -> points
+    reconstruction: Mapping[str, Any] | None  # windows, and the audit of `rmse`
     repairs: Repairs
     left_out: list[str]
     warnings: list[str]
@@ -47,7 +48,11 @@ class BakeReport(Record):
     def summary(self) -> str:
         """One line: the error of the values, and what they took."""
         rays = sum(self.rays.values())
+        how = "root mean square"
+        if self.reconstruction is not None:
+            low, high = self.reconstruction["audit"]["interval"]
+            how += f", audited: {low:.2g} to {high:.2g}"
         return (
-            f"{self.vertices} vertices: error {self.rmse:.2g} (root mean square), {rays} rays, "
+            f"{self.vertices} vertices: error {self.rmse:.2g} ({how}), {rays} rays, "
             f"{self.open} points open without a ray"
         )

@@ -219,7 +219,7 @@ class BakeSampler(Record):
 
         # where the error is
         pilot = self.estimate("pilot", RayCounts(points, np.full(len(points), PILOT_SAMPLES)), 1)
-        near = _averaged_along(self.order, points, pilot.values.neighbor_variation, len(self.points.key))
+        near = averaged_along(self.order, points, pilot.values.neighbor_variation, len(self.points.key))
         weight = (1 + near) ** 0.4
         aim = AIM * target / np.sqrt(share)
         scale = float((np.mean(weight) * 0.1 * PILOT_SAMPLES**-0.5 / aim**2) ** (2 / 3))
@@ -227,7 +227,7 @@ class BakeSampler(Record):
         # scale the counts until the measured error is in a narrow band below the aim
         first, rays = 2, 0
         for _ in range(MAX_ROUNDS):
-            samples = _rounded(weight * scale)
+            samples = rounded_samples(weight * scale)
             measured = self.errors(RayCounts(points, samples), first)
             reached, rays = measured.law.rmse, rays + measured.rays
             first += 2 * MIN_PAIRS
@@ -256,7 +256,7 @@ class BakeSampler(Record):
         return run_units(purpose, units, compute, self.threads, self.progress)
 
 
-def _averaged_along(
+def averaged_along(
     order: NDArray[np.int64], points: NDArray[np.int64], values: NDArray[np.float32], count: int
 ) -> NDArray[np.float64]:
     """(K,) mean of the values over each point and its four neighbours to either side along the order."""
@@ -270,7 +270,7 @@ def _averaged_along(
     return out[points]
 
 
-def _rounded(samples: NDArray[np.float64]) -> NDArray[np.int64]:
+def rounded_samples(samples: NDArray[np.float64]) -> NDArray[np.int64]:
     """Numbers of rays in steps of a quarter octave: few different point sets, large units of work."""
     bounded = np.clip(samples, MIN_SAMPLES, MAX_SAMPLES)
     steps = np.rint(2 ** (np.rint(4 * np.log2(bounded)) / 4))

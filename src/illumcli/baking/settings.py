@@ -15,6 +15,7 @@ class BakeSettings(Value):
 
     samples: int = 256  # rays per vertex
     target_error: float | None = None  # root mean square over all vertices, instead of `samples`
+    reconstruct: bool = False  # values of few rays from those around, with an audited error
     falloff: Mapping[str, Any] = field(default_factory=lambda: {"falloff": "step"})  # as scenes have it
     sampler: str = "spiral"
     faces: str = "count"  # back faces: occlude (`count`), are transparent (`ignore`), end rays (`one_sided`)

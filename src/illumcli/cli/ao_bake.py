@@ -61,6 +61,8 @@ def _settings(options: dict[str, Any]) -> BakeSettings:
     _refuse_contradictions(options)
     falloff = {name: options.pop(name) for name in ("falloff", "max_distance", "tau", "exponent")}
     options["samples"] = options["samples"] or 256
+    if options["reconstruct"] is None:
+        options["reconstruct"] = options["target_error"] is not None
     options["falloff"] = {name: value for name, value in falloff.items() if value is not None}
     options["faces"] = options["faces"].replace("-", "_")
     options["occluders"] = options["occluders"] or ("scene",)
@@ -73,6 +75,8 @@ def _refuse_contradictions(options: dict[str, Any]) -> None:
     _refuse_foreign_parameters(options)
     if options["target_error"] is not None and options["method"] == "fit":
         raise click.UsageError("--target-error works with --method vertex; give --samples")
+    if options["reconstruct"] and options["method"] == "fit":
+        raise click.UsageError("--reconstruct works with --method vertex")
 
 
 def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
@@ -116,6 +120,12 @@ def _options(options: dict[str, Any]) -> BakeOptions:
     type=click.FloatRange(0, 1, min_open=True),
     metavar="E",
     help="Stop when the root mean square error of all vertices is at most E, instead of --samples.",
+)
+@click.option(
+    "--reconstruct/--no-reconstruct",
+    default=None,
+    help="Smooth noise with the values around where that lowers the error, which is measured with other "
+    "rays. By default with --target-error alone.",
 )
 @click.option("--max-distance", type=_Distance(), help="Occluders beyond it do not count: 0.2, or 0.5r.")
 @click.option(

@@ -52,7 +52,7 @@ class Errors(Value):
         variance = np.square(a.w.astype(np.float64) - b.w) / 2
         scaled = np.tile(variance * np.square(samples, dtype=np.float64), 2)
         x = np.concatenate([a.neighbor_variation, b.neighbor_variation]).astype(np.float64)
-        floor, slope = _line(x, scaled, 1 / np.square(1 + x))
+        floor, slope = line(x, scaled, 1 / np.square(1 + x))
 
         # If no ray of any pair was blocked, the floor is still not known to be lower than this.
         least = (NO_HIT_QUANTILE / (2 * len(a.w))) ** 2
@@ -64,7 +64,7 @@ class Errors(Value):
         return (np.sqrt(scaled) / samples).astype(F)
 
 
-def _line(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
+def line(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
     """a and b of the weighted least-squares line y = a + b x, both at least 0."""
     s, sx, sy, sxx, sxy = (float(np.sum(weight * v)) for v in (np.ones_like(x), x, y, x * x, x * y))
     determinant = s * sxx - sx * sx

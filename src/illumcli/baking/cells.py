@@ -1,0 +1,163 @@
+"""Cells of up to eight points of one object that lie together and whose normals agree, and cells near each.
+
+Points along a compact order are cut into groups of eight, and a group whose normals disagree (both sides of a
+thin sheet, a hard edge) into cells of its own. Cells replace points where neighbours are searched: there are
+eight times fewer of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import Floats, Ids, Vectors
+from illumcli.geometry.spatial_order import compact
+from illumcli.records import Record
+
+SIZE = 8
+"""Points of a cell, at most: those of the smallest boxes of a compact order."""
+SAME_CELL = 0.7
+"""Least cosine between the normals of a cell's points and its first point's."""
+AGREE = 0.5
+"""Least cosine between the mean normals of cells that are near each other."""
+GROUP, GROUPS_NEAR = 16, 16
+"""Boxes of one group, and groups near each in which its nearest boxes are searched."""
+BRUTE = 1 << 11
+"""Boxes that are compared each with each."""
+ROWS = 32
+"""Groups at a time: their distances stay in a core's own cache."""
+APART = 8.0
+"""Distance between objects along a fourth axis [radii]: more than any within an object."""
+
+
+class Cells(Record):
+    """C cells over M points."""
+
+    points: NDArray[np.int64]  # (C, 8) points of each cell; its first again where it has fewer
+    filled: NDArray[np.bool_]  # (C, 8) False where it has fewer
+    near: NDArray[np.int64]  # (C, K) nearest cells that agree, itself first; C where there are fewer
+
+
+def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int) -> Cells:
+    """Cells over points at (M, 3) positions with (M, 3) unit normals, and the `near` nearest of each."""
+    # groups of eight along the order, one object after the other
+    order = compact(position)
+    order = order[np.argsort(objects[order], kind="stable")]
+    group = np.arange(len(order)) // SIZE
+    normal, owner = n[order].astype(np.float64), objects[order]
+
+    # cells are called after their first point: the first of each group, then of what disagrees with it
+    first = np.empty(len(order), np.int64)
+    rest = np.arange(len(order))
+    while rest.size:
+        begins = np.flatnonzero(np.diff(group[rest], prepend=-1))
+        seed = np.repeat(rest[begins], np.diff(np.append(begins, len(rest))))
+        agrees = (_dot(normal[rest], normal[seed]) >= SAME_CELL) & (owner[rest] == owner[seed])
+        joins = agrees | (rest == seed)
+        first[rest[joins]] = seed[joins]
+        rest = rest[~joins]
+
+    # their points
+    by_cell = np.argsort(first, kind="stable")
+    begins = np.flatnonzero(np.diff(first[by_cell], prepend=-1))
+    count = np.diff(np.append(begins, len(order)))
+    slot = np.arange(SIZE)
+    filled = slot < count[:, None]
+    points = order[by_cell[np.where(filled, begins[:, None] + slot, begins[:, None])]]
+
+    # the nearest, by the centres of cells
+    share = filled / count[:, None]
+    centre = np.stack([(share * axis[points]).sum(axis=1) for axis in position.T.astype(np.float64)], axis=1)
+    mean = np.stack([(share * axis[points]).sum(axis=1) for axis in n.T.astype(np.float64)], axis=1)
+    mean /= np.maximum(np.sqrt(_dot(mean, mean)), 1e-30)[:, None]
+    placed = np.concatenate([centre, APART * objects[points[:, :1]]], axis=1)
+    return Cells(points, filled, nearest(placed, mean, near))
+
+
+def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """(C, count) the nearest cells whose normals agree, each cell itself first; C where there are fewer.
+
+    Cells are searched in the groups whose boxes are nearest to that of their own group; `centre` is (C, 4) in
+    the order of the cells.
+    """
+    cells = len(centre)
+    if not cells:
+        return np.zeros((0, count), np.int64)
+    member = _members(np.arange(-(-cells // GROUP)), cells)
+    groups = nearest_boxes(centre[member].min(axis=1), centre[member].max(axis=1), GROUPS_NEAR)
+    out = np.full((len(member) * GROUP, count), cells)
+    for begin in range(0, len(member), ROWS):
+        own = member[begin : begin + ROWS]
+        near = groups[begin : begin + ROWS]
+        other = np.where(near[:, :, None] < 0, -1, near[:, :, None] * GROUP + np.arange(GROUP))
+        other = other.reshape(len(own), -1)
+        is_cell = (other >= 0) & (other < cells)
+        other = np.where(is_cell, other, 0)
+
+        # squared distances, infinite to cells of other objects and to those that disagree
+        square = np.zeros((*own.shape, other.shape[1]))
+        cosine = np.zeros_like(square)
+        for axis in centre.T:
+            square += np.square(axis[own][:, :, None] - axis[other][:, None])
+        for axis in normal.T:
+            cosine += axis[own][:, :, None] * axis[other][:, None]
+        square[(cosine < AGREE) | (square > (APART / 2) ** 2) | ~is_cell[:, None]] = np.inf
+        square[own[:, :, None] == np.where(is_cell, other, -1)[:, None]] = -1
+        square = square.reshape(-1, square.shape[2])
+        place, distance = _least(square, count)
+        found = np.take_along_axis(np.repeat(other, GROUP, axis=0), place, axis=1)
+        rows = slice(begin * GROUP, begin * GROUP + len(found))
+        out[rows, : found.shape[1]] = np.where(np.isfinite(distance), found, cells)
+    return out[:cells]
+
+
+def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """(B, count) the nearest boxes of each, itself among them; -1 where there are fewer.
+
+    Many boxes are searched in the groups of consecutive ones whose boxes are nearest, found the same way.
+    """
+    boxes = len(low)
+    centre = (low + high) / 2
+    if boxes <= BRUTE:
+        candidates = np.broadcast_to(np.arange(boxes), (boxes, boxes))
+    else:
+        member = _members(np.arange(-(-boxes // GROUP)), boxes)
+        groups = nearest_boxes(low[member].min(axis=1), high[member].max(axis=1), 2 * GROUPS_NEAR)
+        others = np.where(groups[:, :, None] < 0, -1, groups[:, :, None] * GROUP + np.arange(GROUP))
+        candidates = np.repeat(others.reshape(len(member), -1), GROUP, axis=0)[:boxes]
+        candidates = np.where(candidates < boxes, candidates, -1)
+    out = np.full((boxes, count), -1)
+    for begin in range(0, boxes, ROWS):
+        rows = slice(begin, begin + ROWS)
+        other = candidates[rows]
+        square = np.zeros(other.shape)
+        for axis in range(low.shape[1]):
+            gap = np.maximum(
+                low[other, axis] - high[rows, axis, None], low[rows, axis, None] - high[other, axis]
+            )
+            square += np.square(np.maximum(gap, 0))
+            # boxes that touch: those whose centres are nearer first
+            square += 1e-3 * np.square(centre[other, axis] - centre[rows, axis, None])
+        square[other < 0] = np.inf
+        place, distance = _least(square, count)
+        found = np.take_along_axis(other, place, axis=1)
+        out[rows, : found.shape[1]] = np.where(np.isfinite(distance), found, -1)
+    return out
+
+
+def _members(group: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """(G, 16) numbers of each group, of `count` in all; the last again where there are no more."""
+    return np.minimum(group[:, None] * GROUP + np.arange(GROUP), count - 1)
+
+
+def _least(square: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Places of the least values of each row, ascending, and the values."""
+    count = min(count, square.shape[1])
+    place = np.argpartition(square, count - 1, axis=1)[:, :count]
+    values = np.take_along_axis(square, place, axis=1)
+    ascending = np.lexsort((place, values), axis=1)
+    return np.take_along_axis(place, ascending, axis=1), np.take_along_axis(values, ascending, axis=1)
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> Floats:
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]

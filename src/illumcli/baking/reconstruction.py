@@ -1,0 +1,214 @@
+"""Reconstruction of w at the points of a bake from few rays: local first-order regression on the surface.
+
+The noise of w differs from point to point, w itself follows the surface. So w of a point is taken from a
+first-order polynomial of the normal and the position, fitted by least squares to the raw values of the points
+around it. Points are grouped into cells; a window is a cell and its nearest cells of the same object whose
+normals agree, so that no value crosses a hard edge.
+
+Each cell takes the window of the least risk, by Stein's unbiased estimate from the standard errors of the raw
+values; where no window promises less than the raw values they stay. The same is done over the cells of
+another order of the points, and the mean taken, which smooths the steps between cells.
+
+References
+----------
+Stein, C. M. (1981). Estimation of the mean of a multivariate normal distribution. Annals of Statistics 9(6).
+Li, T.-M., Wu, Y.-T. and Chuang, Y.-Y. (2012). SURE-based optimization for adaptive sampling and
+reconstruction. ACM Transactions on Graphics 31(6).
+Bitterli, B. et al. (2016). Nonlinearly weighted first-order regression for denoising Monte Carlo renderings.
+Computer Graphics Forum 35(4). Not followed: its non-linear weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, column_major
+from illumcli.baking.cells import SIZE, Cells, cells_of
+from illumcli.baking.points import Points
+from illumcli.records import Record
+from illumcli.visibility.regression import FEATURES, MOMENTS, Planes, moments, polynomials
+
+WINDOWS = (2, 4, 8, 16)
+"""Cells of the windows that polynomials are fitted in: up to 16, 32, 64 and 128 points."""
+POOL = 12
+"""Nearest cells that a risk is averaged over: one cell's own is too uncertain."""
+EXCESS = 2.0
+"""Between windows, the variance of a raw value is that of the residuals in the smallest window, but at most
+so many times the stated one: where windows are too coarse, residuals are mostly bias."""
+ROTATIONS = (
+    np.eye(3),
+    np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3,
+)
+"""Of the positions before they are ordered into cells: one reconstruction each."""
+CELLS_AT_ONCE = 1 << 11
+"""Cells that are solved together."""
+
+
+class RawValues(Record):
+    """What M points know of w before they are reconstructed."""
+
+    hidden: NDArray[np.float64]  # (M,) 1 - w
+    variance: NDArray[np.float64]  # (M,) as stated, 0 where a point is known to be open
+
+
+class Reconstruction(Record):
+    """Reconstructed values of M points."""
+
+    hidden: NDArray[np.float64]  # (M,) 1 - w in [0, 1]; exactly 0 where nothing around is hidden
+    risk: NDArray[np.float64]  # (M,) expected square error, by the estimate that chose the windows
+    windows: dict[int, float]  # points in a window, at most; 1 for raw values -> share of the cells
+
+
+def reconstruct(points: Points, raw: RawValues, threads: int) -> Reconstruction:
+    """The mean of the reconstructions over the cells of each rotation."""
+    if not len(raw.hidden):
+        return Reconstruction(raw.hidden, raw.variance, {})
+    features = np.concatenate([points.n.T, points.position.T]).astype(np.float64)
+    hidden, risk = np.zeros(len(raw.hidden)), np.zeros(len(raw.hidden))
+    chosen = np.zeros(len(WINDOWS) + 1)
+    with ThreadPoolExecutor(threads, thread_name_prefix="reconstruct") as pool:
+        for cells in pool.map(partial(_cells, points), ROTATIONS):
+            values = CellValues(cells, features, raw)
+            best = chosen_fits(list(pool.map(values.fits, values.blocks())), cells)
+            fitted = pool.map(partial(values.fitted, best), values.blocks())
+            for block, at_points in zip(values.blocks(), fitted, strict=True):
+                is_point = cells.filled[block]
+                index = cells.points[block][is_point]
+                hidden[index] += at_points.hidden[is_point]
+                risk[index] += at_points.risk[is_point]
+            chosen += np.bincount(best.window, minlength=len(chosen)) / len(best.window)
+    count = len(ROTATIONS)
+    sizes = (1, *(SIZE * each for each in WINDOWS))
+    windows = dict(zip(sizes, (chosen / count).tolist(), strict=True))
+    return Reconstruction(np.clip(hidden / count, 0, 1), risk / count, windows)
+
+
+def _cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
+    x, y, z = points.position.T.astype(np.float64)
+    turned = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
+    return cells_of(turned, points.n, points.objects, WINDOWS[-1])
+
+
+class Fits(Record):
+    """Polynomials fitted in the windows of B cells, and what the risk of each is estimated from."""
+
+    coefficients: NDArray[np.float64]  # (windows, 7, B) constant and slopes
+    residual: NDArray[np.float64]  # (windows, B) sum of the squared residuals of the cell's points
+    leverage: NDArray[np.float64]  # (windows, B) sum of their leverages
+    variance: NDArray[np.float64]  # (B,) sum of the stated variances
+    count: NDArray[np.float64]  # (B,) points
+
+
+class ChosenFits(Record):
+    """The window of each cell."""
+
+    window: NDArray[np.int64]  # (C,) 0 where raw values stay
+    coefficients: NDArray[np.float64]  # (7, C)
+    risk: NDArray[np.float64]  # (C,)
+
+
+class Fitted(Record):
+    """Values at the points of B cells."""
+
+    hidden: NDArray[np.float64]  # (B, 8)
+    risk: NDArray[np.float64]  # (B, 8)
+
+
+class CellValues:
+    """Raw values and features of the points of each cell, and the moments of cells."""
+
+    def __init__(self, cells: Cells, features: Planes, raw: RawValues) -> None:
+        self._cells, self._features, self._raw = cells, features, raw
+        # moments of every cell, and of an empty one that stands for neighbours that are not there
+        self._moments = np.zeros((MOMENTS, len(cells.points) + 1))
+        for block in self.blocks():
+            index, share = cells.points[block], cells.filled[block].astype(np.float64)
+            moments(share, raw.hidden[index], features[:, index], _sum_rows, self._moments[:, block])
+
+    def blocks(self) -> list[slice]:
+        """Cells that are solved together."""
+        count = len(self._cells.points)
+        return [slice(k, min(k + CELLS_AT_ONCE, count)) for k in range(0, count, CELLS_AT_ONCE)]
+
+    def fits(self, block: slice) -> Fits:
+        """The polynomials of a block in each of the windows."""
+        index, near = self._cells.points[block], self._cells.near[block]
+        share = self._cells.filled[block].astype(np.float64)
+        hidden, features = self._raw.hidden[index], self._features[:, index]
+        coefficients = np.empty((len(WINDOWS), 1 + FEATURES, len(index)))
+        residual, leverage = (np.empty((len(WINDOWS), len(index))) for _ in range(2))
+        sums = np.zeros((MOMENTS, len(index)))
+        first = 0
+        for number, window in enumerate(WINDOWS):
+            for k in range(first, window):
+                sums += self._moments.take(near[:, k], axis=1)
+            first = window
+            of_window = polynomials(sums[:, :, None].copy())
+            coefficients[number] = of_window.coefficients()[:, :, 0]
+            _sum_rows(share * np.square(of_window.at(features) - hidden), residual[number])
+            _sum_rows(share * np.minimum(of_window.leverage(features), 1), leverage[number])
+        return Fits(
+            coefficients,
+            residual,
+            leverage,
+            (share * self._raw.variance[index]).sum(axis=1),
+            share.sum(axis=1),
+        )
+
+    def fitted(self, best: ChosenFits, block: slice) -> Fitted:
+        """The values at the points of a block."""
+        index, is_raw = self._cells.points[block], best.window[block, None] == 0
+        value = np.repeat(best.coefficients[0, block, None], SIZE, axis=1)
+        for slope, feature in zip(best.coefficients[1:, block, None], self._features, strict=True):
+            value += slope * feature[index]
+        return Fitted(
+            np.where(is_raw, self._raw.hidden[index], value),
+            np.where(is_raw, self._raw.variance[index], best.risk[block, None]),
+        )
+
+
+def chosen_fits(fits: Sequence[Fits], cells: Cells) -> ChosenFits:
+    """The window of the least risk of each cell, averaged over the cells around.
+
+    The risk of a fit f to raw values y of variance s^2 is (f - y)^2 + (2 leverage - 1) s^2: it errs by bias
+    and noise, and the leverage is the share of its own raw value in f. That of the raw value is s^2.
+    """
+    # means over the points of the cells around
+    count = _pooled(np.concatenate([each.count for each in fits]), cells)
+    stated = _pooled(np.concatenate([each.variance for each in fits]), cells) / count
+    residual = _pooled(np.concatenate([each.residual for each in fits], axis=1), cells) / count
+    leverage = _pooled(np.concatenate([each.leverage for each in fits], axis=1), cells) / count
+
+    # the best of the windows
+    of_residuals = residual[0] / np.maximum(1 - leverage[0], 0.05)
+    variance = np.clip(of_residuals, stated, EXCESS * stated)
+    best = np.argmin(residual + (2 * leverage - 1) * variance, axis=0)
+
+    # against the raw value
+    at = best[None]
+    share = np.take_along_axis(leverage, at, axis=0)[0]
+    risk = np.take_along_axis(residual, at, axis=0)[0] + (2 * share - 1) * stated
+    coefficients = np.concatenate([each.coefficients for each in fits], axis=2)
+    return ChosenFits(
+        np.where(risk < stated, best + 1, 0),
+        np.take_along_axis(coefficients, best[None, None], axis=0)[0],
+        np.maximum(risk, share * stated),
+    )
+
+
+def _pooled(values: NDArray[np.float64], cells: Cells) -> NDArray[np.float64]:
+    """(..., C) sums over the cells around each."""
+    padded = np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
+    out = np.zeros_like(values)
+    for near in cells.near.T[:POOL]:
+        out += padded.take(near, axis=-1)
+    return out
+
+
+def _sum_rows(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    values.sum(axis=-1, out=out)

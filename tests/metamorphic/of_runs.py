@@ -35,7 +35,7 @@ def a_layer_does_not_know_of_others(case: Case, random: Random, studio: Studio) 
     otherwise, `error` renders some pixels twice, adaptive samples are each layer's own."""
     path = case.write(studio.folder())
     every = (*ALL, *light_layers(case), *(f"shadow.{name}" for name in light_layers(case)))
-    more = ("triangle_id",) if "adaptive" in case.scene["film"] else ("triangle_id", "error")
+    more = ("triangle_id", "error")
     whole = pictures(path, layers=(*every, *more))
     light = [name for name in every if name != "obscurance"]  # whose rays reach far in most scenes
     asked = [random.sample(names, random.randint(1, 4)) for names in (every, light, light)]

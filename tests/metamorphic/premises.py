@@ -33,7 +33,7 @@ def at_centres(case: Case) -> Case:
 def fixed_samples(case: Case) -> Case:
     """Every pixel gets all samples."""
     case = case.copy()
-    case.scene["film"].pop("adaptive", None)
+    case.scene["film"]["adaptive"] = False
     return case
 
 

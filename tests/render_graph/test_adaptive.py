@@ -387,3 +387,21 @@ def test_damaged_entries_of_some_pixels_are_made_again(scene, whole, tmp_path, k
         entry.path.write_bytes(entry.path.read_bytes()[:-3])
     same(whole[0], cached(scene, store=store)[0])
     assert cached(scene, store=store)[1] == {}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "is_adaptive"),
+    [
+        (["film.samples=8"], True),
+        (["film.samples=7"], False),
+        (["film.samples=2", "film.adaptive=true"], True),
+        (["film.samples=8", "film.adaptive=false"], False),
+        (["film.samples=8", "film.adaptive={probes: 3}"], True),
+        (["film.samples=1", "film.adaptive=true"], False),
+        (["camera.samples=9", "film.samples=1"], True),
+        (["film.samples=8", "obscurance.reconstruct=true"], False),
+    ],
+)
+def test_eight_samples_are_adaptive_by_default(scene, overrides, is_adaptive):
+    plan = planned(load(scene, ["film.adaptive=null", *overrides]), ["beauty"])
+    assert (plan.all_samples is not None) is is_adaptive

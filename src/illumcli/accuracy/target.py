@@ -81,7 +81,7 @@ class SamplingChoice(Record):
         """The counts in the form of `-D`."""
         overrides = [f"film.samples={self.sampling.pixel}"]
         scene = self.layers[0].scene
-        if scene.film.adaptive is not None:  # the choice is for images without adaptive sampling
+        if scene.film.adaptive is not False:  # the choice is for images without adaptive sampling
             overrides.append("film.adaptive=false")
         for name, camera in scene.named_cameras().items():
             if camera.samples is not None:

@@ -14,7 +14,7 @@ from illumcli.film.view import rays, samples
 from illumcli.graph import Node, topological_order
 from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.render_graph import needs, stages
-from illumcli.scene.spec import Scene
+from illumcli.scene.spec import DIFFERENCE, Scene
 from illumcli.visibility.obscurance import baked_or_open
 
 OPEN = "open."
@@ -27,9 +27,10 @@ MIXED = ("obscurance", "ambient", "beauty")
 
 def adaptive_nodes(scene: Scene, nodes: Mapping[str, Node], given: Iterable[str]) -> dict[str, Node]:
     """The nodes that decide about each layer's pixels, by buffer; none if no view is adaptive."""
-    settings = scene.film.adaptive
-    if settings is None or all(view.adaptive is None for view in needs.views(scene)):
+    if all(view.adaptive is None for view in needs.views(scene)):
         return {}
+    settings = scene.film.adaptive
+    difference = settings.difference if settings else DIFFERENCE
     purposes = [each for each in ("lobes", "ambient", "emission") if needs.may_vary(scene, each)]
     textures = {f"{purpose}_textures": f"{purpose}_textures" for purpose in purposes}
     decisions = [
@@ -47,7 +48,7 @@ def adaptive_nodes(scene: Scene, nodes: Mapping[str, Node], given: Iterable[str]
     for layer in means(scene):
         values = f"{OPEN}{layer.buffer}" if f"{OPEN}{layer.buffer}" in opened else layer.buffer
         coarse = {"minified": "minified"} if textures and layer.kind == "light" else {}
-        bound = partial(refined, settings.difference)
+        bound = partial(refined, difference)
         decisions.append(Node.of(bound, decision(layer), values=values, **coarse))
     return opened | {node.output: node for node in decisions}
 

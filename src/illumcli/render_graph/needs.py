@@ -13,14 +13,16 @@ from illumcli.layers import FIXED, PER_LIGHT, Layer
 from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
 from illumcli.rays.camera import footprint
-from illumcli.scene.spec import Film, MeshFile, NameOrMesh, Object, Scene, default_material
+from illumcli.scene.spec import MeshFile, NameOrMesh, Object, Scene, default_material
 from illumcli.schema.messages import suggestion
 from illumcli.shading.rates import RATES, Rate
 from illumcli.shading.terms import given_terms
 from illumcli.shading.textures import paths
 
 FEWEST_PROBES, PROBE_SHARE = 2, 4
-"""Samples whose first hits adaptive sampling looks at: one in so many, but at least so many."""
+"""Samples whose first hits adaptive sampling tests: one in so many, but at least so many."""
+FEWEST_ADAPTIVE = 8
+"""Samples per pixel from which on sampling is adaptive by default: of fewer it saves little."""
 
 
 def views(scene: Scene) -> list[View]:
@@ -30,16 +32,18 @@ def views(scene: Scene) -> list[View]:
     for name, camera in scene.named_cameras().items():
         count = camera.samples or film.samples
         width, height = camera.width or film.width, camera.height or film.height
-        cameras.append(View(name, camera, width, height, count, adaptive(film, count)))
+        cameras.append(View(name, camera, width, height, count, adaptive(scene, count)))
     return cameras
 
 
-def adaptive(film: Film, samples: int) -> Adaptive | None:
+def adaptive(scene: Scene, samples: int) -> Adaptive | None:
     """How adaptive sampling finds the pixels that one sample is not enough for; None if all get all."""
-    if film.adaptive is None or samples == 1:
+    settings = scene.film.adaptive
+    by_default = samples >= FEWEST_ADAPTIVE and not reconstructs(scene)
+    if samples == 1 or settings is False or (settings is None and not by_default):
         return None
-    probes = film.adaptive.probes or max(FEWEST_PROBES, samples // PROBE_SHARE)
-    reach, spread = footprint(film.filter)
+    probes = (settings.probes if settings else None) or max(FEWEST_PROBES, samples // PROBE_SHARE)
+    reach, spread = footprint(scene.film.filter)
     return Adaptive(min(probes, samples), reach, spread)
 
 

@@ -239,6 +239,9 @@ class Filter(Description):
     """Support of box and tent, and two standard deviations of the Gaussian, either side [half pixels]."""
 
 
+DIFFERENCE = 0.02
+
+
 class Adaptive(Description):
     """Adaptive sampling: one sample at the centre of every pixel, and all of them only where one is not
     enough: at the edges of objects, where normal, depth or light change abruptly, where textures are finer
@@ -249,12 +252,18 @@ class Adaptive(Description):
 
     probes: Count | None = None
     """Samples of every pixel whose first hits are tested; by default a quarter of them, but at least 2."""
-    difference: Annotated[float, Field(gt=0, le=1)] = 0.02
+    difference: Annotated[float, Field(gt=0, le=1)] = DIFFERENCE
     """Greatest second difference of light over three pixels, as a share of the brightest around."""
 
 
 def _adaptive(value: Any) -> Any:
-    return ({} if value else None) if isinstance(value, bool) else value
+    return {} if value is True else value
+
+
+AdaptiveOrNot: TypeAlias = Annotated[
+    Annotated[Literal[False], Tag("off")] | Annotated[Adaptive, Tag("on")],
+    Discriminator(lambda value: "off" if value is False else "on"),
+]
 
 
 class Film(Description):
@@ -266,11 +275,12 @@ class Film(Description):
     """Height of the image [pixels]."""
     samples: Count = 4
     """Samples per pixel; a single one is at the pixel's centre."""
-    adaptive: Annotated[
-        Adaptive | None, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool | None)
-    ] = None
+    adaptive: (
+        Annotated[AdaptiveOrNot, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool)] | None
+    ) = None
     """Adaptive sampling: all samples only where one is not enough; `true`, or the settings of the test for
-    it. By default every pixel has all samples."""
+    it. `false`: every pixel has all samples. By default `true` for 8 samples or more, unless obscurance is
+    reconstructed."""
     filter: Filter = DEFAULTS
     """The pixel filter."""
     background: Color | None = None

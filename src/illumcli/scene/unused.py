@@ -78,7 +78,7 @@ def _views(scene: Scene) -> Iterator[Fault]:
             yield ("film", key), f"is not used, every camera has its own {key}; change theirs"
     samples = [camera.samples or film.samples for camera in cameras.values()]
     if max(samples) == 1:
-        if film.adaptive is not None:
+        if film.adaptive:
             yield ("film", "adaptive"), "is not used, no pixel has more than one sample; raise film.samples"
         yield ("film", "filter"), "is not used, a single sample looks through the pixel's centre; take more"
 

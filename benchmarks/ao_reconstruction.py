@@ -20,7 +20,7 @@ import numpy as np
 
 from ao_error import caster
 from illumcli.baking.audit import Audited, audit
-from illumcli.baking.reconstruction import RawValues, reconstruct
+from illumcli.baking.reconstruction import RawValues, reconstruct, rotated_cells
 from illumcli.baking.sampling import BakeSampler, RayCounts
 
 
@@ -37,7 +37,7 @@ def row(path: Path, rays: int, seeds: int, truth: list[np.ndarray]) -> str:
         variance[closed] = law.at(values.neighbor_variation, rays).astype(float) ** 2
 
         start = time.process_time()
-        made = reconstruct(sampler.points, RawValues(hidden, variance), 1)
+        made = reconstruct(sampler.points, rotated_cells(sampler.points, 1), RawValues(hidden, variance), 1)
         seconds.append(time.process_time() - start)
         w, risk = 1 - made.hidden[closed], made.risk[closed]
         found = audit(sampler, Audited(closed, w, risk, rays, float(variance[closed].mean())), 0)

@@ -7,7 +7,7 @@ import pytest
 
 from illumcli.baking.cells import cells_of
 from illumcli.baking.points import Points
-from illumcli.baking.reconstruction import RawValues, reconstruct
+from illumcli.baking.reconstruction import RawValues, reconstruct, rotated_cells
 from illumcli.geometry.scene_geometry import SceneGeometry
 
 
@@ -34,6 +34,10 @@ def noisy(hidden, sigma, seed=1):
     return RawValues(hidden + noise, np.full(len(hidden), sigma**2))
 
 
+def reconstructed(points, raw, threads=1):
+    return reconstruct(points, rotated_cells(points, threads), raw, threads)
+
+
 def rmse(a, b):
     return np.sqrt(np.mean(np.square(a - b)))
 
@@ -41,7 +45,7 @@ def rmse(a, b):
 def test_a_linear_surface_loses_its_noise():
     points = plane(4000)
     truth = 0.3 + 0.2 * points.position[:, 0].astype(float)
-    values = reconstruct(points, noisy(truth, 0.05), 1)
+    values = reconstructed(points, noisy(truth, 0.05))
     assert rmse(values.hidden, truth) < 0.05 / 4
     assert 0.3 < rmse(values.hidden, truth) / np.sqrt(values.risk.mean()) < 1.1
     assert values.windows[128] > 0.7
@@ -51,7 +55,7 @@ def test_w_that_bends_from_point_to_point_keeps_its_raw_values():
     points = plane(300)
     truth = np.random.default_rng(5).random(300)
     raw = noisy(truth, 0.01)
-    values = reconstruct(points, raw, 1)
+    values = reconstructed(points, raw)
     assert values.windows[1] > 0.95
     assert rmse(values.hidden, truth) < 0.0115
 
@@ -60,7 +64,7 @@ def test_w_that_bends_from_point_to_point_keeps_its_raw_values():
 def test_the_choice_weighs_bias_against_noise(roughness, raw):
     points = plane(4000)
     truth = np.random.default_rng(5).normal(0.5, roughness, 4000)
-    values = reconstruct(points, noisy(truth, 0.1), 1)
+    values = reconstructed(points, noisy(truth, 0.1))
     assert (values.windows[1] > 0.9) == raw
     assert (values.windows[1] < 0.1) == (not raw)
 
@@ -69,7 +73,7 @@ def test_a_step_over_a_hard_edge_stays():
     step = np.concatenate([plane(1000).position, plane(1000, 7).position[:, [1, 0, 2]]])
     n = np.repeat([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 1000, axis=0)
     truth = np.repeat([0.2, 0.8], 1000)
-    values = reconstruct(points_at(step, n), noisy(truth, 0.05), 1)
+    values = reconstructed(points_at(step, n), noisy(truth, 0.05))
     assert np.abs(values.hidden - truth).max() < 0.06
     assert values.windows[128] > 0.7
 
@@ -77,7 +81,7 @@ def test_a_step_over_a_hard_edge_stays():
 def test_what_saw_nothing_hidden_stays_open_exactly():
     points = plane(2000)
     hidden = np.where(points.position[:, 0] > 0.8, 0.4, 0.0)
-    values = reconstruct(points, RawValues(hidden, np.full(2000, 1e-3)), 1)
+    values = reconstructed(points, RawValues(hidden, np.full(2000, 1e-3)))
     assert (values.hidden[points.position[:, 0] < 0.4] == 0).all()
     assert (values.hidden[hidden > 0] > 0).all()
 
@@ -87,7 +91,7 @@ def test_no_value_crosses_to_another_object():
     objects = np.random.default_rng(0).integers(0, 2, 2000).astype(np.int32)
     truth = np.where(objects == 0, 0.0, 0.6)
     n = np.repeat([[0.0, 1.0, 0.0]], 2000, axis=0)
-    values = reconstruct(points_at(position, n, objects), RawValues(truth, np.full(2000, 1e-2)), 1)
+    values = reconstructed(points_at(position, n, objects), RawValues(truth, np.full(2000, 1e-2)))
     np.testing.assert_allclose(values.hidden, truth, atol=1e-6)
 
 
@@ -95,7 +99,7 @@ def test_no_value_crosses_to_another_object():
 def test_threads_change_nothing_and_few_points_are_no_fault(count):
     points = plane(count)
     raw = noisy(np.full(count, 0.3), 0.1)
-    one, three = (reconstruct(points, raw, threads) for threads in (1, 3))
+    one, three = (reconstructed(points, raw, threads) for threads in (1, 3))
     assert np.isfinite(one.hidden).all()
     assert one.hidden.tobytes() == three.hidden.tobytes()
     assert one.risk.tobytes() == three.risk.tobytes()
@@ -104,10 +108,10 @@ def test_threads_change_nothing_and_few_points_are_no_fault(count):
 def test_values_of_each_point_come_from_the_cells_around():
     points = plane(4000)
     raw = noisy(np.full(4000, 0.5), 0.05)
-    before = reconstruct(points, raw, 1).hidden
+    before = reconstructed(points, raw).hidden
     far = points.position[:, 0] > 0.9
     changed = RawValues(np.where(far, 0.1, raw.hidden), raw.variance)
-    after = reconstruct(points, changed, 1).hidden
+    after = reconstructed(points, changed).hidden
     near = points.position[:, 0] < 0.3
     assert (before[near] == after[near]).all()
     assert len(cells_of(points.position, points.n, points.objects, 16).points) == 500

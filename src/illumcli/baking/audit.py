@@ -74,7 +74,7 @@ class Audited(Record):
     points: NDArray[np.int64]  # (K,)
     w: NDArray[np.float64]  # (K,)
     risk: NDArray[np.float64]  # (K,) expected square errors
-    samples: int  # rays that a point cast, in the mean
+    samples: float  # rays of a point, in the mean
     raw_variance: float  # mean variance of the values of so many rays before they were reconstructed
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Ids, Vectors
+from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.geometry.spatial_order import compact
 from illumcli.records import Record
 
@@ -22,10 +22,12 @@ AGREE = 0.5
 """Least cosine between the mean normals of cells that are near each other."""
 GROUP, GROUPS_NEAR = 16, 16
 """Boxes of one group, and groups near each in which its nearest boxes are searched."""
-BRUTE = 1 << 11
+BRUTE = 1 << 10
 """Boxes that are compared each with each."""
 ROWS = 32
 """Groups at a time: their distances stay in a core's own cache."""
+TOUCHING = 2.5e-4
+"""Weight of the squared distance of the centres of two boxes [per (2 radii)^2], beside that of their gap."""
 APART = 8.0
 """Distance between objects along a fourth axis [radii]: more than any within an object."""
 
@@ -85,6 +87,7 @@ def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int
         return np.zeros((0, count), np.int64)
     member = _members(np.arange(-(-cells // GROUP)), cells)
     groups = nearest_boxes(centre[member].min(axis=1), centre[member].max(axis=1), GROUPS_NEAR)
+    single = centre.astype(F), normal.astype(F)
     out = np.full((len(member) * GROUP, count), cells)
     for begin in range(0, len(member), ROWS):
         own = member[begin : begin + ROWS]
@@ -95,11 +98,11 @@ def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int
         other = np.where(is_cell, other, 0)
 
         # squared distances, infinite to cells of other objects and to those that disagree
-        square = np.zeros((*own.shape, other.shape[1]))
+        square = np.zeros((*own.shape, other.shape[1]), F)
         cosine = np.zeros_like(square)
-        for axis in centre.T:
+        for axis in single[0].T:
             square += np.square(axis[own][:, :, None] - axis[other][:, None])
-        for axis in normal.T:
+        for axis in single[1].T:
             cosine += axis[own][:, :, None] * axis[other][:, None]
         square[(cosine < AGREE) | (square > (APART / 2) ** 2) | ~is_cell[:, None]] = np.inf
         square[own[:, :, None] == np.where(is_cell, other, -1)[:, None]] = -1
@@ -117,9 +120,8 @@ def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: in
     Many boxes are searched in the groups of consecutive ones whose boxes are nearest, found the same way.
     """
     boxes = len(low)
-    centre = (low + high) / 2
     if boxes <= BRUTE:
-        candidates = np.broadcast_to(np.arange(boxes), (boxes, boxes))
+        candidates = np.arange(boxes)[None]
     else:
         member = _members(np.arange(-(-boxes // GROUP)), boxes)
         groups = nearest_boxes(low[member].min(axis=1), high[member].max(axis=1), 2 * GROUPS_NEAR)
@@ -129,18 +131,17 @@ def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: in
     out = np.full((boxes, count), -1)
     for begin in range(0, boxes, ROWS):
         rows = slice(begin, begin + ROWS)
-        other = candidates[rows]
-        square = np.zeros(other.shape)
-        for axis in range(low.shape[1]):
-            gap = np.maximum(
-                low[other, axis] - high[rows, axis, None], low[rows, axis, None] - high[other, axis]
-            )
+        other = candidates if len(candidates) == 1 else candidates[rows]
+        square = np.zeros((len(low[rows]), other.shape[1]))
+        for least, most in zip(low.T, high.T, strict=True):
+            at, end = least[other], most[other]
+            gap = np.maximum(at - most[rows, None], least[rows, None] - end)
             square += np.square(np.maximum(gap, 0))
-            # boxes that touch: those whose centres are nearer first
-            square += 1e-3 * np.square(centre[other, axis] - centre[rows, axis, None])
-        square[other < 0] = np.inf
+            # of boxes that touch, those whose centres are nearer first
+            square += TOUCHING * np.square((at + end) - (least + most)[rows, None])
+        square[np.broadcast_to(other < 0, square.shape)] = np.inf
         place, distance = _least(square, count)
-        found = np.take_along_axis(other, place, axis=1)
+        found = np.take_along_axis(np.broadcast_to(other, square.shape), place, axis=1)
         out[rows, : found.shape[1]] = np.where(np.isfinite(distance), found, -1)
     return out
 

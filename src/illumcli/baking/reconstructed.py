@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,18 +11,19 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.baking.audit import Audit, Audited, audit
+from illumcli.baking.cells import Cells
 from illumcli.baking.context import BakeContext, SampledValues
-from illumcli.baking.reconstruction import RawValues, Reconstruction, reconstruct
+from illumcli.baking.reconstruction import RawValues, reconstruct, rotated_cells
 from illumcli.baking.sampling import (
     MAX_SAMPLES,
     MIN_SAMPLES,
     BakeSampler,
+    PointEstimates,
     RayCounts,
     averaged_along,
     rounded_samples,
 )
 from illumcli.records import Record
-from illumcli.visibility.obscurance_error import Estimates
 
 PAIRS = 1 << 20
 """Number of the first scramble that measures the error of raw values; each trial has 2^10 more."""
@@ -34,18 +36,6 @@ SLOPE, FLATTEST, STEEPEST = 0.53, 0.35, 0.9
 LEAST_GROWTH, MOST_GROWTH = 1.25, 32.0
 
 
-class Trial(Record):
-    """Reconstructed values of the points that are not open, for some numbers of rays."""
-
-    samples: NDArray[np.int64]  # (K,) rays of each
-    raw: Estimates
-    reconstruction: Reconstruction  # of all points
-    audit: Audit
-    value_rays: int
-    other_rays: dict[str, int]  # purpose -> rays
-    resumed: int
-
-
 def reconstructed_values(
     context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64]
 ) -> SampledValues:
@@ -53,70 +43,120 @@ def reconstructed_values(
 
     Trials with more and more rays are audited until one has reached the target. Each is sampled anew.
     """
+    cells = rotated_cells(sampler.points, context.threads)
+    context.clock.lap("cells")
+    bake = ReconstructedBake(context, sampler, closed, cells)
     target = context.settings.target_error
     if target is None:
-        samples = np.full(len(closed), context.settings.samples)
-        return _values(context, sampler, closed, [_trial(context, sampler, RayCounts(closed, samples), 0)])
+        return bake.values([bake.trial(np.full(len(closed), context.settings.samples), 0)])
 
-    count = len(sampler.points.key)
-    share = len(closed) / max(count, 1)
-    samples, weight = np.full(len(closed), MIN_SAMPLES), np.ones(len(closed))
     trials: list[Trial] = []
+    samples, weight = np.full(len(closed), MIN_SAMPLES), np.ones(len(closed))
     for number in range(MAX_TRIALS):
-        trial = _trial(context, sampler, RayCounts(closed, samples), number)
-        trials.append(trial)
-        is_reached = trial.audit.rmse(share) <= target
+        trials.append(bake.trial(samples, number))
+        is_reached = trials[-1].audit.rmse(bake.share) <= target
         if is_reached or samples.min(initial=MAX_SAMPLES) >= MAX_SAMPLES:
             break
         if number == 0:
-            # more rays where neighbouring rays disagree, as without reconstruction
-            near = averaged_along(sampler.order, closed, trial.raw.neighbor_variation, count)
-            weight = (1 + near) ** 0.4
-            weight /= weight.mean()
-        growth = _growth(trials, AIM * target / share**0.5)
+            weight = bake.ray_weights(trials[0])
+        growth = _growth(trials, AIM * target / bake.share**0.5)
         samples = rounded_samples(weight * samples.mean() * growth)
-    return _values(context, sampler, closed, trials)
+    return bake.values(trials)
 
 
-def _trial(context: BakeContext, sampler: BakeSampler, counts: RayCounts, number: int) -> Trial:
-    """Values of so many rays, reconstructed and audited."""
-    settings, clock = context.settings, context.clock
-    closed, points = counts.points, sampler.points
+class Trial(Record):
+    """Reconstructed values of the points that are not open, for some numbers of rays."""
 
-    # raw values and their errors
-    raw = sampler.estimate("values", counts, 0, settings.bent_normal, context.journal)
-    clock.lap("cast")
-    errors = sampler.errors(counts, PAIRS + (number << 10))
-    clock.lap("errors")
-    hidden, variance = np.zeros(len(points.key)), np.zeros(len(points.key))
-    hidden[closed] = 1 - raw.values.w.astype(np.float64)
-    variance[closed] = np.square(
-        errors.law.at(raw.values.neighbor_variation, counts.samples), dtype=np.float64
-    )
-
-    # reconstructed values and theirs
-    reconstruction = reconstruct(points, RawValues(hidden, variance), context.threads)
-    clock.lap("reconstruct")
-    values = Audited(
-        closed,
-        _written(reconstruction, closed).astype(np.float64),
-        reconstruction.risk[closed],
-        math.ceil(counts.samples.mean()) if len(closed) else 0,
-        float(variance[closed].mean()) if len(closed) else 0.0,
-    )
-    share = len(closed) / max(len(points.key), 1)
-    found = audit(sampler, values, number, (settings.target_error or 0.0) / max(share, 1e-9) ** 0.5)
-    clock.lap("audit")
-    cast = {"errors": errors.rays, "audit": found.rays}
-    return Trial(counts.samples, raw.values, reconstruction, found, raw.rays, cast, raw.resumed)
+    samples: NDArray[np.int64]  # (K,) rays of each
+    raw: PointEstimates
+    w: NDArray[np.float32]  # (K,)
+    risk: NDArray[np.float64]  # (K,)
+    windows: Mapping[int, float]  # points in a window -> share of the cells
+    audit: Audit
+    error_rays: int
 
 
-def _written(reconstruction: Reconstruction, closed: NDArray[np.int64]) -> NDArray[np.float32]:
-    """(K,) float32 the reconstructed w."""
-    return (1 - reconstruction.hidden[closed]).astype(F)
+class ReconstructedBake(Record):
+    """The points of a bake that are not open, and the cells of all."""
+
+    context: BakeContext
+    sampler: BakeSampler
+    closed: NDArray[np.int64]  # (K,)
+    cells: Sequence[Cells]
+
+    @property
+    def share(self) -> float:
+        """Of the points, those that are not open."""
+        return len(self.closed) / max(len(self.sampler.points.key), 1)
+
+    def trial(self, samples: NDArray[np.int64], number: int) -> Trial:
+        """Values of so many rays per point, reconstructed and audited."""
+        context, sampler, closed = self.context, self.sampler, self.closed
+        clock, points = context.clock, sampler.points
+        counts = RayCounts(closed, samples)
+
+        # raw values and their errors
+        raw = sampler.estimate("values", counts, 0, context.settings.bent_normal, context.journal)
+        clock.lap("cast")
+        errors = sampler.errors(counts, PAIRS + (number << 10))
+        clock.lap("errors")
+        hidden, variance = np.zeros(len(points.key)), np.zeros(len(points.key))
+        hidden[closed] = 1 - raw.values.w.astype(np.float64)
+        stated = errors.law.at(raw.values.neighbor_variation, samples)
+        variance[closed] = np.square(stated, dtype=np.float64)
+
+        # reconstructed values and theirs
+        made = reconstruct(points, self.cells, RawValues(hidden, variance), context.threads)
+        w, risk = (1 - made.hidden[closed]).astype(F), made.risk[closed]
+        clock.lap("reconstruct")
+        mean_samples, mean_variance = (
+            float(each.sum() / max(len(closed), 1)) for each in (samples, variance)
+        )
+        values = Audited(closed, w.astype(np.float64), risk, mean_samples, mean_variance)
+        target = (context.settings.target_error or 0.0) / max(self.share, 1e-9) ** 0.5
+        found = audit(sampler, values, number, target)
+        clock.lap("audit")
+        return Trial(samples, raw, w, risk, made.windows, found, errors.rays)
+
+    def ray_weights(self, trial: Trial) -> NDArray[np.float64]:
+        """(K,) rays of each point for the least error, over their mean: more where neighbour rays disagree,
+        as without reconstruction."""
+        variation = trial.raw.values.neighbor_variation
+        count = len(self.sampler.points.key)
+        weight = (1 + averaged_along(self.sampler.order, self.closed, variation, count)) ** 0.4
+        return np.divide(weight, weight.mean())
+
+    def values(self, trials: Sequence[Trial]) -> SampledValues:
+        """What is written of the last trial, and what all of them took."""
+        last = trials[-1]
+        found = last.audit
+        about: dict[str, Any] = {
+            "windows": {str(points): round(share, 4) for points, share in last.windows.items()},
+            "audit": {
+                "interval": list(found.interval(self.share)),
+                "estimates": found.points,
+                "samples": found.samples,
+            },
+        }
+        rays = {
+            "trials": sum(trial.raw.rays for trial in trials[:-1]),
+            "values": last.raw.rays,
+            "errors": sum(trial.error_rays for trial in trials),
+            "audit": sum(trial.audit.rays for trial in trials),
+        }
+        return SampledValues(
+            last.w,
+            found.law.at(last.risk),
+            last.raw.values.bent,
+            found.rmse(self.share),
+            last.samples,
+            rays,
+            sum(trial.raw.resumed for trial in trials),
+            about,
+        )
 
 
-def _growth(trials: list[Trial], aim: float) -> float:
+def _growth(trials: Sequence[Trial], aim: float) -> float:
     """How many times as many rays the next trial casts."""
     last, slope = trials[-1], SLOPE
     if len(trials) > 1:
@@ -125,36 +165,3 @@ def _growth(trials: list[Trial], aim: float) -> float:
         more = math.log(float(last.samples.mean() / before.samples.mean()))
         slope = min(max(gain / more, FLATTEST), STEEPEST)
     return min(max((last.audit.rmse(1) / aim) ** (1 / slope), LEAST_GROWTH), MOST_GROWTH)
-
-
-def _values(
-    context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64], trials: list[Trial]
-) -> SampledValues:
-    """What is written of the last trial, and what all of them took."""
-    last = trials[-1]
-    share = len(closed) / max(len(sampler.points.key), 1)
-    low, high = last.audit.interval(share)
-    about: dict[str, Any] = {
-        "windows": {str(points): round(each, 4) for points, each in last.reconstruction.windows.items()},
-        "audit": {
-            "interval": [low, high],
-            "estimates": last.audit.points,
-            "samples": last.audit.samples,
-        },
-    }
-    rays = {
-        "trials": sum(trial.value_rays for trial in trials[:-1]),
-        "values": last.value_rays,
-        "errors": sum(trial.other_rays["errors"] for trial in trials),
-        "audit": sum(trial.other_rays["audit"] for trial in trials),
-    }
-    return SampledValues(
-        _written(last.reconstruction, closed),
-        last.audit.law.at(last.reconstruction.risk[closed]),
-        last.raw.bent,
-        last.audit.rmse(share),
-        last.samples,
-        rays,
-        sum(trial.resumed for trial in trials),
-        about,
-    )

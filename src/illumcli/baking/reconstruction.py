@@ -64,15 +64,27 @@ class Reconstruction(Record):
     windows: dict[int, float]  # points in a window, at most; 1 for raw values -> share of the cells
 
 
-def reconstruct(points: Points, raw: RawValues, threads: int) -> Reconstruction:
-    """The mean of the reconstructions over the cells of each rotation."""
+def rotated_cells(points: Points, threads: int) -> list[Cells]:
+    """Cells over the points, ordered anew for each rotation; the same for all values at these points."""
+    with ThreadPoolExecutor(threads, thread_name_prefix="cells") as pool:
+        return list(pool.map(partial(_rotated_cells, points), ROTATIONS))
+
+
+def _rotated_cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
+    x, y, z = points.position.T.astype(np.float64)
+    turned = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
+    return cells_of(turned, points.n, points.objects, WINDOWS[-1])
+
+
+def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, threads: int) -> Reconstruction:
+    """The mean of the reconstructions over each of several sets of cells."""
     if not len(raw.hidden):
         return Reconstruction(raw.hidden, raw.variance, {})
     features = np.concatenate([points.n.T, points.position.T]).astype(np.float64)
     hidden, risk = np.zeros(len(raw.hidden)), np.zeros(len(raw.hidden))
     chosen = np.zeros(len(WINDOWS) + 1)
     with ThreadPoolExecutor(threads, thread_name_prefix="reconstruct") as pool:
-        for cells in pool.map(partial(_cells, points), ROTATIONS):
+        for cells in rotated:
             values = CellValues(cells, features, raw)
             best = chosen_fits(list(pool.map(values.fits, values.blocks())), cells)
             fitted = pool.map(partial(values.fitted, best), values.blocks())
@@ -82,16 +94,10 @@ def reconstruct(points: Points, raw: RawValues, threads: int) -> Reconstruction:
                 hidden[index] += at_points.hidden[is_point]
                 risk[index] += at_points.risk[is_point]
             chosen += np.bincount(best.window, minlength=len(chosen)) / len(best.window)
-    count = len(ROTATIONS)
+    count = len(rotated)
     sizes = (1, *(SIZE * each for each in WINDOWS))
     windows = dict(zip(sizes, (chosen / count).tolist(), strict=True))
     return Reconstruction(np.clip(hidden / count, 0, 1), risk / count, windows)
-
-
-def _cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
-    x, y, z = points.position.T.astype(np.float64)
-    turned = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
-    return cells_of(turned, points.n, points.objects, WINDOWS[-1])
 
 
 class Fits(Record):

@@ -55,6 +55,14 @@ class Probes(Record):
     nearest: NDArray[np.float64]  # (P,)
 
 
+class Centres(Record):
+    """The first hits of the pixel centres of a tile, as planes; 0 at pixels whose centre misses."""
+
+    object: NDArray[np.int32]  # (h, w) number, from 1
+    ng: NDArray[np.floating[Any]]  # (3, h, w) unit normals
+    nearness: NDArray[np.float64]  # (h, w)
+
+
 def probe_view(view: View) -> View:
     """The view with the samples whose first hits are probes."""
     return view.probing()
@@ -73,53 +81,56 @@ def probes(
     along = dot(probe_rays.origins, forward.astype(F)[None, :])
     along += np.where(hit, closest.distance, F(0)) * dot(probe_rays.directions, forward.astype(F)[None, :])
     depth = along - forward @ render_space.from_world(probe_view.camera.position)
-    near = np.where(hit, _nearness(probe_view, depth), 0)
+    near = np.where(hit, nearness(probe_view, depth), 0)
 
     of_pixel = [values.reshape(-1, probe_view.samples).T for values in (number, near)]
     low, high = ([extreme.reduce([*each]) for each in of_pixel] for extreme in (np.minimum, np.maximum))
     return Probes(low[0], high[0], low[1], high[1])
 
 
-def nearness(view: View, render_space: RenderSpace, interaction: SurfaceInteraction) -> NDArray[np.float64]:
-    """(M,) 1 / depth, or depth if rays are parallel: on a plane it is linear over the image."""
-    eye = render_space.from_world(view.camera.position)
-    return _nearness(view, dot(interaction.position - eye, axes(view.camera)[2][None, :]))
-
-
-def _nearness(view: View, depth: Floats) -> NDArray[np.float64]:
-    """(N,) the same of depths along the line of sight [radii]."""
+def nearness(view: View, depth: Floats) -> NDArray[np.float64]:
+    """(N,) 1 / depth, or depth [radii] if rays are parallel: on a plane it is linear over the image."""
     if view.camera.projection == "orthographic":
         return np.asarray(depth, np.float64)
     return np.asarray(1 / np.maximum(depth, np.finfo(np.float64).tiny))
 
 
-def edges(
+def centres(
     view: View,
     render_space: RenderSpace,
     tile: Tile,
     hits: Hits,
     object_id: NDArray[np.uint32],
     interaction: SurfaceInteraction,
-    nearness: NDArray[np.float64],
-    probes: Probes,
-) -> NDArray[np.bool_]:
+) -> Centres:
+    """The first hits of the pixel centres of a tile."""
+    shape = (tile.height, tile.width)
+    eye = render_space.from_world(view.camera.position)
+    depth = dot(interaction.position - eye, axes(view.camera)[2][None, :])
+    return Centres(
+        on_film(object_id.astype(np.int32), hits.sample, shape)[0],
+        on_film(interaction.ng, hits.sample, shape),
+        on_film(nearness(view, depth), hits.sample, shape)[0],
+    )
+
+
+def edges(view: View, render_space: RenderSpace, centres: Centres, probes: Probes) -> NDArray[np.bool_]:
     """(P,) True where centres and probes hit different objects, or normals or depths have a step.
 
     The result is not valid at the tile's border, where neighbours are missing, except at the film's.
     """
-    shape, reach = (tile.height, tile.width), view.reach
+    shape, reach = centres.object.shape, view.reach
 
     # Different objects.
-    number = on_film(object_id.astype(np.int32), hits.sample, shape)[0]
-    low = around(np.minimum(number, probes.lowest.reshape(shape)), np.minimum, reach)
-    differ = around(np.maximum(number, probes.highest.reshape(shape)), np.maximum, reach) > low
+    low = around(np.minimum(centres.object, probes.lowest.reshape(shape)), np.minimum, reach)
+    differ = around(np.maximum(centres.object, probes.highest.reshape(shape)), np.maximum, reach) > low
 
     # Different normals.
-    for normal in on_film(interaction.ng, hits.sample, shape):
+    for normal in centres.ng:
         differ |= around(normal, np.maximum, reach) - around(normal, np.minimum, reach) > F(NORMAL_STEP)
 
     # A step in depth between centres, or between a probe and the centres around it.
-    near = on_film(nearness, hits.sample, shape)[0]
+    near = centres.nearness
     step = _nearness_step(view, render_space, near)
     far = around(near, np.minimum, 1, straight=True) - step
     close = around(near, np.maximum, 1, straight=True) + step
@@ -131,7 +142,7 @@ def edges(
 def _nearness_step(
     view: View, render_space: RenderSpace, near: NDArray[np.float64]
 ) -> NDArray[np.float64] | float:
-    """The difference of `nearness` at a step of `DEPTH_STEP`."""
+    """The difference of nearness at a step in depth of `DEPTH_STEP`."""
     if view.camera.projection == "orthographic":
         return DEPTH_STEP * view.camera.extent / render_space.radius / view.height
     return DEPTH_STEP * 2 * float(np.tan(np.radians(view.camera.fov) / 2)) / view.height * near
@@ -142,20 +153,19 @@ def refined(
     view: View,
     tile: Tile,
     hits: Hits,
-    edges: NDArray[np.bool_],
+    detailed: NDArray[np.bool_],
     values: NDArray[np.float32],
-    minified: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
-    """(P,) True for pixels of a layer that need all samples: at edges and large second differences.
+    """(P,) True for pixels of a layer that need all samples: with details, or large second differences.
 
     Parameters
     ----------
     difference : float
         Greatest second difference, relative to the greatest value around.
+    detailed : (P,) bool
+        True for pixels that need all samples, whatever the values.
     values : (M,) or (M, k) float32
         At the hits of the centres; centres that miss count as 0.
-    minified : (P,) bool, optional
-        True for pixels that need all samples because of their textures.
     """
     shape = (tile.height, tile.width)
     planes = on_film(values, hits.sample, shape)
@@ -163,8 +173,12 @@ def refined(
     bent = np.maximum.reduce([bend(plane) for plane in planes])
     spread = view.adaptive.spread if view.adaptive else 1.0
     bends = around(bent * F(spread) > F(difference) * scale, np.maximum, view.reach)
-    out = edges | bends.ravel()
-    return out if minified is None else out | minified
+    return detailed | bends.ravel()
+
+
+def detailed(edges: NDArray[np.bool_], minified: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(P,) True for pixels with details of geometry or textures."""
+    return edges | minified
 
 
 def minified(

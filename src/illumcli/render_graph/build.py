@@ -42,7 +42,7 @@ from illumcli.shading.materials import material, material_id
 from illumcli.shading.rates import RATES, normal, obscurance_normals, point_weights, points
 from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
-from illumcli.visibility.object_pixels import object_pixels
+from illumcli.visibility.object_pixels import object_pixels, pixel_pairs
 from illumcli.visibility.obscurance import baked_or_open, obscurance_method
 from illumcli.visibility.open_hemisphere import known_open, open_triangles
 from illumcli.visibility.reconstruction import reconstructed_obscurance
@@ -184,7 +184,8 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     if needs.reconstructs(scene):
         nodes = [
             replace(w, output="raw_obscurance"),
-            Node.of(object_pixels, **partly_baked),
+            Node.of(pixel_pairs, **partly_baked),
+            Node.of(object_pixels),
             Node.of(reconstructed_obscurance, "obscurance"),
         ]
     return [
@@ -192,6 +193,8 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         Node.of(partial(obscurance_normals, tuple(needs.rates(scene))), "obscurance_normals"),
         Node.of(triangle_normals),
         Node.of(partial(obscurance_method, settings), "obscurance_method", **by_face),
+        Node.of(stages.view_method),
+        Node.of(stages.read_hits),
         Node.of(hemispheres, **axes),
         Node.of(open_triangles),
         Node.of(partial(known_open, settings.samples), "known_open"),
@@ -224,9 +227,16 @@ def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:
     """Why the scene itself makes buffers unnecessary, by buffer."""
     # Emission, ambient light and obscurance.
     reasons: dict[str, str] = {}
-    traced = ["obscurance_draws", "obscurance_method", "hemispheres", "known_open"]
+    traced = [
+        "obscurance_draws",
+        "obscurance_method",
+        "view_method",
+        "read_hits",
+        "hemispheres",
+        "known_open",
+    ]
     if needs.reconstructs(scene):
-        traced += ["raw_obscurance", "object_pixels"]
+        traced += ["raw_obscurance", "pixel_pairs", "object_pixels"]
     if not needs.is_emissive(scene):
         reasons |= dict.fromkeys(("emission", "emission_materials"), "no material emits")
     if not needs.is_ambient(scene):

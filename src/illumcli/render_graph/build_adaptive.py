@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import partial
 
-from illumcli.film.adaptive import edges, minified, nearness, probe_view, probes, refined
+from illumcli.film.adaptive import centres, detailed, edges, minified, probe_view, probes, refined
 from illumcli.film.view import rays, samples
 from illumcli.graph import Node, topological_order
 from illumcli.layers import FIXED, PER_LIGHT, Layer
@@ -38,18 +38,19 @@ def adaptive_nodes(scene: Scene, nodes: Mapping[str, Node], given: Iterable[str]
         Node.of(partial(samples, scene.seed), "probe_samples", view="probe_view"),
         Node.of(partial(rays, scene.film.filter), "probe_rays", view="probe_view", samples="probe_samples"),
         Node.of(probes),
-        Node.of(nearness),
+        Node.of(centres),
         Node.of(edges),
         Node("texels", stages.texels, {"geometry": "geometry", "uvs": "uvs", "hits": "hits",
              "material_id": "material_id", **textures}),
         Node.of(minified),
+        Node.of(detailed),
     ]  # fmt: skip
     opened = _opened(nodes, given)
     for layer in means(scene):
         values = f"{OPEN}{layer.buffer}" if f"{OPEN}{layer.buffer}" in opened else layer.buffer
-        coarse = {"minified": "minified"} if textures and layer.kind == "light" else {}
+        details = "detailed" if textures and layer.kind == "light" else "edges"
         bound = partial(refined, difference)
-        decisions.append(Node.of(bound, decision(layer), values=values, **coarse))
+        decisions.append(Node.of(bound, decision(layer), detailed=details, values=values))
     return opened | {node.output: node for node in decisions}
 
 

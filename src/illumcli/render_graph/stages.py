@@ -114,30 +114,37 @@ def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
     return sampling.dither(key, samples.x.take(pixel), samples.y.take(pixel), sample)
 
 
-def obscurance(
-    tracer: Tracer,
-    hemispheres: Hemispheres,
-    obscurance_draws: NDArray[np.float64],
-    obscurance_method: Method,
-    hits: Hits,
-    view: View,
-    read_pixels: NDArray[np.bool_] | None,
-    baked_obscurance: Floats | None = None,
-) -> NDArray[np.float32]:
-    """(M,) w of every hit, by the rays of all samples that each sample represents.
+def view_method(obscurance_method: Method, view: View) -> Method:
+    """The method of one sample, which casts the rays of all samples that it represents."""
+    return replace(obscurance_method, samples=min(obscurance_method.samples * view.stands_for, MAX_RAYS))
+
+
+def read_hits(hits: Hits, view: View, read_pixels: NDArray[np.bool_] | None) -> NDArray[np.int64] | None:
+    """(K,) the hits whose obscurance is read; None if it is all of them.
 
     Parameters
     ----------
     read_pixels : (P,) bool, optional
-        Pixels whose obscurance is read; that of others is NaN.
+        Pixels whose obscurance is read.
     """
-    method = replace(obscurance_method, samples=min(obscurance_method.samples * view.stands_for, MAX_RAYS))
-    if read_pixels is None:
-        return traced(tracer, hemispheres, obscurance_draws, method, baked_obscurance)
-    w = np.full(len(hits.sample), np.nan, F)
-    hit = np.flatnonzero(read_pixels.take(hits.sample // view.samples))
-    baked = None if baked_obscurance is None else baked_obscurance.take(hit)
-    w[hit] = traced(tracer, hemispheres.take(hit), obscurance_draws[:, hit], method, baked)
+    return None if read_pixels is None else np.flatnonzero(read_pixels.take(hits.sample // view.samples))
+
+
+def obscurance(
+    tracer: Tracer,
+    hemispheres: Hemispheres,
+    obscurance_draws: NDArray[np.float64],
+    view_method: Method,
+    read_hits: NDArray[np.int64] | None,
+    baked_obscurance: Floats | None = None,
+) -> NDArray[np.float32]:
+    """(M,) w of every hit; NaN at those whose w is not read."""
+    if read_hits is None:
+        return traced(tracer, hemispheres, obscurance_draws, view_method, baked_obscurance)
+    w = np.full(len(hemispheres.n), np.nan, F)
+    baked = None if baked_obscurance is None else baked_obscurance.take(read_hits)
+    draws = obscurance_draws[:, read_hits]
+    w[read_hits] = traced(tracer, hemispheres.take(read_hits), draws, view_method, baked)
     return w
 
 

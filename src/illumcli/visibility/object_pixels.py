@@ -1,4 +1,4 @@
-"""Pixels of objects: means over those samples of a pixel that see one object, for the reconstruction of w."""
+"""Means over those samples of a pixel that hit one object, for the reconstruction of w."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from illumcli.visibility.hemisphere import Hemispheres
 
 
 class ObjectPixels(Record):
-    """What G pairs of a pixel and an object in it know of w: means over the samples of the pair.
+    """Means over the samples of G pairs of a pixel and an object in it.
 
-    An object's edge runs through pixels; each object there has a pair of its own.
+    A pixel at an object's edge has a pair for each object.
     """
 
     x: NDArray[np.int32]  # (G,) column of the film
@@ -52,7 +52,7 @@ def joined(parts: Sequence[ObjectPixels]) -> ObjectPixels:
 
 
 class SampledPixels(Record):
-    """The pixels of objects in a tile, and which of them each sample is part of."""
+    """The means of a tile's pairs, and the pair of each sample."""
 
     pixels: ObjectPixels
     pair_of_sample: NDArray[np.int64]  # (M,) -1 where w is baked
@@ -67,29 +67,31 @@ class SampledPixels(Record):
         return out
 
 
-def object_pixels(
-    samples: Samples,
-    hits: Hits,
-    object_id: NDArray[np.uint32],
-    hemispheres: Hemispheres,
-    interaction: SurfaceInteraction,
-    raw_obscurance: Floats,
-    baked_obscurance: Floats | None = None,
-) -> SampledPixels:
-    """Means over the samples of every pixel that see one object, pixel by pixel.
+class PixelPairs(Record):
+    """The G pairs of a pixel and an object in it, and the K samples of each, in the order of the pairs."""
+
+    samples: NDArray[np.int64]  # (K,) those whose w is traced
+    first: NDArray[np.int64]  # (G,) index of each pair's first one in `samples`
+    pair_of_sample: NDArray[np.int64]  # (M,) -1 where w is baked
+    pixel: NDArray[np.int64]  # (G,) number within the tile
+    object: NDArray[np.int32]  # (G,)
+
+
+def pixel_pairs(
+    samples: Samples, hits: Hits, object_id: NDArray[np.uint32], baked_obscurance: Floats | None = None
+) -> PixelPairs:
+    """The pairs of a tile's hits, pixel by pixel.
 
     Parameters
     ----------
-    raw_obscurance : (M,) float32
-        w by the rays of each sample alone.
     baked_obscurance : (M,) float32, optional
-        NaN on meshes that have no baked values; the others take no part.
+        NaN on meshes that have no baked values; hits on other meshes are in no pair.
     """
     traced = np.arange(len(hits.sample))
     if baked_obscurance is not None:
         traced = np.flatnonzero(np.isnan(baked_obscurance))
 
-    # samples in the order of their pixel and object
+    # Sort the samples by pixel and object.
     pixel = hits.sample.take(traced).astype(np.int64) // samples.per_pixel
     objects = object_id.take(traced)
     key = pixel * (int(objects.max(initial=0)) + 1) + objects
@@ -97,11 +99,29 @@ def object_pixels(
         order = np.argsort(key, kind="stable")
         traced, pixel, objects, key = traced[order], pixel[order], objects[order], key[order]
 
-    # means over each pair
+    # A pair begins where the pixel or the object changes.
     is_first = np.diff(key, prepend=-1) != 0
     first = np.flatnonzero(is_first)
     pair_of_sample = np.full(len(hits.sample), -1)
     pair_of_sample[traced] = np.cumsum(is_first) - 1
+    return PixelPairs(traced, first, pair_of_sample, pixel[first], objects[first].astype(np.int32))
+
+
+def object_pixels(
+    samples: Samples,
+    pixel_pairs: PixelPairs,
+    hemispheres: Hemispheres,
+    interaction: SurfaceInteraction,
+    raw_obscurance: Floats,
+) -> SampledPixels:
+    """Means over the samples of each pair.
+
+    Parameters
+    ----------
+    raw_obscurance : (M,) float32
+        w by the rays of each sample alone.
+    """
+    traced, first = pixel_pairs.samples, pixel_pairs.first
     count = np.diff(first, append=len(traced))
     hidden = 1 - raw_obscurance.take(traced).astype(np.float64)
     features = [*hemispheres.n.T, *interaction.position.T]
@@ -109,14 +129,14 @@ def object_pixels(
     if samples.per_pixel > 1:
         means = [np.add.reduceat(each, first) / count if len(first) else each for each in means]
     pixels = ObjectPixels(
-        samples.x.take(pixel[first]).astype(np.int32),
-        samples.y.take(pixel[first]).astype(np.int32),
-        objects[first].astype(np.int32),
+        samples.x.take(pixel_pairs.pixel).astype(np.int32),
+        samples.y.take(pixel_pairs.pixel).astype(np.int32),
+        pixel_pairs.object,
         (count / samples.per_pixel).astype(F),
         means[0].astype(F),
         np.stack(means[1:]).astype(F),
     )
-    return SampledPixels(pixels, pair_of_sample)
+    return SampledPixels(pixels, pixel_pairs.pair_of_sample)
 
 
 def within(parts: Sequence[ObjectPixels], tile: Tile, margin: int) -> ObjectPixels:

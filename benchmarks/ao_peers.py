@@ -160,7 +160,7 @@ def starts(own: BakeSampler) -> np.ndarray:
     """(M, 3) one of the places around each point from which rays start."""
     every = np.arange(len(own.points.key))
     over = own.points.hemispheres(every, np.zeros(len(every)))
-    return over.origins[:: over.starts]
+    return over.origins[:: over.origins_per_point]
 
 
 def even(own: BakeSampler, few: np.ndarray) -> np.ndarray:

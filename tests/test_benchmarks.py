@@ -20,6 +20,7 @@ SCRIPTS = {
     "growth": "exponent time",
     "memory": "cpu per pixel",
     "replay": "ratio whole / rays alone",
+    "packets": "\n0 of ",
     "adaptive": "to full: RMSE",
     "reconstruction": "blades",
 }

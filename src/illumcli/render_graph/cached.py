@@ -39,7 +39,13 @@ class Lookup(Value):
 
 
 def substitute_cached(
-    graph: Graph, buffers: Iterable[str], view: View, cache: Cache, look: bool = False, some: bool = False
+    graph: Graph,
+    buffers: Iterable[str],
+    view: View,
+    cache: Cache,
+    look: bool = False,
+    some: bool = False,
+    tiles: bool = True,
 ) -> tuple[Graph, Lookup]:
     """The graph with nodes that load the cached buffers among all that `buffers` need, and which these are.
 
@@ -49,6 +55,8 @@ def substitute_cached(
         Read nothing: an entry that exists counts as valid, and the graph cannot run.
     some : bool
         Buffers of tiles are kept for some pixels only; the graph loads those of pixels that all of them have.
+    tiles : bool
+        Load buffers of tiles, too.
     """
     keys = Keys(graph.nodes, view, code())
     loaders: dict[str, Node] = {}
@@ -76,7 +84,7 @@ def substitute_cached(
                 source, loader, found = _pixel_loader(name, key, view, cache, look)
                 pixels |= {name: found} if found is not None else {}
             else:
-                source, loader = _loader(name, key, view, cache, look)
+                source, loader = _loader(name, key, view, cache, look, tiles)
             if loader is not None:
                 node = loaders[name] = loader
                 reused[name] = source
@@ -111,7 +119,9 @@ def _pixel_loader(
     return "store", Node(name, partial(load, found), _inputs(name)), found
 
 
-def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[str, Node | None]:
+def _loader(
+    name: str, key: str, view: View, cache: Cache, look: bool, of_tiles: bool
+) -> tuple[str, Node | None]:
     """Where a buffer is loaded from, and the node that does so; None if it must be computed."""
     memory, store = cache.memory, cache.store
 
@@ -119,19 +129,19 @@ def _loader(name: str, key: str, view: View, cache: Cache, look: bool) -> tuple[
     if memory is not None:
         if key in memory.once:
             return "memory", Node(name, partial(_constant, memory.once[key]), {})
-        tiles = memory.tiles(key)
+        tiles = memory.tiles(key) if of_tiles else None
         if tiles is not None:
             return "memory", Node(name, partial(_of_tile, tiles), {"tile": "tile"})
 
     # On disk: a valid entry that holds the type of value that its key promises.
-    if store is None or not is_kept(name):
+    codec = codec_of(name)
+    if store is None or not is_kept(name) or (codec is not None and not of_tiles):
         return "", None
     if look:
         return "store", Node(name, _constant, _inputs(name)) if store.has(key) else None
     stored = store.read(key)
     if stored is None:
         return "", None
-    codec = codec_of(name)
     try:
         if codec is None:
             value = decode_entry(stored, SCENE_BUFFERS[name.partition(":")[0]])

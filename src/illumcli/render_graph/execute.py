@@ -27,7 +27,7 @@ from illumcli.records import Record, Value
 from illumcli.render_graph.build import READ, SURROUNDINGS
 from illumcli.render_graph.build_adaptive import decision
 from illumcli.render_graph.replicates import REPLICATED, pixel_luminance, standard_error
-from illumcli.render_graph.schedule import Plan, without_cached_tiles
+from illumcli.render_graph.schedule import Plan, uncached_plans
 from illumcli.visibility.object_pixels import ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
 
@@ -94,6 +94,7 @@ class _Common(Record):
     recorder: BufferRecorder
     develop: Develop
     pixel_recorder: PixelRecorder | None = None
+    cache: Cache = NO_CACHE
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @cached_property
@@ -116,13 +117,15 @@ class _Common(Record):
 
     @cached_property
     def _uncached(self) -> tuple[Plan, Plan, Buffers]:
-        centres, all_samples = without_cached_tiles(self.plan)
+        centres, all_samples = uncached_plans(self.plan, self.cache)
         shared = dict(self.shared)
         for node in (*centres.once, *all_samples.once):
             if node.output not in shared:
                 start = time.perf_counter()
-                shared[node.output] = node.run(shared)
+                value = shared[node.output] = node.run(shared)
                 self.stats.add({node.output: time.perf_counter() - start}, {})
+                if self.cache.memory is not None and node.output in all_samples.lookup.keeps:
+                    self.cache.memory.once[all_samples.lookup.keeps[node.output]] = value
         return centres, all_samples, shared
 
 
@@ -197,7 +200,9 @@ def bands(
     rows = tiles(view.width, view.height, plan.tile_side(view, side), view.samples)
     keeps = plan.lookup.keeps
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
-    common = _Common(plan, shared, run.stats, stop, recorder, develop, _pixel_recorder(plan, run.cache))
+    common = _Common(
+        plan, shared, run.stats, stop, recorder, develop, _pixel_recorder(plan, run.cache), run.cache
+    )
     compute = _adaptive_tile if plan.all_samples else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:

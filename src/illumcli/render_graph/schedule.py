@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from illumcli.cache.codec import codec_of
+from illumcli.cache.recorder import Cache
 from illumcli.errors import InputError
 from illumcli.film.tiles import min_tile_samples, tile_side
 from illumcli.film.view import View
@@ -14,7 +15,7 @@ from illumcli.layers import FIXED, Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import GIVEN, SURROUNDINGS, Graph
 from illumcli.render_graph.build_adaptive import decision
-from illumcli.render_graph.cached import Lookup
+from illumcli.render_graph.cached import Lookup, substitute_cached
 from illumcli.render_graph.keys import Keys, code
 from illumcli.render_graph.needs import layers, reconstructs, views
 from illumcli.render_graph.replicates import BLOCK, REPLICATED
@@ -185,7 +186,9 @@ def schedule(
     # The error compares finished pixels with replicates, which have all samples.
     replicates = None
     if any(layer.per_pixel for layer in outputs):
-        first, rest = _split(without_tile_loaders(graph).topological_order(REPLICATED))
+        scene_loaders = {name: node for name, node in graph.loaders.items() if not node.inputs}
+        whole = replace(graph, loaders=scene_loaders)
+        first, rest = _split(whole.topological_order(REPLICATED))
         replicates = Plan(graph, (), view.all_samples(), tuple(first), tuple(rest))
     known = {node.output for node in once}
     for other in (all_samples, replicates):
@@ -195,18 +198,19 @@ def schedule(
     return replace(plan, all_samples=all_samples, replicates=replicates)
 
 
-def without_tile_loaders(graph: Graph) -> Graph:
-    """The graph in which buffers of tiles are computed."""
-    return replace(graph, loaders={name: node for name, node in graph.loaders.items() if not node.inputs})
-
-
-def without_cached_tiles(plan: Plan) -> tuple[Plan, Plan]:
+def uncached_plans(plan: Plan, cache: Cache) -> tuple[Plan, Plan]:
     """Plans of an adaptive picture that load no buffer of a tile: for one sample of pixels, and for all."""
     others = plan.all_samples
     assert others is not None
-    graph = without_tile_loaders(replace(plan.graph, loaders={**plan.graph.loaders, **others.graph.loaders}))
-    centres = schedule(graph, plan.sampled, replace(plan.view, adaptive=None))
-    return centres, schedule(graph, others.outputs, others.view) if others.lookup.pixels else others
+    if not any(node.inputs for node in (*plan.graph.loaders.values(), *others.graph.loaders.values())):
+        return plan, others
+    graph, centres = plan.graph.without_loaders(), replace(plan.view, adaptive=None)
+    plans = []
+    for outputs, view in ((plan.sampled, centres), (others.outputs, others.view)):
+        needed = needed_buffers(graph, outputs, [view])
+        loaded, lookup = substitute_cached(graph, needed, view, cache, tiles=False)
+        plans.append(schedule(loaded, outputs, view, lookup))
+    return plans[0], plans[1]
 
 
 def _split(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:

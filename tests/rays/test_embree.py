@@ -212,3 +212,9 @@ class Elsewhere:
     """A scene of another layout."""
 
     is_committed = 0
+
+
+@pytest.mark.parametrize("paths", [[], ["libembree4-a.so", "libembree4-b.so"], ["missing.so"]])
+def test_a_library_that_is_not_there_once_is_not_used(paths, monkeypatch):
+    monkeypatch.setattr(library, "_paths", lambda: iter(paths))
+    assert library.embree_library.__wrapped__() is None

@@ -36,7 +36,7 @@ but its import takes 12 to 28 ms."""
 
 
 @cache
-def embree_library() -> Any:
+def embree_library() -> ctypes.CDLL | None:
     """The library that embreex uses, with declared functions; None if there is not exactly one."""
     paths = list(_paths())
     if len(paths) != 1:
@@ -56,7 +56,14 @@ def _paths() -> Iterator[Path]:
             yield from Path(folder).parent.glob(place)
 
 
-def _declare(library: Any) -> None:
+def loaded_library() -> ctypes.CDLL:
+    """The library, known to be there."""
+    library = embree_library()
+    assert library is not None
+    return library
+
+
+def _declare(library: ctypes.CDLL) -> None:
     pointer, number, size = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "rtcNewDevice": (pointer, [ctypes.c_char_p]),
@@ -95,7 +102,7 @@ def build_tree(
     IllumError
         Embree reports another error.
     """
-    library = embree_library()
+    library = loaded_library()
     if len(triangles):
         _attach(device, scene, vertices, triangles)
     library.rtcCommitScene(scene)
@@ -113,7 +120,7 @@ def check(error: int) -> None:
 def _attach(
     device: Handle, scene: Handle, vertices: NDArray[np.float32], triangles: NDArray[np.int32]
 ) -> None:
-    library = embree_library()
+    library = loaded_library()
     geometry = library.rtcNewGeometry(device, TRIANGLES)
     if not geometry:  # any call with a null handle ends the process
         raise MemoryError

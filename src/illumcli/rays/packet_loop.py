@@ -20,7 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors
-from illumcli.rays.embree_library import NATIVE_PACKETS, ROBUST, Handle, build_tree, check, embree_library
+from illumcli.rays.embree_library import (
+    NATIVE_PACKETS,
+    ROBUST,
+    Handle,
+    build_tree,
+    check,
+    embree_library,
+    loaded_library,
+)
 from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
 from illumcli.rays.ray_loop import NO_LIMIT, RAYS_PER_CALL, Closest, batches
 
@@ -100,7 +108,7 @@ class _Hits(ctypes.Structure):
 
 
 @cache
-def packet_library() -> Any:
+def packet_library() -> ctypes.CDLL | None:
     """The compiled loop, a ctypes.CDLL; None if it is missing or has another interface."""
     try:
         library = ctypes.CDLL(str(LIBRARY))
@@ -119,7 +127,7 @@ def packet_library() -> Any:
 @cache
 def native_widths() -> tuple[int, ...]:
     """Rays per packet that Embree has kernels for on this processor, the widest first."""
-    library = embree_library()
+    library = loaded_library()
     device = library.rtcNewDevice(None)
     if not device:
         raise MemoryError
@@ -144,7 +152,9 @@ class PacketLoop:
     def __init__(
         self, vertices: NDArray[np.float32], triangles: NDArray[np.int32], width: int | None = None
     ) -> None:
-        library = embree_library()
+        library, loop = loaded_library(), packet_library()
+        assert loop is not None
+        self._loop = loop
         self.width = native_widths()[0] if width is None else width
         device = library.rtcNewDevice(None)
         if not device:
@@ -167,7 +177,7 @@ class PacketLoop:
             rays.query.arguments = ctypes.addressof(COHERENT)
         for part in batches(len(directions)):
             rays.first, rays.end = part.start, part.stop
-            packet_library().illum_occluded(rays, out.ctypes.data)
+            self._loop.illum_occluded(rays, out.ctypes.data)
         return out
 
     def closest(self, origins: Vectors, directions: Vectors) -> Closest:
@@ -185,7 +195,7 @@ class PacketLoop:
         rays = self._rays("rtcIntersect", origins, directions, _NO_LIMIT)
         for part in batches(len(directions)):
             rays.first, rays.end = part.start, part.stop
-            packet_library().illum_closest(rays, hits)
+            self._loop.illum_closest(rays, hits)
 
     def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
         points, samples = rays.shape
@@ -215,7 +225,7 @@ class PacketLoop:
         per_call = max(1, RAYS_PER_CALL // max(samples, 1))
         for first in range(0, points, per_call):
             structure.first, structure.end = first, min(first + per_call, points)
-            packet_library().illum_patterns(structure, results)
+            self._loop.illum_patterns(structure, results)
 
     def _query(self, name: str) -> _Query:
         return _Query(_address(f"{name}{self.width}"), self._scene, None, self.width)
@@ -246,11 +256,11 @@ def _vectors(array: Vectors) -> _Vectors:
 @cache
 def _address(name: str) -> int | None:
     """Where a function of Embree is in memory."""
-    return ctypes.cast(getattr(embree_library(), name), ctypes.c_void_p).value
+    return ctypes.cast(getattr(loaded_library(), name), ctypes.c_void_p).value
 
 
 def _release(device: Handle, scene: Handle | None) -> None:
-    library = embree_library()
+    library = loaded_library()
     if scene:
         library.rtcReleaseScene(scene)
     library.rtcReleaseDevice(device)

@@ -49,6 +49,15 @@ def test_ambient_may_be_written_short(ambient, color, form):
     assert (made.color, made.form) == (color, form)
 
 
+@pytest.mark.parametrize(
+    ("adaptive", "probes", "difference"),
+    [(True, None, 0.02), ({}, None, 0.02), (5, 5, 0.02), ({"first": 3, "difference": 0.1}, 3, 0.1)],
+)
+def test_adaptive_may_be_written_short_and_as_in_0_1_0(adaptive, probes, difference):
+    made = scene(film={"samples": 16, "adaptive": adaptive}).film.adaptive
+    assert (made.probes, made.difference) == (probes, difference)
+
+
 def test_an_override_changes_only_what_it_says():
     made = scene(
         materials={"clay": {"model": "phong", "diffuse": 0.5, "exponent": 7}},

@@ -5,6 +5,7 @@ The JSON schema in ``schemas/scene.schema.json`` is generated from this module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
@@ -257,7 +258,14 @@ class Adaptive(Description):
 
 
 def _adaptive(value: Any) -> Any:
-    return {} if value is True else value
+    """`true` is a mapping without keys, a number its `probes`; scenes of 0.1.0 call these `first`."""
+    if value is True:
+        return {}
+    if isinstance(value, int) and value is not False:
+        return {"probes": value}
+    if isinstance(value, Mapping) and "first" in value and "probes" not in value:
+        return {"probes" if key == "first" else key: each for key, each in value.items()}
+    return value
 
 
 AdaptiveOrNot: TypeAlias = Annotated[
@@ -276,11 +284,12 @@ class Film(Description):
     samples: Count = 4
     """Samples per pixel; a single one is at the pixel's centre."""
     adaptive: (
-        Annotated[AdaptiveOrNot, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool)] | None
+        Annotated[AdaptiveOrNot, BeforeValidator(_adaptive, json_schema_input_type=Adaptive | bool | Count)]
+        | None
     ) = None
-    """Adaptive sampling: all samples only where one is not enough; `true`, or the settings of the test for
-    it. `false`: every pixel has all samples. By default `true` for 8 samples or more, unless obscurance is
-    reconstructed."""
+    """Adaptive sampling: all samples only where one is not enough; `true`, the settings of the test for it,
+    or its number of probes. `false`: every pixel has all samples. By default `true` for 8 samples or more,
+    unless obscurance is reconstructed."""
     filter: Filter = DEFAULTS
     """The pixel filter."""
     background: Color | None = None

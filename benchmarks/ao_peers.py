@@ -31,11 +31,13 @@ import numpy as np
 from _bench import SMALL, Took, header, took
 from ao_error import caster
 from illumcli.arrays import F
+from illumcli.baking.at_vertices import sampled_at_vertices
+from illumcli.baking.context import BakeContext, StageClock
 from illumcli.baking.inputs import mesh_alone, surfaces_of
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeSettings
-from illumcli.baking.vertex_points import vertex_points
+from illumcli.files.journal import Journal
 from illumcli.progress import no_progress
 from illumcli.rays.sampling import GOLDEN
 from illumcli.visibility.hemisphere import turned_frame
@@ -69,24 +71,24 @@ def main() -> None:
     counts = RayCounts(few, np.full(len(few), REFERENCE))
     truth = own.estimate("reference", counts, 1 << 30).values.w.astype(float)
     header("Which baker is nearest to the truth after so many seconds?", mesh=path.name, rounds=ROUNDS)
-    bakers = [illum(path, truth), *peers(path, own, few, truth)]
+    bakers = [illum(path, truth), illum(path, truth, True), *peers(path, own, few, truth)]
     for number in range(ROUNDS):
         for count in COUNTS:
             for each in bakers if number == 0 or count < SLOW else ():
                 measure(each, count, few, truth)
-    print(f"{'':12s} {'rays':>6s} {'wall [s]':>9s} {'cpu [s]':>9s} {'RMSE':>9s} {'RMSE to w':>10s}")
+    print(f"{'':14s} {'rays':>6s} {'wall [s]':>9s} {'cpu [s]':>9s} {'RMSE':>9s} {'RMSE to w':>10s}")
     for each in bakers:
         for count in COUNTS:
             times = each.best[count]
             errors = f"{each.rmse[count]:9.5f} {each.off[count]:10.5f}"
-            print(f"{each.name:12s} {count:6d} {times.wall:9.3f} {times.cpu:9.3f} {errors}")
+            print(f"{each.name:14s} {count:6d} {times.wall:9.3f} {times.cpu:9.3f} {errors}")
     aim = bakers[0].rmse[EQUAL]
     print(f"to our RMSE at {EQUAL} rays, {aim:.5f}:")
     for each in bakers:
         rays, wall, cpu = (at_error(each, aim, what) for what in ("rays", "wall", "cpu"))
         base = bakers[0].best[EQUAL]
         print(
-            f"  {each.name:12s} {rays:8.0f} rays, wall {wall:8.2f} s, {wall / base.wall:6.2f} times ours;"
+            f"  {each.name:14s} {rays:8.0f} rays, wall {wall:8.2f} s, {wall / base.wall:6.2f} times ours;"
             f" cpu {cpu:8.2f} s, {cpu / base.cpu:6.2f} times ours"
         )
 
@@ -113,27 +115,23 @@ def at_error(each: Baker, aim: float, what: str) -> float:
     return float(np.exp(low + share * (high - low)))
 
 
-def illum(path: Path, truth: np.ndarray) -> Baker:
-    """This program: all that `illum ao-bake` does between reading and writing."""
+def illum(path: Path, truth: np.ndarray, is_reconstructed: bool = False) -> Baker:
+    """This program: all that `illum ao-bake`, with `--reconstruct` or without, does between reading and
+    writing."""
     loaded = mesh_alone(path)
     surfaces, _ = surfaces_of(loaded.scene, loaded)
     geometry = surfaces.geometry
-    settings = BakeSettings()
 
     def bake(rays: int) -> np.ndarray:
-        points = vertex_points(surfaces).points
+        settings = BakeSettings(samples=rays, reconstruct=is_reconstructed)
         method = Method(rays, settings.obscurance().falloff, geometry.render_space.radius)
         occluders = occluders_of(loaded.scene, geometry, settings)
-        made = BakeSampler(points, occluders, method, 0, THREADS, no_progress)
-        lanes = np.flatnonzero(~made.open_points())
-        counts = RayCounts(lanes, np.full(len(lanes), rays))
-        w = np.ones(len(points.key))
-        found = made.estimate("values", counts, 0).values
-        w[lanes] = found.w
-        made.errors(counts, 1 << 20).law.at(found.neighbor_variation, rays)
-        return w
+        journal = Journal(Path(os.devnull) / "none", "00")  # keeps nothing
+        return sampled_at_vertices(
+            BakeContext(surfaces, occluders, method, settings, THREADS, no_progress, StageClock(), journal)
+        ).w
 
-    return Baker("illum", bake, truth)
+    return Baker("illum, fitted" if is_reconstructed else "illum", bake, truth)
 
 
 def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> list[Baker]:
@@ -195,7 +193,7 @@ def pymeshlab_filter(vertices, faces, number, few) -> Baker:
         meshes = pymeshlab.MeshSet()
         meshes.add_mesh(pymeshlab.Mesh(vertices.astype(float), faces.astype(np.int32)))
         meshes.compute_scalar_ambient_occlusion(rays=rays)
-        values = meshes.current_mesh().vertex_scalar_array()[number]
+        values = meshes.current_mesh().vertex_scalar_array()[number % len(vertices)]
         return values / values.max()
 
     return Baker("PyMeshLab", bake, bake(FINEST)[few])

@@ -30,7 +30,7 @@ PAIRS = 1 << 20
 MAX_TRIALS = 8
 AIM = 0.93
 """What the next trial aims at, as a share of the error asked for: an audit knows the error to 5 %."""
-SLOPE, FLATTEST, STEEPEST = 0.53, 0.35, 0.9
+SLOPE, FLATTEST, STEEPEST = 0.57, 0.35, 0.9
 """Error falls like this power of the rays: as expected, and the bounds of what two trials may say."""
 
 LEAST_GROWTH, MOST_GROWTH = 1.25, 32.0

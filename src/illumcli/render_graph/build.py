@@ -39,7 +39,7 @@ from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.shading.grain import tangents
 from illumcli.shading.materials import material, material_id
-from illumcli.shading.rates import RATES, normal, obscurance_normals, point_weights, points
+from illumcli.shading.rates import RATES, normal, normals_of_points, obscurance_normals, point_weights, points
 from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
 from illumcli.visibility.object_pixels import object_pixels, pixel_pairs
@@ -190,7 +190,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         ]
     return [
         Node.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
-        Node.of(partial(obscurance_normals, tuple(needs.rates(scene))), "obscurance_normals"),
+        _obscurance_normals(scene),
         Node.of(triangle_normals),
         Node.of(partial(obscurance_method, settings), "obscurance_method", **by_face),
         Node.of(stages.view_method),
@@ -202,6 +202,14 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         Node.of(baked_obscurance),
         *nodes,
     ]
+
+
+def _obscurance_normals(scene: Scene) -> Node:
+    """The axes of the hemispheres: the normals of shading points, where these are the samples."""
+    rates = tuple(needs.rates(scene))
+    if all(RATES[rate].at_samples for rate in rates):
+        return Node.of(normals_of_points, "obscurance_normals")
+    return Node.of(partial(obscurance_normals, rates), "obscurance_normals")
 
 
 def _about_shading(scene: Scene) -> bool:

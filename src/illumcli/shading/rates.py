@@ -173,6 +173,11 @@ def obscurance_normals(rates: Sequence[Rate], shading_context: ShadingContext) -
     return _sample_normals(shading_context, _rate_of_samples(rates, shading_context))
 
 
+def normals_of_points(points: ShadingPoints) -> Vectors:
+    """(M, 3) the same where every object is shaded at the samples: the normals that it is shaded with."""
+    return points.n
+
+
 def _rate_of_samples(rates: Sequence[Rate], context: ShadingContext) -> NDArray[np.int8]:
     """(M,) row in `RATES` of the rate of each sample's object."""
     number = np.array([list(RATES).index(name) for name in rates], np.int8)

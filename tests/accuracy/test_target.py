@@ -84,15 +84,21 @@ def test_nothing_to_reach_and_too_much(scene):
         choose_sampling(scene, 1e-9)
 
 
-def test_the_command_chooses_renders_and_reports(illum, scene, tmp_path):
-    words = ("--target-error", "0.05", "-o", "ring.exr", "--report", "r.json", "--force")
+@pytest.mark.parametrize("reconstruct", ["null", "false"])
+def test_the_command_chooses_renders_and_reports(illum, scene, tmp_path, reconstruct):
+    own = ("-D", f"obscurance.reconstruct={reconstruct}")
+    words = (*own, "--target-error", "0.05", "-o", "ring.exr", "--report", "r.json", "--force")
     done = illum("render", "ring.yaml", *words)
     assert (done.returncode, done.stdout) == (0, "ring.exr\n")
     error = json.loads((tmp_path / "r.json").read_text())["error"]
     assert error["target"] == 0.05
     assert 0 < error["reached"] < 0.06
     counts = (f"film.samples={error['pixel_samples']}", f"obscurance.samples={error['obscurance_samples']}")
-    again = illum("render", "ring.yaml", "-D", counts[0], "-D", counts[1], "-o", "again.exr")
+    assert error["reconstructed"] == (reconstruct == "null")
+    assert all(count in done.stderr for count in counts)
+    fitted = f"obscurance.reconstruct={str(error['reconstructed']).lower()}"
+    chosen = [word for count in (*counts, fitted) for word in ("-D", count)]
+    again = illum("render", "ring.yaml", *chosen, "-o", "again.exr")
     assert again.returncode == 0
     same = illum("compare", "ring.exr", "again.exr", "--no-flip", "--max-difference", "0")
     assert same.returncode == 0, same.stdout

@@ -90,13 +90,18 @@ class Audit(Record):
     layer: Layer
     seed: int
     candidates: Candidates
+    camera_samples: int | None
+    """Of each of C and D, over the pixel filter; None: at the places of the picture's own."""
+    precision: float = PRECISION
     taken: list[tuple[NDArray[np.intp], NDArray[np.float64]]] = field(default_factory=list)
     """Numbers of candidates and the picture's values there, (K, channels)."""
 
     @classmethod
     def of(cls, plan: Plan, layer: Layer, seed: int) -> Audit:
-        """The audit of a layer of a plan, at pixels that the seed draws."""
-        return cls(plan, layer, seed, Candidates.of(plan.view, seed))
+        """The audit of a layer of a plan, antialiased as the plan does it, at pixels that the seed draws."""
+        several = plan.view.samples > 1
+        camera_samples = max(plan.view.samples, CAMERA_SAMPLES) if several else None
+        return cls(plan, layer, seed, Candidates.of(plan.view, seed), camera_samples)
 
     def take(self, tile: Tile, layers: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a finished tile at the candidates; any thread."""
@@ -135,7 +140,7 @@ class Audit(Record):
         counts = counts_by_block(
             self.candidates.smoothed(np.square(products).reshape(PILOT, -1).mean(axis=0)),
             share,
-            2 * PRECISION * square,
+            2 * self.precision * square,
             max(BUDGET // (2 * rays), len(share)),
         )
         block = np.repeat(np.arange(len(share)), counts)
@@ -163,7 +168,8 @@ class Audit(Record):
         self, which: NDArray[np.intp], rays: int, purpose: str, buffers: dict[str, Any], run: Run
     ) -> NDArray[np.float64]:
         """(K, channels) the layer at some candidates, not reconstructed, with random numbers of its own."""
-        plan = fresh_plan(self.plan, self.layer, rays, stream(self.seed, f"audit:{purpose}"))
+        seed = stream(self.seed, f"audit:{purpose}")
+        plan = fresh_plan(self.plan, self.layer, rays, seed, self.camera_samples)
         for node in plan.once:
             if node.output not in buffers or node.output == "obscurance_method":
                 buffers[node.output] = node.run(buffers)
@@ -242,18 +248,25 @@ def audited_layer(plan: Plan) -> Layer | None:
     return min(means, key=lambda layer: layer.buffer != "beauty", default=None)
 
 
-def fresh_plan(plan: Plan, layer: Layer, rays: int, seed: int) -> Plan:
-    """The plan of one layer that is not reconstructed, with so many obscurance rays per pixel."""
-    view, scene = plan.view, plan.graph.scene
+def fresh_plan(plan: Plan, layer: Layer, rays: int, seed: int, camera_samples: int | None) -> Plan:
+    """The plan of one layer that is not reconstructed, with so many obscurance rays per pixel.
+
+    Parameters
+    ----------
+    camera_samples : int, optional
+        Over the pixel filter; by default those of `plan`, at their places.
+    """
+    view, scene, nodes = plan.view, plan.graph.scene, plan.graph.nodes
     assert scene.obscurance is not None
-    camera_samples = 1 if view.samples == 1 else max(view.samples, CAMERA_SAMPLES)
-    settings = scene.obscurance.model_copy(update={"samples": max(1, rays // camera_samples)})
-    nodes = plan.graph.nodes
-    changed = (
-        Node.of(partial(samples, seed), "samples"),
+    each = max(1, rays // (camera_samples or view.samples))
+    settings = scene.obscurance.model_copy(update={"samples": each, "reconstruct": None})
+    changed = [
         Node.of(partial(replicated_draws, seed), "obscurance_draws"),
         replace(nodes["obscurance_method"], function=partial(obscurance_method, settings)),
         replace(nodes["raw_obscurance"], output="obscurance"),
-    )
+    ]
+    if camera_samples is not None:
+        changed.append(Node.of(partial(samples, seed), "samples"))
+        view = replace(view, samples=camera_samples)
     graph: Graph = replace(plan.graph, nodes={**nodes, **{node.output: node for node in changed}}, loaders={})
-    return schedule(graph, [layer], replace(view, samples=camera_samples))
+    return schedule(graph, [layer], view)

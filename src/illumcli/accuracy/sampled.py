@@ -34,6 +34,8 @@ class Sampling(Value):
     obscurance: int  # rays per sample
     sampler: str
     seed: int
+    reconstruct: bool = False
+    """Is obscurance fitted to the surface?"""
 
     @property
     def rays(self) -> int:
@@ -76,7 +78,11 @@ class SampledLayer(Record):
         """The plan at a sampling; computes the buffers of the whole scene."""
         update: dict[str, Any] = {"seed": sampling.seed}
         if self.scene.obscurance is not None:
-            finer = {"samples": sampling.obscurance, "sampler": sampling.sampler}
+            finer = {
+                "samples": sampling.obscurance,
+                "sampler": sampling.sampler,
+                "reconstruct": sampling.reconstruct,
+            }
             update["obscurance"] = self.scene.obscurance.model_copy(update=finer)
         graph = build(self.scene.model_copy(update=update), self.loaded)
         outputs = outputs_of(graph.scene, [self.layer.name])

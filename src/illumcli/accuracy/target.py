@@ -12,12 +12,13 @@ Kirk, D. and Arvo, J. (1991). Unbiased sampling techniques for image synthesis. 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from illumcli.accuracy.audit import AuditedError
 from illumcli.accuracy.sampled import SampledLayer, Sampling, sampled_layer
 from illumcli.errors import InputError, LimitError
 from illumcli.rays.sampling import stream
@@ -26,6 +27,7 @@ from illumcli.render_graph.build import build
 from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.schedule import outputs_of, reached
 from illumcli.scene.load import load
+from illumcli.scene.spec import Scene
 
 MIN_PIXELS, FILM_SHARE = 4000, 50
 """Pixels that a pilot renders twice: one in 50 of the film, but at least 4000, since few contain edges."""
@@ -78,18 +80,16 @@ class SamplingChoice(Record):
 
     @property
     def overrides(self) -> tuple[str, ...]:
-        """The counts in the form of `-D`."""
-        overrides = [f"film.samples={self.sampling.pixel}"]
+        """The counts as `-D` overrides."""
         scene = self.layers[0].scene
-        if scene.film.adaptive is not False:  # the choice is for images without adaptive sampling
-            overrides.append("film.adaptive=false")
-        for name, camera in scene.named_cameras().items():
-            if camera.samples is not None:
-                path = f"cameras.{name}" if scene.cameras else "camera"
-                overrides.append(f"{path}.samples={self.sampling.pixel}")
-        if self.sampling.obscurance:
-            overrides.append(f"obscurance.samples={self.sampling.obscurance}")
-        return tuple(overrides)
+        counts = count_overrides(scene, self.sampling.pixel, self.sampling.obscurance)
+        fitted = scene.obscurance is not None and scene.obscurance.reconstruct
+        return (*counts, "obscurance.reconstruct=false") if fitted else counts
+
+    @property
+    def audited(self) -> Mapping[str, AuditedError]:
+        """Nothing is reconstructed."""
+        return {}
 
     def reached(self) -> float:
         """RMSE of the image, the largest over the cameras: one in 50 of its pixels is rendered again, with
@@ -106,8 +106,23 @@ class SamplingChoice(Record):
             "expected": self.expected,
             "pixel_samples": self.sampling.pixel,
             "obscurance_samples": self.sampling.obscurance,
+            "reconstructed": False,
             "pilot_rays": self.pilot_rays,
         }
+
+
+def count_overrides(scene: Scene, pixel: int, obscurance: int) -> tuple[str, ...]:
+    """`-D` overrides for samples per pixel and, unless 0, obscurance rays per sample, of all cameras."""
+    overrides = [f"film.samples={pixel}"]
+    if scene.film.adaptive is not False:  # the choice is for images without adaptive sampling
+        overrides.append("film.adaptive=false")
+    for name, camera in scene.named_cameras().items():
+        if camera.samples is not None:
+            place = f"cameras.{name}" if scene.cameras else "camera"
+            overrides.append(f"{place}.samples={pixel}")
+    if obscurance:
+        overrides.append(f"obscurance.samples={obscurance}")
+    return tuple(overrides)
 
 
 def choose_sampling(

@@ -42,11 +42,13 @@ def render_scene(job: RenderJob, progress: Progress = no_progress) -> tuple[list
     return paths, replace(report, total_seconds=time.perf_counter() - start)
 
 
-def render_prepared(work: Work, progress: Progress = no_progress) -> tuple[list[Path], Report]:
-    """The same for a scene that was loaded and planned already."""
+def render_prepared(
+    work: Work, progress: Progress = no_progress, memory: MemoryCache | None = None
+) -> tuple[list[Path], Report]:
+    """The same for a scene that was loaded and planned already; `memory` may hold some of its buffers."""
     start = time.perf_counter()
     store = open_store() if work.job.options.cache else None
-    report = rendered(work, Cache(store, MemoryCache()), progress)
+    report = rendered(work, Cache(store, memory or MemoryCache()), progress)
     warnings = [*report.warnings, *unused_keys(work)]
     if store is not None:
         store.finish()

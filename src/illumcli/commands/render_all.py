@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from illumcli.cache.fingerprint import digest
+from illumcli.cache.memory import MemoryCache
+from illumcli.cache.store import open_store
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_prepared
@@ -16,6 +20,10 @@ from illumcli.commands.work import Work, prepared
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress
 from illumcli.records import Value
+
+if TYPE_CHECKING:
+    from illumcli.accuracy.reconstructed_target import ReconstructedChoice
+    from illumcli.accuracy.target import SamplingChoice
 
 
 class Rendered(Value):
@@ -78,16 +86,35 @@ def _files(works: dict[int, Work]) -> list[tuple[Path, str]]:
 def _rendered(work: Work, progress: Progress) -> Rendered:
     """A scene rendered, with as many samples as the error that is asked for takes."""
     start = time.perf_counter()
-    job, options, choice = work.job, work.job.options, None
-    if options.target_error is not None:
-        from illumcli.accuracy.target import choose_sampling
+    job, options = work.job, work.job.options
+    if options.target_error is None:
+        paths, report = render_prepared(work, progress)
+        return Rendered(job.scene, paths, report)
+    choice, memory = _choice(job, options.target_error)
+    overrides = (*options.overrides, *choice.overrides)
+    work = prepared(replace(job, options=replace(options, overrides=overrides, audit=False)))
+    paths, report = render_prepared(work, progress, memory)
+    report = replace(
+        report,
+        error=choice.as_data(),
+        audited_error={camera: error.as_data() for camera, error in choice.audited.items()},
+        total_seconds=time.perf_counter() - start,
+    )
+    return Rendered(job.scene, paths, report, choice.overrides)
 
-        choice = choose_sampling(
-            job.scene, options.target_error, options.overrides, options.only, options.seed, options.threads
-        )
-        overrides = (*options.overrides, *choice.overrides)
-        work = prepared(replace(job, options=replace(options, overrides=overrides)))
-    paths, report = render_prepared(work, progress)
-    error = choice.as_data() if choice is not None else {}
-    report = replace(report, error=error, total_seconds=time.perf_counter() - start)
-    return Rendered(job.scene, paths, report, choice.overrides if choice else ())
+
+def _choice(job: RenderJob, target: float) -> tuple[SamplingChoice | ReconstructedChoice, MemoryCache]:
+    """Counts for a target error, reconstructed where that reaches it, and buffers that are computed
+    already."""
+    from illumcli.accuracy.reconstructed_target import Attempts, choose_reconstruction
+    from illumcli.accuracy.target import choose_sampling
+
+    options = job.options
+    threads = options.threads or len(os.sched_getaffinity(0))
+    store = open_store() if options.cache else None
+    attempts = Attempts(job.scene, options.overrides, options.only, options.seed, threads, store)
+    reconstructed = choose_reconstruction(attempts, target)
+    if reconstructed is not None:
+        return reconstructed, reconstructed.memory
+    raw = choose_sampling(job.scene, target, options.overrides, options.only, options.seed, options.threads)
+    return raw, MemoryCache()

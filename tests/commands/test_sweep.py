@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gc
 import json
 import os
 import re
@@ -10,12 +11,15 @@ from collections import Counter
 
 import pytest
 
+from illumcli.cache import fingerprint
+from illumcli.cache.fingerprint import file_digest as digest
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
 from illumcli.errors import InputError, OutputError
 from illumcli.graph import Node, short_name
 from illumcli.images.reader import read_image
+from illumcli.scene.spec import Scene
 from illumcli.scene.variants import variants_of
 
 SCENE = """
@@ -108,6 +112,33 @@ def test_what_no_variant_changes_is_computed_once(scene, tmp_path, runs, change,
     sweep_scene(scene, variants_of([change]), options)
     assert {name: runs[name] for name in once} == {name: 2 if name == "mesh" else 1 for name in once}
     assert runs["samples"] >= 3 or runs["hits"] >= 3
+
+
+def test_many_variants_hold_no_scene(scene, tmp_path):
+    options = RenderOptions(pattern=str(tmp_path / "{ambient}.png"), cache=False)
+    done = sweep_scene(scene, variants_of(["ambient=0.1:0.6:6"]), options)
+    gc.collect()
+    assert sum(isinstance(each, Scene) for each in gc.get_objects()) == 0
+    first, *others = [outcome.report for outcome in done.outcomes[1:-1]]
+    assert all(report.skipped is first.skipped and report.reused is first.reused for report in others)
+
+
+def test_what_others_write_to_the_scene_and_its_mesh_meanwhile_is_not_seen(tmp_path, monkeypatch):
+    read = []
+    monkeypatch.setattr(fingerprint, "file_digest", lambda path: read.append(path.name) or digest(path))
+    mesh = tmp_path / "a.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scene = tmp_path / "a.yaml"
+    scene.write_text("version: 1\nfilm: {width: 8, height: 8}\nambient: 0.1\nobjects: [{mesh: a.obj}]\n")
+    options = RenderOptions(pattern=str(tmp_path / "{film.exposure}.png"), cache=False)
+
+    def changed(outcome):
+        for path in (mesh, scene):
+            path.write_text("no longer")
+
+    done = sweep_scene(scene, variants_of(["film.exposure=0,1,2,3"]), options, written=changed)
+    assert [outcome.error for outcome in done.outcomes] == [None] * 4
+    assert read == ["a.obj"] * 2  # before the first variant, and once its mesh is read
 
 
 def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):

@@ -100,6 +100,22 @@ class FileFingerprint(Value):
         return "digest" in vars(self) and FileFingerprint(self.locate, self.beside).digest != self.digest
 
 
+class FileFingerprints:
+    """The fingerprints of a scene's files by path. Variants of a sweep share them: each file is read once for
+    all of them, and none sees another content than the first."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, Callable[[Path], Iterable[Path]]], FileFingerprint] = {}
+
+    def of(
+        self, path: str, locate: Callable[[str], Path], beside: Callable[[Path], Iterable[Path]] = _none
+    ) -> FileFingerprint:
+        """The fingerprint of the file that the scene means by `path`."""
+        if (path, beside) not in self._known:
+            self._known[path, beside] = FileFingerprint(partial(locate, path), beside)
+        return self._known[path, beside]
+
+
 def file_digest(path: Path) -> str:
     """BLAKE2b-128 of a file, 32 hexadecimal digits.
 

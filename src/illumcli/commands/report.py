@@ -60,6 +60,15 @@ class Report(Value):
             ray_loop=ray_loop_name() if any(stats.rays.values()) else None,
         )
 
+    def sharing(self, other: Report | None) -> Report:
+        """This report, without memory of its own for what it says just as another does."""
+        equal = {
+            part.name: getattr(other, part.name)
+            for part in fields(self)
+            if other is not None and getattr(self, part.name) == getattr(other, part.name)
+        }
+        return replace(self, **equal)
+
     def as_data(self) -> dict[str, Any]:
         """The report as JSON has it, with versions and the peak of memory."""
         data = {part.name: getattr(self, part.name) for part in fields(self)} | repairs_data(self.repairs)

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property, partial
 from pathlib import Path
 
+from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.store import open_store
 from illumcli.commands.batch import Batch
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import rendered
+from illumcli.commands.report import Report
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
-from illumcli.commands.sweep_outcome import Outcome, SweepResult
-from illumcli.commands.work import Work, prepared, unused_keys
+from illumcli.commands.sweep_outcome import Outcome, PlannedVariant, SweepResult
+from illumcli.commands.sweep_reference import channel_count
+from illumcli.commands.work import Work, unused_keys, work_of
+from illumcli.errors import IllumError
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress, no_progress
+from illumcli.scene.load import SceneText, load, read_text
 from illumcli.scene.variants import Variant
 
 
@@ -47,14 +54,16 @@ def sweep_scene(
     batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
     # faults that can be known before the first ray
-    outcomes = _prepared(path, variants, options, batch, written)
+    works = _Works(path, replace(options, pattern=options.pattern or default_pattern(variants)))
+    outcomes, warnings = _planned(works, variants, batch, written)
     if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
     planned = plan_files(files, outcomes, options.force)
 
     # the images
-    outcomes, warnings = _rendered(outcomes, options, batch, progress, written)
+    outcomes, of_images = _rendered(works, outcomes, batch, progress, written)
+    warnings += of_images
     seconds = time.perf_counter() - start
 
     # the files about all of them
@@ -66,62 +75,113 @@ def sweep_scene(
     return SweepResult(tuple(outcomes), planned.kept if has_images else (), tuple(warnings), seconds)
 
 
-def _prepared(
-    path: Path,
-    variants: Sequence[Variant],
-    options: RenderOptions,
-    batch: Batch,
-    written: Callable[[Outcome], None],
-) -> list[Outcome]:
-    """Plan every variant that has no fault."""
-    pattern = options.pattern or default_pattern(variants)
-    refuse_equal_names(variants, pattern)
+class _Works:
+    """Makes the work of a variant when it is asked for. The scene and the files that it names are read once
+    for all variants: what others write to them meanwhile is not seen."""
+
+    def __init__(self, path: Path, options: RenderOptions) -> None:
+        self._path = path
+        self.options = options
+        self._files = FileFingerprints()
+
+    @cached_property
+    def _text(self) -> SceneText:
+        return read_text(self._path)
+
+    def of(self, variant: Variant) -> Work:
+        """What rendering a variant takes."""
+        overrides = tuple(variant.overrides)
+        own = replace(self.options, overrides=overrides, audit=False)
+        job = RenderJob(self._path, own, {"frame": variant.frame})
+        return work_of(job, load(self._path, overrides, self._text), self._files)
+
+
+def _planned(
+    works: _Works, variants: Sequence[Variant], batch: Batch, written: Callable[[Outcome], None]
+) -> tuple[list[Outcome], list[str]]:
+    """The outcomes with what every variant will make, where it has no fault, and warnings of the scene that
+    hold in all of them."""
+    assert works.options.pattern is not None
+    refuse_equal_names(variants, works.options.pattern)
+    warnings: list[str] | None = None
 
     def planned(outcome: Outcome) -> Outcome:
-        overrides = tuple(outcome.variant.overrides)
-        own = replace(options, pattern=pattern, overrides=overrides, audit=False)
-        job = RenderJob(path, own, {"frame": outcome.variant.frame})
-        work = prepared(job)
-        return replace(outcome, work=work, is_due=bool(work.due()))
+        nonlocal warnings
+        work = works.of(outcome.variant)
+        outcome = replace(outcome, planned=_facts(work))
+        told = unused_keys(work)
+        warnings = told if warnings is None else [line for line in warnings if line in told]
+        return outcome
 
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
-    return [_attempt(outcome, planned, batch, written) for outcome in outcomes]
+    outcomes = [_attempt(outcome, planned, batch, written) for outcome in outcomes]
+    return outcomes, warnings or []
+
+
+def _facts(work: Work) -> PlannedVariant:
+    """What is known of a variant before it is rendered."""
+    first = work.targets[0]
+    return PlannedVariant(
+        paths=tuple(target.path for target in work.targets),
+        content=work.content,
+        image_content=first.content,
+        height=first.view.height,
+        width=first.view.width,
+        channels=channel_count(work.development.channels(first)),
+        exposure=work.scene.film.exposure,
+        is_due=bool(work.due()),
+    )
 
 
 def _rendered(
+    works: _Works,
     outcomes: Sequence[Outcome],
-    options: RenderOptions,
     batch: Batch,
     progress: Progress,
     written: Callable[[Outcome], None],
 ) -> tuple[list[Outcome], list[str]]:
     """The outcomes with their reports, and warnings."""
-    store, memory = open_store() if options.cache else None, MemoryCache()
+    store, memory = open_store() if works.options.cache else None, MemoryCache()
     cache = Cache(store, memory)
     done = list(outcomes)
+    following = _following(done)
+    ahead: dict[int, Work] = {}
+    last: Report | None = None
+
+    def images(own: Work | None, other: Work | None, outcome: Outcome) -> Outcome:
+        report = rendered(own or works.of(outcome.variant), cache, progress, other)
+        outcome = replace(outcome, report=report.sharing(last))
+        written(outcome)
+        return outcome
 
     # one variant after the other; buffers that the next one reads stay in memory
     for index in batch.due():
-        following = next((done[k].work for k in range(index + 1, len(done)) if done[k].is_due), None)
-
-        def images(outcome: Outcome, following: Work | None = following) -> Outcome:
-            assert outcome.work is not None
-            outcome = replace(outcome, report=rendered(outcome.work, cache, progress, following))
-            written(outcome)
-            return outcome
-
-        done[index] = _attempt(done[index], images, batch, written)
+        own, number = ahead.pop(index, None), following[index]
+        if number is not None and number not in ahead:
+            with suppress(IllumError):  # it is told in its turn
+                ahead[number] = works.of(done[number].variant)
+        step = partial(images, own, None if number is None else ahead.get(number))
+        done[index] = _attempt(done[index], step, batch, written)
+        last = done[index].report or last
         memory.retire()
 
-    # warnings of the scene hold in all variants, those of images in any
-    works = [outcome.work for outcome in done if outcome.work]
-    warnings = _in_all([unused_keys(work) for work in works])
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
-    warnings += dict.fromkeys(of_images)
+    warnings = list(dict.fromkeys(of_images))
     if store is not None:
         store.finish()
         warnings += [store.warning] if store.warning else []
     return done, warnings
+
+
+def _following(outcomes: Sequence[Outcome]) -> list[int | None]:
+    """For each variant, the index of the next one that is due."""
+    found: list[int | None] = []
+    upcoming: int | None = None
+    for index in reversed(range(len(outcomes))):
+        found.append(upcoming)
+        planned = outcomes[index].planned
+        upcoming = index if planned is not None and planned.is_due else upcoming
+    return found[::-1]
 
 
 def _attempt(
@@ -136,9 +196,3 @@ def _attempt(
     failed = replace(outcome, error=batch.failures[outcome.number - 1])
     written(failed)
     return failed
-
-
-def _in_all(groups: Sequence[Sequence[str]]) -> list[str]:
-    """The lines of the first group that are in every other too."""
-    common = set(groups[0]).intersection(*groups) if groups else set()
-    return [line for line in groups[0] if line in common] if groups else []

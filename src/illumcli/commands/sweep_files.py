@@ -88,12 +88,12 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
                 dict(outcome.variant.values),
                 outcome.variant.frame,
                 [str(path) for path in outcome.paths],
-                outcome.work.content,
+                outcome.planned.content,
                 reference.content if reference else None,
             )
         )
         for outcome in outcomes
-        if outcome.work is not None
+        if outcome.planned is not None
     }
     each = [contents.get(outcome.number, INCOMPLETE) for outcome in outcomes]
     held = (

@@ -5,10 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 
 from illumcli.commands.report import Report
-from illumcli.commands.work import Work
 from illumcli.errors import IllumError
-from illumcli.records import Record
+from illumcli.records import Record, Value
 from illumcli.scene.variants import Variant
+
+
+class PlannedVariant(Value):
+    """What is known of a variant before it is rendered. It holds no scene: a sweep has up to 100,000."""
+
+    paths: tuple[Path, ...]
+    content: str
+    """Hash of all that the pixels of its images depend on."""
+    image_content: str
+    """The same of its first image."""
+    height: int
+    width: int
+    channels: int
+    """Of the first image: 3 for colours, else 1."""
+    exposure: float
+    is_due: bool
+    """Is some image not there yet with the same content?"""
 
 
 class Outcome(Record):
@@ -17,10 +33,8 @@ class Outcome(Record):
     number: int
     """From 1."""
     variant: Variant
-    work: Work | None = None
+    planned: PlannedVariant | None = None
     """None where the scene has a fault with these values."""
-    is_due: bool = False
-    """Is some image not there yet with the same content?"""
     report: Report | None = None
     """Once it is rendered, or kept."""
     error: IllumError | None = None
@@ -31,9 +45,9 @@ class Outcome(Record):
         return self.variant.label or f"variant {self.number}"
 
     @property
-    def paths(self) -> list[Path]:
+    def paths(self) -> tuple[Path, ...]:
         """The images of the variant."""
-        return [target.path for target in self.work.targets] if self.work else []
+        return self.planned.paths if self.planned else ()
 
 
 class SweepResult(Record):

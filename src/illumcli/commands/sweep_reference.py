@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.cache.fingerprint import file_digest
-from illumcli.commands.sweep_outcome import Outcome
-from illumcli.commands.work import Work
+from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
 from illumcli.errors import InputError, OutputError
 from illumcli.records import Record, Value
 
@@ -45,11 +44,10 @@ def reference_of(text: str, outcomes: Sequence[Outcome]) -> Reference:
     InputError
         It is not there, is no image, or differs in size or kind from that of some variant.
     """
-    works = {outcome.number: outcome.work for outcome in outcomes if outcome.work is not None}
-    number = _variant_number(text, len(outcomes), works)
+    variants = {each.number: each.planned for each in outcomes if each.planned is not None}
+    number = _variant_number(text, len(outcomes), variants)
     if number is not None:
-        work = works[number]
-        kind, reference = _kind(work), Reference(work.targets[0].content, number)
+        kind, reference = _kind(variants[number]), Reference(variants[number].image_content, number)
     else:
         pixels, encoded = colors(Path(text))
         height, width, count = pixels.shape
@@ -57,30 +55,29 @@ def reference_of(text: str, outcomes: Sequence[Outcome]) -> Reference:
             _Kind(height, width, count, encoded),
             Reference(file_digest(Path(text)), None, pixels),
         )
-    for work in works.values():
-        if fault := _difference(_kind(work), kind):
-            name = f"--reference {text}: {work.targets[0].path}"
+    for variant in variants.values():
+        if fault := _difference(_kind(variant), kind):
+            name = f"--reference {text}: {variant.paths[0]}"
             raise InputError(f"{name} {fault}; take a picture of the same kind and size")
     return reference
 
 
-def _variant_number(text: str, count: int, works: dict[int, Work]) -> int | None:
+def _variant_number(text: str, count: int, variants: dict[int, PlannedVariant]) -> int | None:
     """The number of the variant that `text` names; None where it names another file."""
     if text.isascii() and text.isdecimal() and len(text) <= MAX_DIGITS:
         number = int(text)
         if not 1 <= number <= count:
             raise InputError(f"--reference {text}: there are variants 1 to {count}")
-        if number not in works:
+        if number not in variants:
             raise InputError(f"--reference {text}: this variant has a fault; take another")
         return number
-    return next((each for each, work in works.items() if work.targets[0].path == Path(text)), None)
+    return next((each for each, variant in variants.items() if variant.paths[0] == Path(text)), None)
 
 
-def _kind(work: Work) -> _Kind:
+def _kind(variant: PlannedVariant) -> _Kind:
     """Of a variant's first image."""
-    target = work.targets[0]
-    count = _channel_count(work.development.channels(target))
-    return _Kind(target.view.height, target.view.width, count, target.path.suffix.lower() == ".png")
+    encoded = variant.paths[0].suffix.lower() == ".png"
+    return _Kind(variant.height, variant.width, variant.channels, encoded)
 
 
 def _difference(kind: _Kind, reference: _Kind) -> str:
@@ -96,7 +93,8 @@ def _difference(kind: _Kind, reference: _Kind) -> str:
     return ""
 
 
-def _channel_count(names: Collection[str]) -> int:
+def channel_count(names: Collection[str]) -> int:
+    """3 where an image with these channels has colours, else 1: its first channel."""
     return 3 if {"R", "G", "B"} <= set(names) else 1
 
 
@@ -106,7 +104,7 @@ def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
     from illumcli.images.reader import read_image
 
     image = read_image(path)
-    names = ("R", "G", "B") if _channel_count(image.channels) == 3 else (next(iter(image.channels)),)
+    names = ("R", "G", "B") if channel_count(image.channels) == 3 else (next(iter(image.channels)),)
     return np.stack([image.channels[name] for name in names], axis=-1), image.encoded
 
 

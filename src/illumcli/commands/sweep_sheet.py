@@ -21,10 +21,10 @@ def refuse_large_sheet(path: Path, outcomes: Sequence[Outcome]) -> None:
     memory."""
     from illumcli.images.contact_sheet import CELL_WIDTH
 
-    views = [outcome.work.targets[0].view for outcome in outcomes if outcome.work is not None]
-    tallest = max((CELL_WIDTH * view.height // view.width for view in views), default=0)
-    size = SHEET_BYTES * len(views) * CELL_WIDTH * (tallest + CELL_WIDTH // 8)
-    what = f"{path}: a sheet of {len(views)} pictures, {CELL_WIDTH} x {tallest} pixels each"
+    images = [outcome.planned for outcome in outcomes if outcome.planned is not None]
+    tallest = max((CELL_WIDTH * image.height // image.width for image in images), default=0)
+    size = SHEET_BYTES * len(images) * CELL_WIDTH * (tallest + CELL_WIDTH // 8)
+    what = f"{path}: a sheet of {len(images)} pictures, {CELL_WIDTH} x {tallest} pixels each"
     refuse_beyond(size, what, "leave --sheet out, or sweep in parts")
 
 
@@ -41,8 +41,8 @@ def _display_values(outcome: Outcome) -> NDArray[np.uint8]:
     """(H, W, 1 or 3) the first image of a variant as a screen shows it."""
     from illumcli.film.encode import picture
 
-    assert outcome.work is not None
+    assert outcome.planned is not None
     pixels, encoded = written_colors(outcome.paths[0])
     if encoded:
         return np.rint(pixels * 255).astype(np.uint8)
-    return picture(pixels, outcome.work.scene.film.exposure, 8, str(outcome.paths[0]))
+    return picture(pixels, outcome.planned.exposure, 8, str(outcome.paths[0]))

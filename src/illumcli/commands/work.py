@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from illumcli.cache.fingerprint import digest
+from illumcli.cache.fingerprint import FileFingerprints, digest
 from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
 from illumcli.files.names import check_unique, expand
@@ -82,11 +82,11 @@ def prepared(job: RenderJob) -> Work:
     return work_of(job, load(job.scene, job.options.overrides))
 
 
-def work_of(job: RenderJob, loaded: SceneFile) -> Work:
-    """The same for a scene that was loaded already."""
+def work_of(job: RenderJob, loaded: SceneFile, files: FileFingerprints | None = None) -> Work:
+    """The same for a scene that was loaded already; its variants share the fingerprints of `files`."""
     options = job.options
     scene = loaded.scene if options.seed is None else loaded.scene.model_copy(update={"seed": options.seed})
-    graph, outputs = build(scene, loaded), outputs_of(scene, options.only)
+    graph, outputs = build(scene, loaded, files), outputs_of(scene, options.only)
     refuse_rays(graph, outputs)
     targets = image_set(job, loaded, graph, outputs)
     return Work(job, loaded, graph, outputs, tuple(targets))

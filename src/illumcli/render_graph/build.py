@@ -11,6 +11,7 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
+from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.film.view import View, depth, rays, samples, view_vectors
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import polygon_centres, scene_uvs, triangle_normals
@@ -92,18 +93,24 @@ class Graph(Value):
         return replace(self, loaders={})
 
 
-def build(scene: Scene, loaded: SceneFile) -> Graph:
+def build(scene: Scene, loaded: SceneFile, files: FileFingerprints | None = None) -> Graph:
     """The graph of a scene. Reads no mesh, runs nothing.
 
     A node binds only those parts of the scene that its buffer depends on: they are its key in the cache
     (`render_graph.keys`). The buffers `view` and `tile` are given.
+
+    Parameters
+    ----------
+    files : FileFingerprints, optional
+        Those that variants of the scene share.
     """
+    files = files or FileFingerprints()
     nodes = [
-        *geometry_nodes(scene, loaded),
+        *geometry_nodes(scene, loaded, files),
         *_surface_nodes(scene),
-        *_obscurance_nodes(scene, loaded),
+        *_obscurance_nodes(scene, loaded, files),
         *_data_nodes(),
-        *material_nodes(scene, loaded),
+        *material_nodes(scene, loaded, files),
         *light_nodes(scene),
         *sum_nodes(scene),
         *_camera_nodes(scene),
@@ -166,11 +173,11 @@ def _data_nodes() -> list[Node]:
     ]
 
 
-def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+def _obscurance_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> list[Node]:
     """Nodes of obscurance, traced or baked."""
     # Which inputs w has.
-    files = baked_files(scene, loaded)
-    some_baked = any(file for _, file in files)
+    values = baked_files(scene, loaded, files)
+    some_baked = any(file for _, file in values)
     settings = scene.obscurance or Obscurance()
     settings = settings.model_copy(update={"reconstruct": None})  # no ray depends on it
     by_face = {"triangle_normals": "triangle_normals"} if settings.faces != "count" else {}
@@ -198,7 +205,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         Node.of(hemispheres, **axes),
         Node.of(open_triangles),
         Node.of(partial(known_open, settings.samples), "known_open"),
-        Node.of(partial(baked, files), "baked"),
+        Node.of(partial(baked, values), "baked"),
         Node.of(baked_obscurance),
         *nodes,
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from illumcli.cache.fingerprint import FileFingerprint
+from illumcli.cache.fingerprint import FileFingerprint, FileFingerprints
 from illumcli.geometry.bounds import implied_widths
 from illumcli.geometry.scene_geometry import (
     bounds_of,
@@ -24,13 +24,13 @@ from illumcli.scene.spec import MeshFile, Normals, Object, Scene
 from illumcli.shading.rates import RATES
 
 
-def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+def geometry_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> list[Node]:
     """Nodes of meshes, and of everything computed from all of them."""
     transforms = tuple(thing.transform for thing in scene.objects)
     rates = needs.rates(scene)
     flat = tuple(not RATES[rate].is_smooth or scene.terminator == "none" for rate in rates)
     return [
-        *_mesh_nodes(scene, loaded),
+        *_mesh_nodes(scene, loaded, files),
         Node.of(partial(bounds_of, transforms), "object_bounds"),
         Node.of(partial(implied_widths, flat), "implied_widths"),
         Node.of(stages.render_space),
@@ -40,7 +40,7 @@ def geometry_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     ]
 
 
-def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+def _mesh_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> list[Node]:
     """One node per mesh file or shape, and the node of every object's mesh."""
     of_object = [needs.mesh_name(scene, thing.mesh) for thing in scene.objects]
     sources = {name: source for name, (_, source) in zip(of_object, _sources(scene), strict=True)}
@@ -48,7 +48,7 @@ def _mesh_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
     which = tuple(number[name] for name in of_object)
     parts = {f"mesh{k}": f"mesh:{name}" for name, k in number.items()}
     meshes = [
-        Node.of(partial(stages.mesh, _content(loaded, source)), f"mesh:{name}")
+        Node.of(partial(stages.mesh, _content(loaded, files, source)), f"mesh:{name}")
         for name, source in sources.items()
     ]
     return [*meshes, Node("meshes", partial(stages.meshes, which), parts)]
@@ -96,11 +96,11 @@ def _sources(scene: Scene) -> list[tuple[Object, MeshFile | Shape]]:
     return [(thing, needs.source_of(scene, thing.mesh)) for thing in scene.objects]
 
 
-def _content(loaded: SceneFile, source: MeshFile | Shape) -> FileFingerprint | Shape:
+def _content(loaded: SceneFile, files: FileFingerprints, source: MeshFile | Shape) -> FileFingerprint | Shape:
     """The source of a mesh: the fingerprint of its file, or the shape."""
     if not isinstance(source, MeshFile):
         return source
-    return FileFingerprint(partial(resolve, loaded, source.file), companions)
+    return files.of(source.file, partial(resolve, loaded), companions)
 
 
 def _computes_normals(source: MeshFile | Shape) -> bool:
@@ -126,10 +126,12 @@ def _selects(scene: Scene, thing: Object) -> tuple[tuple[str, ...], bool] | None
     return named, needs.imports(scene, thing)
 
 
-def baked_files(scene: Scene, loaded: SceneFile) -> tuple[tuple[str, FileFingerprint | None], ...]:
+def baked_files(
+    scene: Scene, loaded: SceneFile, files: FileFingerprints
+) -> tuple[tuple[str, FileFingerprint | None], ...]:
     """The name of each object and the file of its baked obscurance, if any."""
-    files = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
+    paths = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     return tuple(
-        (name, None if file is None else FileFingerprint(partial(resolve, loaded, file)))
-        for name, file in zip(scene.object_names(), files, strict=True)
+        (name, None if path is None else files.of(path, partial(resolve, loaded)))
+        for name, path in zip(scene.object_names(), paths, strict=True)
     )

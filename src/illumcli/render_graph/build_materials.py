@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from illumcli.cache.fingerprint import FileFingerprint
+from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.graph import Node
 from illumcli.images.textures import Images
 from illumcli.models._base import IlluminationModel
@@ -23,7 +23,7 @@ PURPOSES = ("lobes", "ambient", "emission")
 """What parameters that vary over a surface are used for."""
 
 
-def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
+def material_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> list[Node]:
     """Nodes of the material numbers, the models, and the parameters that vary."""
     # How each object's materials are chosen, and all models that may be.
     choices: list[Choice] = []
@@ -37,10 +37,10 @@ def material_nodes(scene: Scene, loaded: SceneFile) -> list[Node]:
         models |= {("material", name): model for name, model in scene.materials.items()}
 
     # Measured materials and textures are identified by the content of their files.
-    files = {model.file for model in models.values() if hasattr(model, "file")}
-    measured = {file: FileFingerprint(partial(resolve, loaded, file)) for file in sorted(files)}
+    tables = {model.file for model in models.values() if hasattr(model, "file")}
+    measured = {path: files.of(path, partial(resolve, loaded)) for path in sorted(tables)}
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
-    contents = {path: FileFingerprint(partial(resolve, loaded, path)) for path in named}
+    contents = {path: files.of(path, partial(resolve, loaded)) for path in named}
     images = Images(contents, partial(resolve, loaded))
 
     libraries = {"meshes": "meshes"} if any(imported) else {}

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from illumcli.errors import InputError
 from illumcli.mesh_files import is_mesh_file
+from illumcli.records import Value
 from illumcli.scene.access import readable_folders
 from illumcli.scene.blame import Applied, PlacedFault, blamed
 from illumcli.scene.extend import SceneReader
@@ -26,7 +27,22 @@ from illumcli.schema.description import Description
 D = TypeVar("D", bound=Description)
 
 
-def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
+class SceneText(Value):
+    """What is written in the file of a scene and in those it extends, before any override."""
+
+    tree: Node | None
+    problems: tuple[Problem, ...]
+    roots: tuple[Path, ...]
+
+
+def read_text(path: Path) -> SceneText:
+    """The text of the scene file `path`; nothing is written where that is a mesh file."""
+    reader = SceneReader(readable_folders(path.parent))
+    tree = None if is_mesh_file(path) else reader.file(path, ())
+    return SceneText(tree, tuple(reader.problems), reader.roots)
+
+
+def load(path: Path, overrides: Sequence[str] = (), text: SceneText | None = None) -> SceneFile:
     """The scene in a file, or the studio scene with the mesh of a mesh file.
 
     A scene may read files in its own folder, the folder above, the current one and those of ILLUM_ALLOW.
@@ -37,13 +53,16 @@ def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
         A scene, or a mesh file.
     overrides : sequence of str
         `PATH=VALUE`, applied in turn; the value is YAML, and `null` removes a part.
+    text : SceneText, optional
+        Of the file, where it was read before: variants of a scene are what it was then.
 
     Raises
     ------
     InputError
         All problems of the scene, ordered by place.
     """
-    reader = SceneReader(readable_folders(path.parent))
+    text = text or read_text(path)
+    reader = SceneReader(text.roots)
     changes = [change for text in overrides if (change := parse(text, reader.problems))]
     settings = [change for change in changes if change.steps[0] == SETTINGS]
 
@@ -51,7 +70,8 @@ def load(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
     if is_mesh_file(path):
         tree = _studio(path, settings, reader)
     else:
-        tree = reader.file(path, ())
+        tree = text.tree
+        reader.problems += text.problems
         fact = f"{path} is not a mesh file; change its camera and the transforms of its objects"
         reader.problems += [Problem(change.value.place, (), fact) for change in settings]
 

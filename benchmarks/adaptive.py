@@ -21,11 +21,11 @@ from _bench import planned
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
 
-SIZE = ("film.width=64", "film.height=36") if _bench.SMALL else ("film.width=1280", "film.height=720")
+SIZE = ("film.width=64", "film.height=36") if _bench.SMALL else ("film.width=640", "film.height=360")
 REFERENCE = 32 if _bench.SMALL else 256
 REPEATS = 1 if _bench.SMALL else 3
 OBSCURANCE = ("ambient=0.4", "obscurance={samples: 4}")
-COUNTS = (4, 16) if _bench.SMALL else (4, 16, 64)
+COUNTS = (4, 16)
 RUNS = {
     f"{count} samples{kind}": (f"film.samples={count}", f"film.adaptive={adaptive}")
     for count in COUNTS
@@ -135,7 +135,7 @@ def main() -> None:
     words = [word for word in sys.argv[1:] if word != "--small"]
     _bench.header("What does adaptive antialiasing save, and how far is it from full sampling?", seed=0)
     with tempfile.TemporaryDirectory() as folder:
-        scene, thin = _bench.lit_scene(Path(folder), 1280, 720), blades(Path(folder))
+        scene, thin = _bench.lit_scene(Path(folder), 640, 360), blades(Path(folder))
         cases = {"lights": (scene, ()), "lights and obscurance": (scene, OBSCURANCE), "blades": (thin, ())}
         for what, (path, overrides) in cases.items():
             runs = compared(what, path, *overrides)

@@ -52,15 +52,13 @@ def pixel_buffer(codec: BufferCodec, stored: Stored, view: View) -> PixelBuffer:
     ------
     Misfit
     """
-    if len(stored.arrays) != 2:
+    if len(stored.arrays) != 2 or stored.arrays[0].ndim != 1:
         raise Misfit
     pixels, values = stored.arrays
     shape = (len(pixels), codec.planes, view.samples)
     fits = pixels.dtype == np.int64 and values.dtype == codec.dtype and values.shape == shape
-    ascending = pixels.ndim == 1 and bool((np.diff(pixels) > 0).all())
-    if not (
-        fits and ascending and pixels.min(initial=0) >= 0 and pixels.max(initial=0) < view.width * view.height
-    ):
+    inside = pixels.min(initial=0) >= 0 and pixels.max(initial=0) < view.width * view.height
+    if not (fits and inside and (np.diff(pixels) > 0).all()):
         raise Misfit
     return PixelBuffer(codec, pixels, values, view.width)
 

@@ -63,9 +63,9 @@ def schema_cases(count: int, seed: int) -> list[str]:
     """Scenes drawn from the JSON schema, most of them wrong in some part."""
     import json
 
-    from illumcli.commands.schema import run
+    from illumcli.commands.schema import schema_text
 
-    schema, draw = json.loads(run()), random.Random(seed)
+    schema, draw = json.loads(schema_text()), random.Random(seed)
     return [json.dumps(_drawn(schema, schema.get("$defs", {}), draw, 0)) for _ in range(count)]
 
 

@@ -46,5 +46,5 @@ def test_of_a_sweep(folder, what):
     files = SweepFiles(**{what: folder / f"all.{'png' if what == 'sheet' else 'csv'}"})
     settings = RenderOptions(pattern=str(folder / "new" / "{ambient}.png"), cache=False, only=("beauty",))
     variants = variants_of(["ambient=0.1,0.2", *SMALL])
-    with pytest.raises(OutputError, match="others took it away"):
+    with pytest.raises(OutputError, match="has been removed since"):
         sweep_scene(folder / "scene.yaml", variants, settings, files, written=gone)

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from illumcli.commands.check import check_scenes
-from illumcli.commands.schema import run as schema_text
+from illumcli.commands.schema import schema_text
 
 GOOD = "version: 1\nmeshes: {a: {shape: sphere}}\nobjects: [{mesh: a}]\n"
 

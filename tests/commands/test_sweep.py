@@ -210,7 +210,7 @@ def test_pictures_that_vanish_before_the_table_is_written_are_exit_5(scene, tmp_
     variants = variants_of(["materials.clay.specular=0.1,0.2"])
     files = SweepFiles(table=tmp_path / "t.csv")
     settings = RenderOptions(pattern=str(tmp_path / "o" / "{materials.clay.specular}.png"), cache=False)
-    with pytest.raises(OutputError, match="others took it away"):
+    with pytest.raises(OutputError, match="has been removed since"):
         sweep_scene(scene, variants, settings, files, written=gone)
 
 

@@ -321,7 +321,7 @@ def test_buffers_come_back_as_they_were(scene):
 
 
 def test_what_is_no_buffer_is_a_programming_error():
-    with pytest.raises(TypeError, match="object is not among what is kept"):
+    with pytest.raises(TypeError, match="object is not stored"):
         encode(object(), [], {})
 
 

@@ -1,4 +1,4 @@
-"""Points spread over the area of all triangles, for values that are fitted to them."""
+"""Points distributed over the area of all triangles, to which vertex values are fitted."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from illumcli.visibility.hemisphere import Hemispheres
 
 
 class AreaPoints(Points):
-    """Points spread evenly over triangles."""
+    """Points distributed evenly over triangles."""
 
     origins: Vectors  # (M, 3) float32 offset from the surface, in radii
     ng: Vectors  # (M, 3) float32 unit normals of their triangles
     triangle: Ids  # (M,)
     u: NDArray[np.float64]  # (M,) barycentric weight of corner 1
     v: NDArray[np.float64]  # (M,) barycentric weight of corner 2
-    area: NDArray[np.float64]  # (M,) of surface that each point stands for, in radii^2
+    area: NDArray[np.float64]  # (M,) area of the surface that each point represents, in radii^2
 
     def hemispheres(self, index: NDArray[np.int64], offset: Floats) -> Hemispheres:
         return Hemispheres(self.n, self.origins, self.ng).take(index)
@@ -36,11 +36,11 @@ class AreaPoints(Points):
 
 
 def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
-    """About `count` points on triangles that have an area: at least one each, more by area.
+    """About `count` points on the triangles, in proportion to their area; at least one on each with an area.
 
     On each triangle they follow the R2 sequence (Roberts 2018), shifted by a hash of the triangle's index.
     """
-    # how many on each triangle
+    # The number of points on each triangle.
     geometry = surfaces.geometry
     corner = triangle_corners(geometry.vertices, geometry.triangles)
     area = length(cross(corner[1] - corner[0], corner[2] - corner[0])) / 2
@@ -49,7 +49,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     size = share.astype(np.int64)
     triangle = np.repeat(np.arange(len(size), dtype=np.int32), size)
 
-    # where: points beyond the diagonal of the unit square fold back onto the triangle
+    # Their positions: points beyond the diagonal of the unit square are folded back onto the triangle.
     within = np.arange(len(triangle)) - np.repeat(np.cumsum(size) - size, size)
     key = stream(seed, "area")
     shift = [unit_interval(hashed(key + k, np.arange(len(size), dtype=np.uint32)))[triangle] for k in (0, 1)]
@@ -57,7 +57,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     over = a + b > 1
     a, b = np.where(over, 1 - a, a), np.where(over, 1 - b, b)
 
-    # shading normals; the triangle's own where there is none
+    # Shading normals, or the triangle's normal if there is none.
     interaction = interact(geometry, triangle, a, b, np.zeros((len(triangle), 3), F))
     n = or_geometric(_interpolated(surfaces.normals, geometry, triangle, a, b), interaction.ng)
     return AreaPoints(

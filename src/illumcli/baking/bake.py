@@ -1,4 +1,4 @@
-"""Bake obscurance at every vertex of a mesh or a scene, with its standard error, into files of its meshes."""
+"""Bakes obscurance at every vertex of a mesh or scene, with its standard error, into files of its meshes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.visibility.obscurance import Method
 
 DARK, MOSTLY = 0.01, 0.9
-"""Where a larger share of the values is lower, the mesh is taken to be turned inside out."""
+"""If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
 
 METHODS: dict[str, Callable[[BakeContext], PointValues]] = {
     "vertex": sampled_at_vertices,
@@ -47,12 +47,12 @@ def bake_mesh(
     options: BakeOptions = AS_USUAL,
     progress: Progress = no_progress,
 ) -> tuple[list[Path], BakeReport]:
-    """Bake a mesh file, or every mesh of a scene in its place; the files, written or kept, and the report.
+    """Bake a mesh file, or all meshes of a scene in their places. Returns the files and the report.
 
     Raises
     ------
     InputError, LimitError, OutputError
-        Before anything is baked, where it can be known then.
+        Before anything is baked, if the fault can be found by then.
     """
     return bake_prepared(prepare_bake(path, outputs, settings, options), options.threads, progress)
 
@@ -60,12 +60,16 @@ def bake_mesh(
 def bake_prepared(
     work: BakeWork, threads: int | None = None, progress: Progress = no_progress
 ) -> tuple[list[Path], BakeReport]:
-    """The same for a bake whose meshes were read."""
+    """Bake a prepared input."""
     threads = threads or len(os.sched_getaffinity(0))
+
+    # Refresh the files that are kept.
     kept = [path for path in work.outputs if path not in work.due]
     for path in kept:
         refresh(path)
     work.clock.lap("read")
+
+    # Compute the values, with a journal for a next run, and write the files.
     values: PointValues | None = None
     left_out: Sequence[str] = ()
     warnings: list[str] = []
@@ -83,7 +87,7 @@ def bake_prepared(
 
 
 def point_values(work: BakeWork, threads: int, progress: Progress, journal: Journal) -> PointValues:
-    """Obscurance of every point at a vertex, by the method asked for."""
+    """Obscurance of every point at a vertex, by the method of the settings."""
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
     wanted = settings.obscurance()
@@ -96,7 +100,7 @@ def point_values(work: BakeWork, threads: int, progress: Progress, journal: Jour
 
 
 def description(work: BakeWork, statistics: SampleStatistics) -> dict[str, Any]:
-    """What the files of a bake say of themselves."""
+    """The description of a bake that its files contain."""
     names, placed = work.scene.object_names(), work.surfaces.geometry.placed
     return {
         "content": work.content,
@@ -114,7 +118,7 @@ def description(work: BakeWork, statistics: SampleStatistics) -> dict[str, Any]:
 
 
 def warnings_of(settings: BakeSettings, values: PointValues) -> list[str]:
-    """A target that was not reached; values as of a mesh that is turned inside out."""
+    """Warnings about a target that was not reached, and about a mesh that seems to be inside out."""
     warnings = []
     rmse, target = values.statistics.rmse, settings.target_error
     if target is not None and rmse > target:
@@ -132,12 +136,12 @@ def warnings_of(settings: BakeSettings, values: PointValues) -> list[str]:
 
 
 def dark_share(w: NDArray[np.float32]) -> float:
-    """Share of values where next to nothing is open."""
+    """Share of values below `DARK`."""
     return float(np.mean(w < DARK)) if len(w) else 0.0
 
 
 def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
-    """Why a next run could not take the bake up."""
+    """A warning if an interrupted bake could not be continued by a next run."""
     if journal.refusal is None:
         return []
     output = work.outputs[0]
@@ -147,10 +151,12 @@ def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
 def bake_report(
     work: BakeWork, threads: int, values: PointValues | None, left_out: Sequence[str], warnings: list[str]
 ) -> BakeReport:
-    """The report of a bake; `values` are None where every output is kept."""
+    """The report of a bake; `values` are None if every output is kept."""
+    # If nothing was computed, the counts are 0.
     statistics = SampleStatistics() if values is None else values.statistics
     vertices = None if values is None else values.vertices
     return BakeReport(
+        # The input.
         input=str(work.path),
         content=work.content,
         seed=work.settings.seed,
@@ -160,6 +166,7 @@ def bake_report(
         unreferenced=vertices.unreferenced if vertices else 0,
         without_normal=vertices.without_normal if vertices else 0,
         copies=vertices.copies if vertices else 0,
+        # The values, their errors and rays.
         open=statistics.open,
         cast=statistics.cast,
         rmse=statistics.rmse,
@@ -169,6 +176,7 @@ def bake_report(
         resumed=statistics.resumed,
         samples=statistics.samples,
         reconstruction=statistics.reconstruction,
+        # What was repaired, left out and written.
         repairs=work.repairs,
         left_out=list(left_out),
         warnings=warnings,

@@ -18,21 +18,21 @@ from illumcli.visibility.baked import Baked
 
 SUFFIXES = (".npz", ".ply", ".glb")
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
-"""Where obscurance may be written as a colour -> channels of red, green, blue, alpha."""
+"""Option -> the channels of red, green, blue, alpha that obscurance is written to."""
 
 
 def write_baked_ply(
     path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, channel: str | None
 ) -> None:
-    """The mesh with float properties `obscurance`, `quality` (the same, as MeshLab reads it) and
-    `standard_error`, and `nx_bent ny_bent nz_bent` where the bent normal was asked for.
+    """Write a PLY with float properties `obscurance`, `quality` (equal, the name that MeshLab reads),
+    `standard_error`, and `nx_bent ny_bent nz_bent` if there is a bent normal.
 
     Parameters
     ----------
     source
-        A PLY that is written again with all it has; without, `meshes` are written.
+        A PLY whose content is kept and extended; None to write `meshes`.
     channel : {"r", "g", "b", "a", "rgb"}, optional
-        Where to write obscurance as 8-bit colour; other channels stay, or are white.
+        Channels in which obscurance is written as 8-bit colour; others are kept, or are white.
     """
     columns = {"obscurance": baked.obscurance, "quality": baked.obscurance}
     columns["standard_error"] = baked.standard_error
@@ -43,26 +43,26 @@ def write_baked_ply(
 
 
 def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, channel: str | None) -> None:
-    """A node per mesh with `_OBSCURANCE`, `_STANDARD_ERROR` and, where asked for, `_BENT_NORMAL`; `COLOR_0`
-    only where a `channel` is given."""
+    """Write a GLB with a node per mesh, with `_OBSCURANCE`, `_STANDARD_ERROR`, and `_BENT_NORMAL` if there is
+    a bent normal; `COLOR_0` only if a `channel` is given."""
     gltf.write_glb(path, meshes, _vertex_data(baked.columns(), baked, channel))
 
 
 def add_baked_to_glb(
     path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], baked: Baked
 ) -> None:
-    """A GLB with the same attributes added to each primitive, all else as it is; `source` and `counts` are
-    those of `gltf.add_to_glb`."""
+    """Write a GLB that is a copy of another, with the same attributes added to each primitive; `source` and
+    `counts` are those of `gltf.add_to_glb`."""
     gltf.add_to_glb(path, source, counts, _vertex_data(baked.columns(), baked, None))
 
 
 def baked_contents(path: Path) -> list[str]:
-    """The hash of what a file written here was made from.
+    """The content hash in a file written here.
 
     Raises
     ------
     InputError
-        A file of others.
+        A file that illum did not write.
     """
     readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
     try:

@@ -27,20 +27,20 @@ from illumcli.records import Record
 
 RAYS_PER_POINT = 16
 PARTS = 8
-"""The points are dealt to so many parts; the residuals in each of them estimate the error."""
+"""Number of parts that the points are divided into; the residuals in each of them estimate the error."""
 SMOOTHING = 0.02
-"""Weight of the squared difference along edges, as a share of the area around: it matters only where points
-are few."""
+"""Weight of the squared differences along edges, as a share of the area around; it matters only where
+points are few."""
 MAX_STEPS, TOLERANCE = 500, 1e-6
 
 
 def fitted_to_surface(context: BakeContext) -> PointValues:
     """Vertex values by least squares, with `samples` rays per vertex spread over the area.
 
-    The standard error of a value is how far the residuals in eight parts of the points would move it: it
-    holds the error of the rays and that of where the points lie.
+    The standard error of a value is estimated by how much the residuals in each of eight parts of the points
+    would change it. It includes the errors of rays and of the points' positions.
     """
-    # estimates at points all over the surface
+    # Estimate obscurance at points on the surface.
     settings = context.settings
     vertices = vertex_points(context.surfaces)
     per_point = min(RAYS_PER_POINT, settings.samples)
@@ -54,16 +54,16 @@ def fitted_to_surface(context: BakeContext) -> PointValues:
     w = np.ones(len(is_open))
     w[closed] = estimates.values.w
 
-    # vertex values nearest to them
+    # Fit the vertex values.
     equations = NormalEquations.of(context.surfaces.geometry, area, vertices)
     mean = equations.solve(equations.right_side(area, w)[:, None])[:, 0]
 
-    # and their error from the residuals
+    # Estimate their errors from the residuals.
     residual = w - equations.interpolated(area, mean)
     part = np.arange(len(w)) % PARTS
     sides = [equations.right_side(area, np.where(part == k, residual, 0.0)) for k in range(PARTS)]
-    moved = equations.solve(np.stack(sides, axis=1))
-    spread = np.sqrt(np.square(moved).sum(axis=1) * PARTS / (PARTS - 1))
+    changes = equations.solve(np.stack(sides, axis=1))
+    spread = np.sqrt(np.square(changes).sum(axis=1) * PARTS / (PARTS - 1))
     value, error = np.clip(mean, 0, 1).astype(F), spread.astype(F)
     if is_open.all():
         value, error = np.ones_like(value), np.zeros_like(error)
@@ -123,8 +123,8 @@ class NormalEquations(Record):
         return out
 
     def solve(self, sides: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(M, k) by conjugate gradients, each column for itself, preconditioned by the diagonal."""
-        # start from the solution of the diagonal
+        """(M, k) by conjugate gradients for each column, preconditioned by the diagonal."""
+        # Start from the solution of the diagonal.
         diagonal = np.bincount(self.corner.ravel(), np.einsum("tii->ti", self.block).ravel(), self.count)
         diagonal = diagonal[:, None]
         inverse = np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
@@ -136,13 +136,13 @@ class NormalEquations(Record):
         for _ in range(MAX_STEPS):
             if (square <= enough).all():
                 break
-            # to the minimum along the direction
+            # Step to the minimum along the direction.
             image = self.times(direction)
             curvature = (direction * image).sum(axis=0)
             step = np.divide(square, curvature, out=np.zeros_like(square), where=curvature > 0)
             x += step * direction
             residual -= step * image
-            # the next direction, conjugate to the last
+            # The next direction is conjugate to the last.
             scaled = inverse * residual
             before, square = square, (residual * scaled).sum(axis=0)
             direction = (

@@ -1,4 +1,4 @@
-"""The input of a bake: a mesh file alone or a scene, placed and hashed before any ray is cast."""
+"""The input of a bake: a single mesh file or a scene, placed and hashed before any ray is cast."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from illumcli.visibility.baked import mesh_hash
 
 
 class BakeWork(Record):
-    """A bake whose meshes were read: its surfaces, and the files to write."""
+    """A bake whose meshes have been read: its surfaces, and the files to write."""
 
     path: Path
     outputs: tuple[Path, ...]
     due: tuple[Path, ...]
-    """Outputs that are not there yet with the same content."""
+    """Outputs to write: those that do not exist with the same content."""
     settings: BakeSettings
     scene: Scene
     surfaces: Surfaces
     hashes: tuple[str, ...]
-    """Of the meshes."""
+    """Hashes of the meshes."""
     content: str
-    """Hash of all that the values and files depend on."""
+    """Hash of everything that the values and files depend on."""
     repairs: Repairs
     clock: StageClock
 
@@ -53,23 +53,23 @@ class BakeWork(Record):
 def prepare_bake(
     path: Path, outputs: Sequence[Path], settings: BakeSettings, options: BakeOptions = AS_USUAL
 ) -> BakeWork:
-    """Read the meshes of a bake and refuse whatever can be known to fail; no ray is cast.
+    """Read the meshes of a bake, and refuse what is certain to fail; no ray is cast.
 
     Raises
     ------
     InputError
         A fault of the input, the settings or the outputs' names.
     OutputError
-        A different file stands in the place of an output; an output cannot be written.
+        A different file exists under the name of an output; an output cannot be written.
     LimitError
         The meshes do not fit into memory.
     """
-    # names of the outputs
+    # Check the names of the outputs.
     refuse_outputs(outputs)
     if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
 
-    # the scene, and whether its meshes fit into memory
+    # Load the scene; refuse meshes that do not fit into memory.
     clock = StageClock()
     is_mesh = is_mesh_file(path)
     loaded = mesh_alone(path, options.overrides) if is_mesh else load(path, options.overrides)
@@ -77,7 +77,7 @@ def prepare_bake(
     expected.pop("textures", None)  # no bake reads them
     refuse_memory(0, 0, 0, expected, str(path))
 
-    # its meshes
+    # Read and hash the meshes, and find the outputs to write.
     surfaces, repairs = surfaces_of(loaded.scene, loaded)
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
@@ -91,7 +91,7 @@ def prepare_bake(
 
 
 def refuse_outputs(outputs: Sequence[Path]) -> None:
-    """Raise InputError for suffixes that nobody writes and files named twice."""
+    """Raise InputError for unknown suffixes and files named twice."""
     problems = [
         f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(SUFFIXES)}"
         for each in outputs
@@ -104,15 +104,15 @@ def refuse_outputs(outputs: Sequence[Path]) -> None:
 
 
 def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
-    """A scene of one mesh file and nothing else, not placed on a floor."""
+    """A scene of one mesh file alone, without a transform or a floor."""
     scene_file = load(path, overrides)
     description = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
     return replace(scene_file, scene=Scene.model_validate(description))
 
 
 def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
-    """The scene's placed meshes, the same as a render's, with the normals that obscurance is about; what was
-    repaired."""
+    """The placed meshes of a scene, as in a render, with the normals that are the axes of hemispheres; and
+    their repairs."""
     buffers: dict[str, Any] = {}
     for node in build(scene, loaded).topological_order(["geometry", "corner_normals", "repairs"]):
         buffers[node.output] = node.run(buffers)
@@ -123,7 +123,7 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
 
 
 def content_hash(scene: Scene, hashes: Sequence[str], normals: CornerVectors, settings: BakeSettings) -> str:
-    """Hash of all that the values and files of a bake depend on."""
+    """Hash of everything that the values and files of a bake depend on."""
     transforms = [dict(each.transform) for each in scene.objects]
     text = json.dumps(
         [__version__, settings.as_data(), list(hashes), transforms, scene.object_names()], default=str

@@ -1,4 +1,4 @@
-"""What the vertices of each object of a bake may be occluded by."""
+"""The geometry that may occlude the vertices of each object of a bake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from illumcli.scene.spec import Scene
 from illumcli.visibility.open_hemisphere import ClusterTree
 
 GROUND_GAP = 1e-4
-"""How far the added ground lies below the lowest vertex, in radii: it closes what stands on it."""
+"""Distance of the added ground below the lowest vertex, in radii: it closes objects that stand on it."""
 GROUND_SIZE = 1e3
 """Half the side of the added ground, in radii."""
 
@@ -27,16 +27,16 @@ class Occluders(Record):
 
     tracer: Tracer
     clusters: ClusterTree
-    normals: NDArray[np.float32] | None = None  # (T, 3) unit, where back faces do not occlude
+    normals: NDArray[np.float32] | None = None  # (T, 3) unit; None if back faces occlude
 
 
 def occluders_of(scene: Scene, geometry: SceneGeometry, settings: BakeSettings) -> list[Occluders]:
-    """Occluders of each object: the scene, the object itself, or it and objects named.
+    """Occluders of each object: the scene, the object itself, or the object and others by name.
 
     Raises
     ------
     InputError
-        `settings.occluders` names no object, or means two things.
+        A name in `settings.occluders` is no object, or is ambiguous.
     """
     names = scene.object_names()
     _refuse_unknown(settings.occluders, names)

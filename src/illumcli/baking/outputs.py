@@ -17,7 +17,7 @@ GlbParts: TypeAlias = tuple[tuple[dict[str, Any], bytes], list[tuple[int, int, i
 
 
 def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
-    """Write the files that are due; a line for everything of the meshes that is not in them."""
+    """Write the files that are due. Returns a line for each part of the meshes that they lack."""
     left_out: list[str] = []
 
     @cache
@@ -32,7 +32,7 @@ def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
 
 
 def _write(path: Path, work: BakeWork, baked: Baked, meshes: Callable[[bool], OutputMeshes]) -> None:
-    """One file: what was baked added to the file that was read where both have one format, else all anew."""
+    """Write one file: a copy of the input with the values if both have one format, otherwise a new file."""
     source, channel, split = work.path, work.settings.channel, work.settings.split
     source_kind, kind = source.suffix.lower(), path.suffix.lower()
     if kind == ".npz":
@@ -40,18 +40,18 @@ def _write(path: Path, work: BakeWork, baked: Baked, meshes: Callable[[bool], Ou
     elif kind == ".ply" and source_kind == ".ply" and not split:
         write_baked_ply(path, [], baked, source, channel)
     elif kind == ".ply":
-        anew = meshes(split)
-        write_baked_ply(path, anew.meshes, anew.baked, None, channel)
+        written = meshes(split)
+        write_baked_ply(path, written.meshes, written.baked, None, channel)
     elif source_kind == ".glb" and channel is None and (parts := glb_parts(source)):
         add_baked_to_glb(path, *parts, baked)
     else:
-        anew = meshes(True)
-        write_baked_glb(path, anew.meshes, anew.baked, channel)
+        written = meshes(True)
+        write_baked_glb(path, written.meshes, written.baked, channel)
 
 
 def glb_parts(path: Path) -> GlbParts | None:
-    """What values are added to in a GLB; None where a mesh stands twice, or where the first buffer is no
-    chunk of the file."""
+    """The parts of a GLB that values are added to; None if a mesh is placed twice, or the first buffer is not
+    in the file."""
     from illumcli.mesh_files.gltf import primitives_of
     from illumcli.mesh_files.gltf.document import open_document
 

@@ -1,4 +1,4 @@
-"""The points of a bake: where rays start, and about which normals."""
+"""The points of a bake: positions and normals from which rays are cast."""
 
 from __future__ import annotations
 

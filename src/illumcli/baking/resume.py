@@ -1,4 +1,4 @@
-"""Finished units of a bake in a journal beside its first output, for a run that takes the bake up again."""
+"""Finished units of a bake, in a journal beside its first output, with which a next run continues."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Result = TypeVar("Result")
 
 
 def open_journal(output: Path, content: str) -> Journal:
-    """The journal of one computation, on processors with the same instructions."""
+    """The journal of one computation; processors with other instructions have another one."""
     return Journal(place(output, content), digest((content, code())))
 
 
 def load_unit(journal: Journal, unit: WorkUnit, estimates: Estimates) -> int | None:
-    """Copy the journal's values of a unit into `estimates`, which has a row for every point; the rays that
-    they took, None where the journal has none."""
+    """Copy the journal's values of a unit into `estimates`, which has a row for every point. Returns the rays
+    that they took, or None if the journal has no values."""
     width = 2 if estimates.bent is None else 5
     record = journal.find(unit.key())
     if record is None or len(record) != 8 + 4 * width * len(unit.points):
@@ -49,8 +49,8 @@ def store_unit(journal: Journal, unit: WorkUnit, estimates: Estimates, rays: int
 
 
 def write_beside(journal: Journal, write: Callable[[], Result]) -> Result:
-    """The result of `write`. Where the disk is full, the journal, which is no longer needed, is removed and
-    `write` called again."""
+    """The result of `write`. If the disk is full, remove the journal, which is no longer needed, and call
+    `write` again."""
     try:
         return write()
     except OutputError as error:

@@ -28,24 +28,24 @@ from illumcli.visibility.open_hemisphere import triangle_planes
 UNIT_RAYS = 1 << 18
 """Rays of a unit of work: an interrupt loses no more, and there are enough units to share."""
 UNIT_TRIANGLES = 1 << 14
-"""Triangles of a unit of work that asks which are open."""
+"""Triangles of a unit of work that tests which of them are open."""
 PAIR_SHARE, MIN_PAIRS = 100, 512
-"""The error is estimated at one point in so many, and at so many at least."""
+"""The error is estimated at one point in `PAIR_SHARE`, but at `MIN_PAIRS` at least."""
 PILOT_SAMPLES = 16
 AIM = 0.94
-"""What is aimed at, as a share of the error asked for: the error itself is known to some 4 %."""
+"""Error to aim at, as a share of the target error: errors are known to some 4 %."""
 MAX_ROUNDS = 6
 MIN_SAMPLES, MAX_SAMPLES = 8, 65536
 
 
 class RayCounts(Record):
-    """How many rays each of K points casts."""
+    """The number of rays that each of K points casts."""
 
-    points: NDArray[np.int64]  # (K,)
+    points: NDArray[np.int64]  # (K,) their indices
     samples: NDArray[np.int64]  # (K,)
 
     def at(self, index: NDArray[np.int64]) -> RayCounts:
-        """Those of some of the points."""
+        """The counts of some of the points."""
         return RayCounts(self.points[index], self.samples[index])
 
 
@@ -73,7 +73,7 @@ class ChosenSamples(Record):
 
 
 class BakeSampler(Record):
-    """The points of a bake, and what it takes to estimate their obscurance."""
+    """Estimates obscurance at the points of a bake."""
 
     points: Points
     occluders: Sequence[Occluders]  # per object
@@ -84,12 +84,12 @@ class BakeSampler(Record):
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
-        """(M,) the points along a curve that keeps neighbours together."""
+        """(M,) indices of the points in an order that keeps neighbours together."""
         return compact(self.points.position)
 
     def open_points(self) -> NDArray[np.bool_]:
         """(M,) True for points with no geometry above the triangles that their rays leave."""
-        # triangles that have an area, near ones together
+        # Units of neighbouring triangles that have an area.
         geometry = self.points.geometry
         a, b, c = triangle_corners(geometry.vertices, geometry.triangles)
         area = cross(b - a, c - a)
@@ -125,13 +125,13 @@ class BakeSampler(Record):
         Parameters
         ----------
         purpose : str
-            For progress alone.
+            Shown as progress.
         replicate : int
-            Every number gives an independent scramble; values that are handed out are of number 0.
+            Every number gives an independent scramble; results have number 0.
         bent : bool
-            Also the mean unoccluded direction.
+            Also compute the mean unoccluded direction.
         journal
-            Units that it holds are not computed, and those that are finished are added to it.
+            Units in it are not computed, and finished units are added to it.
         """
         count = len(self.points.key)
         out = Estimates(np.ones(count, F), np.zeros(count, F), np.zeros((count, 3), F) if bent else None)
@@ -146,7 +146,7 @@ class BakeSampler(Record):
             method = replace(self.method, samples=unit.samples, triangle_normals=occluders.normals)
             return estimates(tracer, hemispheres, draws[:2], method, bent=bent), tracer.rays
 
-        # units that an earlier run finished are copied from the journal
+        # Copy the units that an earlier run finished from the journal.
         due: list[WorkUnit] = []
         resumed = 0
         for unit in self._units(counts):
@@ -154,7 +154,7 @@ class BakeSampler(Record):
             resumed += stored or 0
             due += [unit] if stored is None else []
 
-        # all others are computed
+        # Compute the others.
         total = resumed
         for index, (values, rays) in self._run(purpose, due, compute):
             points = due[index].points
@@ -171,19 +171,17 @@ class BakeSampler(Record):
     def errors(self, counts: RayCounts, replicate: int) -> ErrorEstimate:
         """The error law of the points, from pairs of scrambles at a few of them.
 
-        The scrambles are numbered from `replicate` on.
-
-        None of these rays is among those whose values are handed out.
+        The scrambles are numbered from `replicate` on. None of their rays is part of a result.
         """
         if not len(counts.points):
             return ErrorEstimate(Errors(0.0, 0.0, 0.0, 0), 0)
 
-        # a few points at random
+        # Choose a few points at random.
         draw = hashed(stream(self.seed, "ao pairs"), self.points.key[counts.points])
         few = np.argsort(draw, kind="stable")[: max(-(-len(draw) // PAIR_SHARE), MIN_PAIRS)]
         few = np.sort(few)
 
-        # pairs of estimates there, several where the points are few
+        # Estimate pairs of values there, several pairs if the points are few.
         halves: list[list[Estimates]] = [[], []]
         rounds = -(-MIN_PAIRS // len(few))
         rays = 0
@@ -205,7 +203,7 @@ class BakeSampler(Record):
         """Rays of each point for a root mean square error of `target` over all points, of which `points` are
         the `share` that is not open; with the fewest rays in all.
 
-        A pilot of few rays tells where the error is: with L the neighbour variation around a point, its
+        A pilot of few rays estimates the error at each point: with L the neighbour variation around it, its
         variance is L N^-3/2, and the sum of N at a given sum of variances is least where N is proportional to
         L^(2/5). Pairs of scrambles then measure the error at these counts. All these rays are discarded:
         counts do not depend on the values that are kept, so the estimate stays unbiased.
@@ -217,14 +215,14 @@ class BakeSampler(Record):
         if not len(points):
             return ChosenSamples(np.zeros(0, np.int64), 0, 0)
 
-        # where the error is
+        # Estimate the errors by a pilot.
         pilot = self.estimate("pilot", RayCounts(points, np.full(len(points), PILOT_SAMPLES)), 1)
         near = averaged_along(self.order, points, pilot.values.neighbor_variation, len(self.points.key))
         weight = (1 + near) ** 0.4
         aim = AIM * target / np.sqrt(share)
         scale = float((np.mean(weight) * 0.1 * PILOT_SAMPLES**-0.5 / aim**2) ** (2 / 3))
 
-        # scale the counts until the measured error is in a narrow band below the aim
+        # Scale the counts until the measured error is in a narrow band below the aim.
         first, rays = 2, 0
         for _ in range(MAX_ROUNDS):
             samples = rounded_samples(weight * scale)
@@ -234,12 +232,12 @@ class BakeSampler(Record):
             at_bound = samples.min() == MAX_SAMPLES or samples.max() == MIN_SAMPLES
             if 0.9 * aim <= reached <= aim or at_bound:
                 break
-            # towards the middle of the band
+            # Scale towards the middle of the band.
             scale *= float(np.clip((reached / (0.97 * aim)) ** (4 / 3), 0.05, 20.0))
         return ChosenSamples(samples, pilot.rays, rays)
 
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
-        """Points of one object and one number of rays, near each other."""
+        """Units of neighbouring points of one object that cast the same number of rays."""
         samples = np.zeros(len(self.order), np.int64)
         samples[counts.points] = counts.samples
         objects, along = self.points.objects[self.order], samples[self.order]

@@ -1,4 +1,4 @@
-"""What a bake is asked for, and how it is run."""
+"""Settings and options of a bake."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from illumcli.scene.spec import Obscurance
 
 
 class BakeSettings(Value):
-    """Everything that baked values and files depend on besides the meshes and their places."""
+    """Everything that baked values and files depend on, apart from the meshes and their places."""
 
     samples: int = 256  # rays per vertex
     target_error: float | None = None  # root mean square over all vertices, instead of `samples`
@@ -28,7 +28,7 @@ class BakeSettings(Value):
     seed: int = 0
 
     def obscurance(self) -> Obscurance:
-        """The same as a scene describes it."""
+        """The settings as a scene describes them."""
         return Obscurance.model_validate(
             {
                 "samples": self.samples,
@@ -39,7 +39,7 @@ class BakeSettings(Value):
         )
 
     def as_data(self) -> dict[str, Any]:
-        """The settings as JSON holds them."""
+        """The settings for JSON."""
         return {**vars(self), "falloff": dict(self.falloff), "occluders": list(self.occluders)}
 
 
@@ -47,9 +47,9 @@ class BakeOptions(Value):
     """How inputs are read, computed and written."""
 
     overrides: tuple[str, ...] = ()
-    """Of scenes, as `-D` gives them."""
+    """`PATH=VALUE` for scenes, as `-D` gives them."""
     threads: int | None = None
-    """By default one per core."""
+    """Number of threads; by default one per core."""
     force: bool = False
     """Replace files that differ."""
     strict: bool = False

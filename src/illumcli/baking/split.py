@@ -1,5 +1,5 @@
-"""The objects of a bake as they are written: with their own vertices, or with vertices split by what their
-corners have."""
+"""The objects of a bake as they are written: with the vertices of the mesh, or with vertices split where
+their corners differ."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from illumcli.visibility.baked import Baked
 
 
 class OutputMeshes(Record):
-    """Objects as they are written, and the values of their vertices."""
+    """Objects to write, and the values of their vertices."""
 
     meshes: list[OutputMesh]
     baked: Baked
     left_out: tuple[str, ...]
-    """A line for everything of the meshes that is not written."""
+    """A line for each part of the meshes that is not written."""
 
 
 class SplitVertices(Record):
-    """The N vertices of a mesh, and after them a copy for all that a vertex has beyond its first."""
+    """N vertices: those of a mesh, then copies for further combinations of their corners' values."""
 
-    source: NDArray[np.int64]  # (N,) vertex that each is, or is a copy of
-    corner: NDArray[np.int64]  # (N,) a corner that it stands for, -1 for vertices of no polygon
-    of_corner: NDArray[np.int32]  # (C,) which of them each corner has
+    source: NDArray[np.int64]  # (N,) the vertex of the mesh that each one is, or is a copy of
+    corner: NDArray[np.int64]  # (N,) one of its corners, -1 for vertices of no polygon
+    of_corner: NDArray[np.int32]  # (C,) the vertex of each corner, among the N
 
 
 def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, split: bool) -> OutputMeshes:
-    """The objects as they are written; with `split`, vertices with several normals, uv or values are."""
-    # what corners have; without splitting, only what all corners of each vertex agree on
+    """The objects to write; with `split`, vertices with several normals, uv or values are split."""
+    # The tables to write. Without splitting, the corners of each vertex must agree.
     tables: list[dict[str, NDArray[np.float64]]] = []
     left_out: list[str] = []
     for name, placed in zip(names, geometry.placed, strict=True):
@@ -51,7 +51,7 @@ def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, s
                 kept[kind] = values
         tables.append(kept)
 
-    # what vertices become
+    # Split the vertices.
     parts = []
     for placed, table in zip(geometry.placed, tables, strict=True):
         count = len(placed.mesh.corners)
@@ -59,7 +59,7 @@ def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, s
         baked_here = [column[corners].reshape(count, -1) for column in baked.corner_columns().values()]
         parts.append(split_vertices(placed.mesh, [*table.values(), *baked_here] if split else []))
 
-    # the objects
+    # The objects.
     outputs = [
         output_mesh(name, geometry, index, tables[index], parts[index]) for index, name in enumerate(names)
     ]
@@ -68,8 +68,8 @@ def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, s
 
 
 def corner_tables(placed: PlacedMesh) -> dict[str, NDArray[np.float64] | None]:
-    """What the corners of an object's file have, by name, (C, k) each, normals in scene directions; None
-    where some corner lacks it."""
+    """Normals, in scene directions, and uv of the corners of an object's file, (C, k) each, by name; None if
+    a corner lacks them."""
     mesh, linear = placed.mesh, placed.matrix[:3, :3]
     tables: dict[str, NDArray[np.float64] | None] = {}
     if mesh.normals is not None and mesh.corner_normals is not None:
@@ -81,7 +81,7 @@ def corner_tables(placed: PlacedMesh) -> dict[str, NDArray[np.float64] | None]:
 
 
 def is_per_vertex(mesh: Mesh, values: NDArray[np.float64]) -> bool:
-    """Do all corners of every vertex have the same of these values, (C, k)?"""
+    """True if all corners of every vertex have the same values, (C, k)."""
     out = np.zeros((len(mesh.vertices), values.shape[1]))
     out[mesh.corners] = values
     return np.array_equal(out[mesh.corners], values)
@@ -94,8 +94,8 @@ def output_mesh(
     tables: Mapping[str, NDArray[np.float64]],
     part: SplitVertices,
 ) -> OutputMesh:
-    """An object in its place, with what its vertices have."""
-    # attributes of the file, and what corners have
+    """An object in its place, with the attributes of its vertices."""
+    # The attributes of the file, and the tables of corners.
     placed = geometry.placed[index]
     mesh = placed.mesh
     attributes: dict[str, NDArray[Any]] = {}
@@ -107,7 +107,7 @@ def output_mesh(
         at = values[np.maximum(part.corner, 0)]
         attributes[kind] = np.where((part.corner >= 0)[:, None], at, 0.0)
 
-    # triangles; files keep the order of their corners
+    # The triangles. Reversed polygons regain the order of corners in their file.
     of_object = geometry.objects == index
     corner = geometry.corners[of_object] - np.int32(placed.first_corner)
     if placed.reversed is not None:
@@ -119,14 +119,14 @@ def output_mesh(
 
 
 def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
-    """Each vertex, and one more for every other row of `tables` that its corners have.
+    """Each vertex, and a copy for every further combination of rows of `tables` at its corners.
 
     Parameters
     ----------
     tables : sequence of (C, k)
-        What a corner has: normals, uv, values.
+        Normals, uv or values of each corner.
     """
-    # one number for all that a corner has
+    # Number the combinations of a vertex and its rows.
     key = mesh.corners.astype(np.int64)
     for table in tables:
         _, row = np.unique(table, axis=0, return_inverse=True)
@@ -134,7 +134,7 @@ def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
         key = key.ravel()
     _, first, key = np.unique(key, return_index=True, return_inverse=True)
 
-    # the first of each vertex keeps its index, all others follow after the vertices
+    # The first combination of each vertex keeps the vertex's index; the others follow after all vertices.
     count = len(mesh.vertices)
     order = np.argsort(first, kind="stable")
     vertex = mesh.corners[first[order]]
@@ -149,7 +149,7 @@ def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
 
 
 def split_values(baked: Baked, meshes: Sequence[Mesh], parts: Sequence[SplitVertices]) -> Baked:
-    """Values of the split vertices of all meshes: those of their corners where there are any, else of their
+    """Values of the split vertices of all meshes: those of their corners if there are any, otherwise of their
     vertices."""
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in baked.columns()}
     at_corners = baked.corner_columns()

@@ -1,1 +1,1 @@
-"""What is kept between runs, and what names it."""
+"""Buffers kept between runs, and the fingerprints that they are known by."""

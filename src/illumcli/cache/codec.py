@@ -1,4 +1,4 @@
-"""How buffers are stored: those of a view sample by sample, those of the whole scene as JSON and arrays."""
+"""Encoding of stored buffers: those of a view sample by sample, those of the scene as JSON and arrays."""
 
 from __future__ import annotations
 
@@ -40,30 +40,30 @@ CLASSES = {
         Substitute,
     )
 }
-"""Records that buffers of the whole scene are made of."""
+"""Classes of the records in buffers of the scene."""
 
 
 class Misfit(Exception):
-    """A sound entry does not hold what its key stands for."""
+    """A valid entry does not hold a buffer of the expected type and shape."""
 
 
 # --- buffers of a view, tile by tile --------------------------------------------------------------------
 
 
 class BufferCodec(Value):
-    """How one value per sample, or several, are stored for a whole view."""
+    """The encoding of a tile buffer with one or several values per sample."""
 
     dtype: type[np.generic]
     planes: int
     pack: Callable[[Any, Buffers], NDArray[Any] | None]
-    """Buffer, all buffers of the tile -> (planes, M) at the hits; None where it cannot be kept."""
+    """Buffer, all buffers of the tile -> (planes, M) at the hits; None if it cannot be stored."""
     unpack: Callable[[NDArray[Any], Hits], Any]
     """(planes, M) and the hits -> buffer."""
     of_pixels: bool = False
-    """Does it have a value for every pixel, hit or not? (planes, P) take the place of (planes, M)."""
+    """True if it has a value for every pixel, hit or not: (planes, P) instead of (planes, M)."""
 
     def layout(self, view: View) -> tuple[tuple[int, ...], type[np.generic]]:
-        """Shape and type of what is stored for a view; truth values take a bit."""
+        """Shape and type of the array stored for a view; truth values take a bit each."""
         row = view.width * (1 if self.of_pixels else view.samples)
         if self.dtype is np.bool_:
             return (view.height, self.planes, -(-row // 8)), np.uint8
@@ -104,17 +104,17 @@ CODECS = {
     ),
     "edges": BufferCodec(np.bool_, 1, lambda edges, buffers: edges[None], _first, of_pixels=True),
 }
-"""Buffers of a view that are kept: primary hits, where and on what they lie, w, delta of each light; edges of
-adaptive sampling."""
+"""Tile buffers that are stored, by kind: primary hits, their points and materials, w, delta of each light,
+the edges of adaptive sampling."""
 
 
 def codec_of(name: str) -> BufferCodec | None:
-    """How the tile buffer `name` is stored; None for one that is not."""
+    """The encoding of the tile buffer `name`; None if it is not stored."""
     return CODECS.get(name.partition(":")[0])
 
 
 class StoredBuffer(Record):
-    """A buffer of a whole view as it is stored: (height, planes, samples of a row), truth values in bits."""
+    """A buffer of a view as it is stored: (height, planes, samples of a row), truth values as bits."""
 
     codec: BufferCodec
     values: NDArray[Any]
@@ -134,7 +134,7 @@ class StoredBuffer(Record):
 
 
 class Loads(Protocol):
-    """A stored buffer, of a whole view or of some of its pixels."""
+    """A stored buffer, of all or some of the pixels of a view."""
 
     @property
     def codec(self) -> BufferCodec: ...
@@ -166,8 +166,8 @@ def load_tile(stored: Loads, tile: Tile, hits: Hits) -> Any:
 
 
 def pack_tile(name: str, buffers: Buffers, tile: Tile, per_pixel: int) -> NDArray[Any] | None:
-    """(height, planes, samples of a row) of a tile's buffer, -1 or 0 where there is no hit; None where it
-    cannot be kept."""
+    """(height, planes, samples of a row) of a tile's buffer, -1 or 0 at samples without a hit; None if it
+    cannot be stored."""
     codec = codec_of(name)
     packed = None if codec is None else codec.pack(buffers[name], buffers)
     if codec is None or packed is None:
@@ -190,11 +190,14 @@ def stored_buffer(codec: BufferCodec, stored: Stored, view: View) -> StoredBuffe
     return StoredBuffer(codec, stored.arrays[0], view.samples)
 
 
-# --- buffers of the whole scene as text and arrays -----------------------------------------------------
+# --- buffers of the scene as text and arrays -----------------------------------------------------
 
 
 def encode(value: Any, arrays: list[NDArray[Any]], seen: dict[int, int]) -> Any:
-    """`value` as JSON has it, its arrays in a list of their own; an array that occurs twice is kept once."""
+    """`value` for JSON, with its arrays appended to `arrays`; an array that occurs twice is stored once.
+
+    `seen` maps the `id` of an array to its index.
+    """
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.ndarray):
@@ -208,13 +211,13 @@ def encode(value: Any, arrays: list[NDArray[Any]], seen: dict[int, int]) -> Any:
     if isinstance(value, Mapping):
         return {"dict": [[key, encode(part, arrays, seen)] for key, part in value.items()]}
     if type(value).__name__ not in CLASSES:
-        raise TypeError(f"{type(value).__name__} is not among what is kept")
+        raise TypeError(f"{type(value).__name__} is not stored")
     parts = {name: encode(part, arrays, seen) for name, part in vars(value).items()}
     return {"class": type(value).__name__, "fields": parts}
 
 
 def decode(data: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
-    """What `encode` was given."""
+    """The value that `encode` encoded."""
     if not isinstance(data, dict):
         return data
     if "array" in data:
@@ -233,7 +236,7 @@ def decode(data: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
 
 
 def _fits(part: object, declared: str) -> bool:
-    """Is the part of a record, as decoded, what its declaration says, as far as arrays and None go?"""
+    """True if a decoded part agrees with its declaration, as far as arrays and None are concerned."""
     if part is None:
         return "None" in declared
     if isinstance(part, np.ndarray):
@@ -242,7 +245,7 @@ def _fits(part: object, declared: str) -> bool:
 
 
 def decode_entry(stored: Stored, expected: type | tuple[type, ...]) -> Any:
-    """A buffer of the whole scene, from its entry.
+    """A buffer of the scene, from its entry.
 
     Raises
     ------

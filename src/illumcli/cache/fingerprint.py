@@ -1,7 +1,7 @@
-"""What values and files are known by: equal text for equal content, in every process.
+"""Fingerprints of values and files: equal text for equal content, in every process.
 
-`fingerprint` writes a value as text, `digest` hashes it. A class may have a method `fingerprint()` that
-writes its own, as `FileFingerprint` does: it stands for the content of a file, not for its path or date.
+`fingerprint` writes a value as text, `digest` hashes it. A class may have its own method `fingerprint()`, as
+`FileFingerprint` does, which identifies a file by its content, not by its path or date.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from illumcli.records import Value
 
 
 def fingerprint(value: object) -> str:
-    """Text that equal values have in every process, and different values do not.
+    """Text that is equal for equal values, in every process, and differs for different values.
 
-    Of functions their short name and the values bound to them, of records the fields that their `repr` shows,
-    of descriptions of a scene all fields.
+    It has the short name of a function and the values bound to it, the fields of a record that its `repr`
+    shows, and all fields of a description.
 
     Raises
     ------
     TypeError
-        A value that has no text of its own: an array, an arbitrary object.
+        A value without a fingerprint: an array, an arbitrary object.
     """
     if value is None or isinstance(value, str | int | float | bytes):
         return repr(value)
@@ -42,8 +42,8 @@ def fingerprint(value: object) -> str:
         return fingerprint((value.func, value.args, sorted(value.keywords.items())))
     if ismethod(value):
         return fingerprint((value.__func__, value.__self__))
-    if (own_text := getattr(value, "fingerprint", None)) is not None:
-        return str(own_text())
+    if (method := getattr(value, "fingerprint", None)) is not None:
+        return str(method())
     if isinstance(value, Value):
         named = {part.name: getattr(value, part.name) for part in fields(value) if part.repr}
     elif isinstance(value, Iterable) and type(value).__module__.startswith("illumcli."):
@@ -54,7 +54,7 @@ def fingerprint(value: object) -> str:
 
 
 def digest(value: object) -> str:
-    """32 hexadecimal digits that stand for the fingerprint of a value."""
+    """Hash of the fingerprint of a value, 32 hexadecimal digits."""
     return hashlib.blake2b(fingerprint(value).encode(), digest_size=16).hexdigest()
 
 
@@ -63,15 +63,15 @@ def _none(path: Path) -> Iterable[Path]:
 
 
 class FileFingerprint(Value):
-    """The content of a file and of those beside it that it names, read when it is first needed."""
+    """The content of a file and of the files beside it that it names, read when first needed."""
 
     locate: Callable[[], Path]
-    """Finds the file; its errors are raised when the content is needed."""
+    """Returns the path; its errors are raised when the content is needed."""
     beside: Callable[[Path], Iterable[Path]] = field(default=_none)
-    """The files that `path` names, whether they exist or not."""
+    """The files that the file at a path names, whether they exist or not."""
 
     def fingerprint(self) -> str:
-        """Text that stands for the content.
+        """Text that identifies the content.
 
         Raises
         ------
@@ -82,12 +82,12 @@ class FileFingerprint(Value):
 
     @cached_property
     def path(self) -> Path:
-        """Where the file is."""
+        """The path of the file."""
         return self.locate()
 
     @cached_property
     def digest(self) -> str:
-        """32 hexadecimal digits."""
+        """Hash of the content, 32 hexadecimal digits."""
         content = file_digest(self.path)
         others = [
             (path.name, file_digest(path) if path.is_file() else None) for path in self.beside(self.path)
@@ -96,7 +96,7 @@ class FileFingerprint(Value):
 
     @property
     def has_changed(self) -> bool:
-        """Is the content another one than when it was first needed? False where it never was."""
+        """True if the content has changed since it was first needed; False if it never was."""
         return "digest" in vars(self) and FileFingerprint(self.locate, self.beside).digest != self.digest
 
 

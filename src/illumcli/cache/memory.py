@@ -1,4 +1,4 @@
-"""Buffers that the variants of a sweep keep in memory for each other."""
+"""Buffers in memory that one variant of a sweep leaves to the next."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from illumcli.film.tiles import Tile
 from illumcli.records import Value
 
 LIMIT = 1 << 30
-"""Bytes of tile buffers that are kept."""
+"""Greatest size of all tile buffers together [bytes]."""
 
 
 class MemoryCache:
-    """Buffers by key in this process, of tiles and of the whole scene, up to a number of bytes."""
+    """Buffers by key in this process, of the scene and of tiles; the latter up to `limit` bytes."""
 
     def __init__(self, wanted: frozenset[str] = frozenset(), limit: int = LIMIT) -> None:
         self.wanted = wanted
         """Keys of buffers that the next variant reads."""
         self.limit = limit
         self.once: dict[str, Any] = {}
-        """Buffers of the whole scene."""
+        """Buffers of the scene."""
         self.pixels: dict[str, Any] = {}
         """Buffers of some pixels of a view (`cache.pixels`)."""
         self.needed: frozenset[int] = frozenset()
-        """Numbers of the objects that some variant so far needed."""
+        """Numbers of the objects that any variant so far needed."""
         self._tiles: dict[str, dict[Tile, Any]] = {}
         self._complete: set[str] = set()
         self._bytes = 0
         self._lock = threading.Lock()
 
     def tiles(self, key: str) -> Mapping[Tile, Any] | None:
-        """The buffer of this key by tile; None where not every tile has it."""
+        """The buffer of this key by tile; None unless all tiles have it."""
         return self._tiles[key] if key in self._complete else None
 
     def add(self, key: str, tile: Tile, buffer: object) -> None:
-        """Keep a tile's buffer; beyond the limit the key is given up with all its tiles."""
+        """Keep a tile's buffer; if the limit is exceeded, drop the key with all its tiles."""
         size = sum(array.nbytes for array in arrays_in(buffer))
         with self._lock:
             if key not in self.wanted or key in self._complete:
@@ -52,7 +52,7 @@ class MemoryCache:
             self._tiles.setdefault(key, {})[tile] = buffer
 
     def complete(self, keys: frozenset[str]) -> None:
-        """Every tile of these keys has been added."""
+        """Note that every tile of these keys has been added."""
         self._complete |= keys & self._tiles.keys()
 
     def retire(self) -> None:

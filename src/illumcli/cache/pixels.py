@@ -1,4 +1,4 @@
-"""Buffers at some pixels of a view alone, which adaptive sampling gave all samples."""
+"""Stored buffers of some pixels of a view, those that adaptive sampling gave all samples."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from illumcli.graph import Buffers
 from illumcli.records import Record
 
 LIMIT = 1 << 28
-"""Bytes of the buffers of one view that are held until it is finished; beyond them none is kept."""
+"""Greatest size of the buffers of an unfinished view [bytes]; if they exceed it, none is stored."""
 FRESH = 0.02
-"""Share of new pixels from which on an entry is written anew."""
+"""An entry is written anew if it gets at least this share of new pixels."""
 
 
 class PixelBuffer(Record):
-    """A buffer of K pixels of a view as it is stored."""
+    """A buffer of K pixels of a view, as it is stored."""
 
     codec: BufferCodec
     pixels: NDArray[np.int64]  # (K,) row * width + column, ascending
@@ -34,14 +34,14 @@ class PixelBuffer(Record):
     width: int  # of the view
 
     def tile(self, tile: Tile) -> NDArray[Any]:
-        """(planes, N) of the samples of pixels that are all among these."""
+        """(planes, N) of the samples of a tile whose pixels are all among these."""
         column, row = tile.pixels()
         values = self.values[np.searchsorted(self.pixels, row * self.width + column)]
         return values.transpose(1, 0, 2).reshape(self.codec.planes, -1)
 
 
 def pixel_key(key: str) -> str:
-    """The key of the entry of some pixels of a buffer, whose key is that of all pixels."""
+    """The key of the entry that holds some pixels of the buffer with this key."""
     return digest((key, "some pixels"))
 
 
@@ -64,16 +64,16 @@ def pixel_buffer(codec: BufferCodec, stored: Stored, view: View) -> PixelBuffer:
 
 
 def common_pixels(buffers: Sequence[PixelBuffer]) -> NDArray[np.int64]:
-    """The pixels that all buffers have, ascending; none where there is no buffer."""
-    found = buffers[0].pixels if buffers else np.zeros(0, np.int64)
+    """The pixels that all buffers have, ascending; none if there is no buffer."""
+    common = buffers[0].pixels if buffers else np.zeros(0, np.int64)
     for each in buffers[1:]:
-        if not np.array_equal(found, each.pixels):
-            found = np.intersect1d(found, each.pixels, assume_unique=True)
-    return found
+        if not np.array_equal(common, each.pixels):
+            common = np.intersect1d(common, each.pixels, assume_unique=True)
+    return common
 
 
 class PixelRecorder:
-    """Keeps buffers of some pixels of a view while it is rendered; safe to use from several threads."""
+    """Keeps buffers of some pixels of a view while it is rendered; several threads may use it."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class PixelRecorder:
         wanted = {name for name, key in keys.items() if memory is not None and key in memory.wanted}
         named = {name for name in keys if codec_of(name) is not None}
         self.names = frozenset(named if store is not None else named & wanted)
-        """The buffers that every batch of pixels hands over."""
+        """Names of the buffers to take of every batch of pixels."""
         self._parts: dict[str, list[tuple[NDArray[np.int64], NDArray[Any]]]] = {
             name: [] for name in self.names
         }
@@ -109,7 +109,10 @@ class PixelRecorder:
                     self._parts.clear()
 
     def finish(self, seconds: Mapping[str, float]) -> None:
-        """Keep what is worth it, joined with what was kept before; `seconds` by name, with all its inputs."""
+        """Store the buffers that are worth it, joined with the pixels stored before.
+
+        `seconds` is the time that each buffer took with all its inputs, by name.
+        """
         for name, parts in self._parts.items():
             known, codec = self._known.get(name), codec_of(name)
             count = sum(len(pixels) for pixels, _ in parts)

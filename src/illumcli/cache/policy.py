@@ -16,8 +16,8 @@ from illumcli.shading.materials import Numbering
 
 LOAD_SECONDS = 0.001
 LOAD_RATE = 1e9
-"""Loading a buffer is taken to last `LOAD_SECONDS` and a second per `LOAD_RATE` bytes, checksum included:
-about half as fast as measured."""
+"""Assumed time to load and verify a buffer: `LOAD_SECONDS`, and a second per `LOAD_RATE` bytes. Measured
+loads are about twice as fast."""
 
 SCENE_BUFFERS: Mapping[str, type | tuple[type, ...]] = {
     "mesh": Mesh,
@@ -33,26 +33,27 @@ SCENE_BUFFERS: Mapping[str, type | tuple[type, ...]] = {
     "corner_normals": CornerVectors,
     "numbering": Numbering,
 }
-"""Buffers of the whole scene that are kept, by name or by its part before the colon, and their types.
+"""Types of the buffers of the scene that are kept, by name or by its part before the colon.
 
-Not kept: the Embree tree, which Embree does not give away, and what is computed from these faster than it is
-loaded.
+Not kept: Embree's tree, which Embree cannot export, and buffers that are computed from these faster than they
+are loaded.
 """
 ALWAYS = ("camera",)
-"""Kept whatever they took: the keys of a view's buffers depend on the camera's place."""
+"""Buffers kept even if computing them is fast: the keys of a view's buffers depend on the camera's place."""
 
 
 def worth(seconds: float, size: int) -> bool:
-    """Is it worth keeping what took `seconds` of one processor, with all its inputs, and has `size` bytes?"""
+    """True if loading `size` bytes is faster than the `seconds` of one processor that a buffer took, with all
+    its inputs."""
     return seconds > LOAD_SECONDS + size / LOAD_RATE
 
 
 def is_kept(name: str) -> bool:
-    """Is a buffer of this name ever kept between runs?"""
+    """True if buffers of this name may be kept between runs."""
     kind = name.partition(":")[0]
     return kind in CODECS or kind in SCENE_BUFFERS
 
 
 def is_always_kept(name: str) -> bool:
-    """Is a buffer of this name kept even where computing it takes no time?"""
+    """True if a buffer of this name is kept even if computing it is fast."""
     return name.partition(":")[0] in ALWAYS

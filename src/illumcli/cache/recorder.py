@@ -1,4 +1,4 @@
-"""Keeps what a run computes, in the memory of this process and in the store on disk."""
+"""Keeps the buffers that a run computes, in memory and in the store on disk."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from illumcli.records import Value
 
 
 class Cache(Value):
-    """Where buffers are kept: in memory from one variant to the next, on disk from one run to the next."""
+    """The places where buffers are kept: in memory between variants, on disk between runs."""
 
     store: Store | None = None
     memory: MemoryCache | None = None
 
     def accepts(self, name: str) -> bool:
-        """May a buffer of this name be kept?"""
+        """True if a buffer of this name may be kept."""
         return self.memory is not None or (self.store is not None and policy.is_kept(name))
 
     def keep(self, name: str, key: str, value: object, seconds: float) -> None:
-        """Keep a buffer of the whole scene that took `seconds` with all its inputs, if it is worth it."""
+        """Keep a buffer of the scene that took `seconds` with all its inputs, if it is worth it."""
         if self.memory is not None:
             self.memory.once[key] = value
         if self.store is None or not policy.is_kept(name):
@@ -60,24 +60,24 @@ class BufferRecorder:
         self.names = frozenset(self._writers) | frozenset(
             name for name, key in keys.items() if self._memory is not None and key in self._memory.wanted
         )
-        """The buffers that every tile hands over."""
+        """Names of the buffers to take of every tile."""
 
-    def take(self, name: str, buffers: Buffers, tile: Tile, own: Tile | None = None) -> NDArray[Any] | None:
-        """What the store will hold of a tile's buffer, (height, planes, samples of a row); any thread.
+    def take(self, name: str, buffers: Buffers, tile: Tile, part: Tile | None = None) -> NDArray[Any] | None:
+        """A tile's buffer as it is stored, (height, planes, samples of a row); called by any thread.
 
-        Where the buffers are those of a larger `tile`, `own` is the part of it that is kept on disk.
+        If `tile` is larger than the tile to store, `part` is the latter.
         """
         if self._memory is not None:
             self._memory.add(self._keys[name], tile, buffers[name])
         packed = pack_tile(name, buffers, tile, self._view.samples) if name in self._writers else None
-        if packed is None or own is None:
+        if packed is None or part is None:
             return packed
-        rows, columns = own.within(tile)
+        rows, columns = part.within(tile)
         each = packed.shape[2] // tile.width
         return packed[rows, :, columns.start * each : columns.stop * each]
 
     def write(self, row: Mapping[str, list[NDArray[Any] | None]]) -> None:
-        """The next row of tiles, from left to right."""
+        """Write the next row of tiles, from left to right."""
         for name, parts in row.items():
             writer = self._writers.get(name)
             if writer is None:
@@ -90,7 +90,10 @@ class BufferRecorder:
             writer.append(0, np.packbits(values, axis=-1) if values.dtype == np.bool_ else values)
 
     def finish(self, seconds: Mapping[str, float]) -> None:
-        """Keep what is complete and was worth it; `seconds` by name, with all its inputs."""
+        """Keep the complete buffers that are worth it.
+
+        `seconds` is the time that each buffer took with all its inputs, by name.
+        """
         for name, writer in self._writers.items():
             if policy.worth(seconds[name], writer.bytes):
                 writer.commit()
@@ -101,7 +104,7 @@ class BufferRecorder:
         self._writers = {}
 
     def discard(self) -> None:
-        """Keep nothing that is not finished."""
+        """Discard unfinished buffers."""
         for writer in self._writers.values():
             writer.discard()
         self._writers = {}

@@ -6,8 +6,8 @@ again. Entries are never modified: they are written under a temporary name, rena
 processes may share a folder. Entries are read, not mapped: truncating a mapped file kills the process, and
 changing one would bypass the check.
 
-The checksum finds accidents. What keeps strangers out is who may write to the folder and to the entry: the
-user and root alone, else nothing of it is read and nothing kept in it.
+The checksum detects accidental damage, not forgery. The folder and its entries must therefore be writable by
+the user and root alone; otherwise the store neither reads nor writes.
 
 References
 ----------
@@ -40,33 +40,33 @@ from illumcli.memory import free_memory
 from illumcli.records import Record, Value
 
 SUFFIX = ".illum"
-ABANDONED = 86400  # [s] whoever has not written to a temporary file for so long is gone, locks or not
+ABANDONED = 86400  # [s] a temporary file that was not written to for so long is removed, even if it is locked
 LIMIT = 4 << 30
 """Bytes that all entries together may take, unless ILLUM_CACHE_SIZE says otherwise."""
 LARGEST_SHARE = 4
-"""No entry takes more than this part of the limit."""
+"""The largest entry takes the limit divided by this."""
 SMALL, COUNTED = 1024, "00"
-"""A run that adds less than this part of the limit leaves the pruning to others, unless one of its keys
-begins with `COUNTED`, as one of 256 does: the limit may be outgrown by a quarter at worst, on average."""
+"""A run that adds less than the limit divided by `SMALL` does not prune, unless one of its keys begins with
+`COUNTED`, as one of 256 does: on average the limit is exceeded by a quarter at most."""
 LONGEST = 1 << 24  # [bytes] of a description
 LARGE = 1 << 26
-"""An entry of so many bytes is read only where it takes no more than `MEMORY_SHARE` of the free memory."""
+"""An entry of so many bytes is read only if it takes no more than `MEMORY_SHARE` of the free memory."""
 MEMORY_SHARE = 0.5
 
 _HEADER = struct.Struct("<8sIIQ32s8x")  # magic, format, length of the description, of the arrays, checksum
 _MAGIC, _FORMAT = b"illum\r\n\0", 1
 _WORDS = 8192  # words of 8 bytes that one sum covers
-_PIECE = 16 * 8 * _WORDS  # [bytes] read at a time: summed while the processor's cache still holds it
+_PIECE = 16 * 8 * _WORDS  # [bytes] read at a time: summed while they are in the processor's cache
 _TYPE = re.compile("[<>|][biuf][1248]")
 _ENTRY = re.compile(r"[0-9a-f]+\.illum")
 _PART = re.compile(r"\.[0-9a-f]+\.[0-9]+\.[0-9a-f]{8}\.part")
 _ENTRY_OR_PART = re.compile(f"{_ENTRY.pattern}|{_PART.pattern}")
-"""Names of what the store writes: nothing else in its folder is looked at or removed."""
+"""Names of the files that the store writes: it neither reads nor removes others in its folder."""
 _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 
 
 class Refused(Exception):
-    """A file of the folder is not a sound entry; the text says why."""
+    """A file in the folder is not a valid entry; the text says why."""
 
 
 class Entry(Value):
@@ -82,15 +82,15 @@ class Entry(Value):
 
 
 class Pruned(Value):
-    """What became of the entries that had to go."""
+    """The entries that were removed, or should have been."""
 
     gone: tuple[Entry, ...]
     stayed: Mapping[Path, str]
-    """Those that could not be removed, and why."""
+    """Entry that could not be removed -> why."""
 
 
 class Stored(Record):
-    """An entry that was read and is sound. Arrays are read-only."""
+    """An entry that was read and verified. Its arrays are read-only."""
 
     about: Mapping[str, Any]
     arrays: tuple[NDArray[Any], ...]
@@ -98,8 +98,10 @@ class Stored(Record):
 
 
 class Store:
-    """Entries by key in one folder. A folder that cannot be read or written, or that others can write to,
-    costs time only: `warning` says what happened first; from the first refusal on nothing more is written.
+    """Entries by key in one folder.
+
+    If the folder cannot be read or written, or others can write to it, runs only take longer: `warning` holds
+    the first problem. After one failed write nothing more is written.
     """
 
     def __init__(self, folder: Path, limit: int = LIMIT) -> None:
@@ -108,19 +110,19 @@ class Store:
         self.warning: str | None = None
         self._writes = True
         self._fresh = 0  # bytes added since the last pruning
-        self._counts = False  # is the end of this run to prune?
+        self._counts = False  # True if the end of this run prunes
 
     @property
     def largest(self) -> int:
-        """The most bytes one entry may take."""
+        """The greatest size of an entry [bytes]."""
         return self.limit // LARGEST_SHARE
 
     def has(self, key: str) -> bool:
-        """Is there an entry of this key, sound or not?"""
+        """True if there is an entry of this key, valid or not."""
         return self._is_trusted() and os.path.isfile(self._path(key))
 
     def read(self, key: str) -> Stored | None:
-        """The entry of this key, as used just now; None where there is none or it is not sound."""
+        """The entry of this key, whose time of use becomes now; None if there is no valid one."""
         path = self._path(key)
         if not self._is_trusted():
             return None
@@ -139,13 +141,13 @@ class Store:
         return None
 
     def reject(self, key: str, fact: str) -> None:
-        """Take away an entry that is of no use; the fact says why."""
+        """Remove an entry that cannot be used; `fact` is the reason."""
         path = self._path(key)
         self._warn(f"{path}: {fact}; it is made again")
         removed(path)
 
     def save(self, key: str, about: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> bool:
-        """Keep the arrays under this key; False where they are too large or cannot be written."""
+        """Write arrays under this key; False if they are too large or cannot be written."""
         shapes = [(array.shape, array.dtype) for array in arrays]
         writer = self.writer(key, about, shapes)
         if writer is None:
@@ -157,7 +159,7 @@ class Store:
     def writer(
         self, key: str, about: Mapping[str, Any], shapes: Sequence[tuple[tuple[int, ...], Any]]
     ) -> Writer | None:
-        """Takes arrays of these shapes and types piece by piece; None where nothing can be written."""
+        """A writer of arrays of these shapes and types; None if nothing can be written."""
         places, end = _places(shapes)
         if not self._writes or end > self.largest or not self._is_trusted():
             return None
@@ -169,7 +171,7 @@ class Store:
         part = self.folder / f".{key}.{os.getpid()}.{os.urandom(4).hex()}.part"
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not self._is_trusted():  # somebody else was faster
+            if not self._is_trusted():  # another process created it
                 return None
             return Writer(self, part, self._path(key), text, [place["at"] for place in places], end)
         except OSError as error:
@@ -177,7 +179,7 @@ class Store:
             return None
 
     def refused(self, error: OSError | Refused) -> None:
-        """Note that the operating system refuses to write; nothing more is tried."""
+        """Note a failed write; nothing more is written."""
         self._writes = False
         fact = getattr(error, "strerror", None) or error
         self._warn(f"{self.folder}: cannot be written: {fact}; nothing more is kept there")
@@ -186,15 +188,14 @@ class Store:
         """Note that an entry of so many bytes was added."""
         self._fresh += size
         self._counts |= self._fresh * SMALL > self.limit or key.startswith(COUNTED)
-        if (
-            self._fresh > self.largest
-        ):  # a long run does not outgrow the limit by more than one entry may take
+        # A long run exceeds the limit by no more than the largest entry.
+        if self._fresh > self.largest:
             self._prune()
 
     def finish(self) -> None:
-        """Remove what killed runs left, and prune where this run added much, or an entry whose key says so.
+        """Remove temporary files of killed runs; prune if this run added much, or a key of `COUNTED`.
 
-        To count all entries takes 10 us each, to count them after every small run the square of their number.
+        Counting takes 10 us per entry: after every small run, it would take time quadratic in their number.
         """
         if self._writes and self._is_trusted():
             if self._counts:
@@ -203,35 +204,36 @@ class Store:
                 self._remove_left_over()
 
     def _prune(self) -> None:
-        """Prune; what cannot be removed is a warning."""
+        """Prune; entries that cannot be removed are a warning."""
         self._fresh, self._counts = 0, False
         for path, fact in self.prune(self.limit).stayed.items():
             self._warn(f"{path}: cannot be removed: {fact}; the cache takes more than its limit")
 
     def entries(self) -> list[Entry]:
         """Every entry, the least recently used first."""
-        found = sorted((used, name, size) for name, size, used in self._files(_ENTRY))
-        return [Entry(self.folder / name, size, used) for used, name, size in found]
+        files = sorted((used, name, size) for name, size, used in self._files(_ENTRY))
+        return [Entry(self.folder / name, size, used) for used, name, size in files]
 
     def faults(self) -> dict[Path, str]:
-        """What is wrong with each entry that is not sound."""
-        found = {}
+        """Entry -> what is wrong with it, of those that are not valid."""
+        faults = {}
         for entry in self.entries():
             try:
                 read_entry(entry.path, entry.key)
             except (FileNotFoundError, MemoryError):
-                continue  # another process was faster; too large to tell
+                continue  # removed by another process; too large to read
             except (OSError, Refused) as error:
-                found[entry.path] = str(error)
-        return found
+                faults[entry.path] = str(error)
+        return faults
 
     def prune(self, limit: int) -> Pruned:
-        """Take the least recently used entries away until all fit into `limit` bytes, those in the making
-        included."""
+        """Remove the least recently used entries until all, with unfinished ones, fit into `limit` bytes."""
         self._remove_left_over()
-        # entries that all stay are counted one by one, not listed: a record takes a kilobyte
+        # Without a list if everything fits: a record takes a kilobyte.
         if sum(size for _, size, _ in self._files(_ENTRY_OR_PART)) <= limit:
             return Pruned((), {})
+
+        # Remove entries in the order of their last use.
         entries, gone, stayed = self.entries(), [], {}
         total = sum(entry.bytes for entry in entries) + sum(size for _, size, _ in self._files(_PART))
         for entry in entries:
@@ -254,7 +256,7 @@ class Store:
                 atomic.remove_abandoned(self.folder / name)
 
     def _is_trusted(self) -> bool:
-        """May nobody but the user and root write to the folder, or is it not there?"""
+        """True if only the user and root can write to the folder, or it does not exist."""
         fact = distrust(self.folder)
         if fact is not None:
             self._warn(f"{self.folder}: {fact}; nothing is read or kept there")
@@ -267,7 +269,7 @@ class Store:
         """Name, bytes and last use [s since the epoch] of each file whose name is one of `names`."""
         with suppress(OSError), os.scandir(self.folder) as listing:
             for each in listing:
-                if names.fullmatch(each.name):  # most stop at their first letter
+                if names.fullmatch(each.name):  # most fail at their first letter
                     with suppress(OSError):
                         status = each.stat(follow_symlinks=False)
                         if not stat.S_ISDIR(status.st_mode):
@@ -278,14 +280,14 @@ class Store:
 
 
 class Writer:
-    """An entry in the making: arrays in their order, each in pieces; then `commit`, or `discard`."""
+    """Writes one entry: arrays in their order, each in pieces; then `commit` or `discard`."""
 
     def __init__(
         self, store: Store, part: Path, target: Path, text: bytes, places: Sequence[int], end: int
     ) -> None:
         self._store, self._part, self._target, self._text = store, part, target, text
         self._start = _HEADER.size + len(text)
-        self._at = [self._start + place for place in places]  # where the next piece of each array goes
+        self._at = [self._start + place for place in places]  # offset of the next piece of each array
         self._end = end
         self.bytes = self._start + end
         self._failed = False
@@ -302,24 +304,24 @@ class Writer:
         self._try(lambda: self._file.truncate(self._start + end))
 
     def write(self, array: NDArray[Any]) -> None:
-        """The next array, whole."""
+        """Write the next array in one piece."""
         self.append(self._number, array)
         self._number += 1
 
     def append(self, number: int, piece: NDArray[Any]) -> None:
-        """The next piece of array `number`."""
+        """Write the next piece of array `number`."""
         data = np.ascontiguousarray(piece).reshape(-1).view(np.uint8)
         at = self._at[number]
         self._at[number] += data.nbytes
         self._try(lambda: _write_at(self._file, data, at))
 
     def commit(self) -> bool:
-        """Give the entry its name; False where anything failed."""
+        """Give the entry its name; False if any write failed."""
         self._try(self._finish)
         return not self._failed
 
     def discard(self) -> None:
-        """Leave no trace."""
+        """Remove the temporary file."""
         self._failed = True
         with suppress(OSError):
             self._file.close()
@@ -333,7 +335,7 @@ class Writer:
         pieces = _pieces(self._file.fileno(), self._start, self._end)
         sum_ = checksum(head + self._text, pieces)
         _write_at(self._file, np.frombuffer(head + sum_ + bytes(8), np.uint8), 0)
-        os.replace(self._part, self._target)  # not forced to disk: whoever reads it checks it
+        os.replace(self._part, self._target)  # not forced to disk: every reader verifies it
         with suppress(OSError):
             self._file.close()
         atomic.untrack(self._part)
@@ -350,27 +352,27 @@ class Writer:
 
 
 def distrust(folder: Path) -> str | None:
-    """Why nothing in this folder can be trusted, and the way out; None where only the user and root write to
-    it, or where there is none."""
+    """Why the folder cannot be trusted, and what to do; None if only the user and root can write to it, or it
+    does not exist."""
     try:
         link, status = os.lstat(folder), os.stat(folder)
     except OSError:
         return None
-    way = f"chmod go-w {folder}, or name another folder by ILLUM_CACHE"
-    return _strangers(link, way) or _strangers(status, way)
+    advice = f"chmod go-w {folder}, or name another folder by ILLUM_CACHE"
+    return _other_writers(link, advice) or _other_writers(status, advice)
 
 
-def _strangers(status: os.stat_result, way: str) -> str | None:
-    """Who but the user and root may write to a file or folder, and the way out; None for nobody."""
+def _other_writers(status: os.stat_result, advice: str) -> str | None:
+    """Who beside the user and root can write to a file or folder, and what to do; None if nobody can."""
     if status.st_uid not in (0, os.geteuid()):
         return f"belongs to another user ({status.st_uid}); name a folder of your own by ILLUM_CACHE"
     if not stat.S_ISLNK(status.st_mode) and status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others can write to it; {way}"
+        return f"others can write to it; {advice}"
     return None
 
 
 def removed(path: Path) -> str | None:
-    """Remove a file of the store; why it stays, None where it is gone."""
+    """Remove a file of the store; the reason if that fails, otherwise None."""
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
@@ -379,7 +381,7 @@ def removed(path: Path) -> str | None:
 
 
 def described(path: Path) -> dict[str, Any]:
-    """What an entry says of itself, not verified.
+    """The description of an entry, whose checksum is not verified.
 
     Raises
     ------
@@ -387,11 +389,11 @@ def described(path: Path) -> dict[str, Any]:
     Refused
     """
     with _opened(path) as file:
-        return _said(_head(file)[2])
+        return _description(_head(file)[2])
 
 
 def read_entry(path: Path, key: str, largest: int = LIMIT) -> Stored:
-    """The entry at `path`, sound to the last bit, of this key and of `largest` bytes at most.
+    """The entry at `path`, verified; it must have this key and at most `largest` bytes.
 
     Raises
     ------
@@ -399,6 +401,7 @@ def read_entry(path: Path, key: str, largest: int = LIMIT) -> Stored:
     Refused
     MemoryError
     """
+    # Read the arrays in pieces, and verify the checksum of all bytes.
     with _opened(path) as file:
         head, end, text = _head(file)
         size = os.fstat(file.fileno()).st_size
@@ -412,11 +415,14 @@ def read_entry(path: Path, key: str, largest: int = LIMIT) -> Stored:
         if checksum(head[:24] + text, _pieces(file.fileno(), start, end, payload)) != head[24:56]:
             raise Refused("damaged: its checksum differs")
     payload.flags.writeable = False
-    said = _said(text)
+
+    # Find the arrays by the description.
+    description = _description(text)
     try:
-        if said["key"] != key:
+        if description["key"] != key:
             raise Refused("the entry of another key")
-        about, arrays = dict(said["about"]), tuple(_array(payload, place) for place in said["arrays"])
+        about = dict(description["about"])
+        arrays = tuple(_array(payload, place) for place in description["arrays"])
     except (LookupError, TypeError, ValueError, OverflowError):
         raise Refused("its description is none of an entry") from None
     return Stored(about, arrays, size)
@@ -424,7 +430,7 @@ def read_entry(path: Path, key: str, largest: int = LIMIT) -> Stored:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[BinaryIO]:
-    """The file of an entry: itself, not through a link, and nobody else's to write to."""
+    """The file of an entry, opened without following links; only the user and root may write to it."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError as error:
@@ -435,7 +441,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode):
             raise Refused("not a file")
-        if fact := _strangers(status, "only the user may"):
+        if fact := _other_writers(status, "only the user may"):
             raise Refused(fact)
     except Refused:
         os.close(handle)
@@ -445,7 +451,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _head(file: BinaryIO) -> tuple[bytes, int, bytes]:
-    """The header of an entry, how many bytes its arrays take, and its description as text."""
+    """The header of an entry, the size of its arrays [bytes], and its description as text."""
     size = os.fstat(file.fileno()).st_size
     head = os.pread(file.fileno(), _HEADER.size, 0)
     magic, form, text_size, end, _ = _HEADER.unpack(head.ljust(_HEADER.size, b"\0"))
@@ -461,23 +467,23 @@ def _head(file: BinaryIO) -> tuple[bytes, int, bytes]:
     return head, end, text.tobytes()
 
 
-def _said(text: bytes) -> dict[str, Any]:
-    """The description of an entry."""
+def _description(text: bytes) -> dict[str, Any]:
+    """The description of an entry, from its text."""
     try:
-        said = json.loads(text)
+        description = json.loads(text)
     except (ValueError, RecursionError):
         raise Refused("damaged: its description cannot be read") from None
-    if not isinstance(said, dict):
+    if not isinstance(description, dict):
         raise Refused("its description is none of an entry")
-    return said
+    return description
 
 
 def checksum(text: bytes, pieces: Iterable[NDArray[np.uint8]]) -> bytes:
     """32 bytes that any change of a word of the data, and any but one in 2^64 of larger damage, changes.
 
-    The data comes in pieces of whole blocks of 64 KiB, but for the last. Blocks are first summed up, word by
-    word times fixed odd numbers modulo 2^64, ten times as fast as a cryptographic hash: this is to find
-    accidents, an attacker could write the whole entry.
+    The data comes in pieces of whole blocks of 64 KiB, except the last. Each block is first reduced to the
+    sum of its words times fixed odd numbers modulo 2^64, ten times as fast as a cryptographic hash. That
+    detects accidents; an attacker could replace the checksum, too.
     """
     digest = hashlib.blake2b(text, digest_size=32)
     for data in pieces:
@@ -497,7 +503,7 @@ def _odd_numbers() -> NDArray[np.uint64]:
 
 
 def _places(shapes: Sequence[tuple[tuple[int, ...], Any]]) -> tuple[list[dict[str, Any]], int]:
-    """Where each array lies behind the description, and where the last one ends."""
+    """The offset of each array after the description, with shape and type, and the end of the last one."""
     places, end = [], 0
     for shape, dtype in shapes:
         places.append({"at": end, "shape": list(shape), "dtype": np.dtype(dtype).str})
@@ -507,7 +513,7 @@ def _places(shapes: Sequence[tuple[tuple[int, ...], Any]]) -> tuple[list[dict[st
 
 
 def _array(payload: NDArray[np.uint8], place: Mapping[str, Any]) -> NDArray[Any]:
-    """One of an entry's arrays; what cannot be one raises ValueError, TypeError or LookupError."""
+    """One of an entry's arrays; a wrong description raises ValueError, TypeError or LookupError."""
     if not _TYPE.fullmatch(place["dtype"]) or any(side < 0 for side in place["shape"]):
         raise ValueError("not an array")
     dtype, count = np.dtype(place["dtype"]), math.prod(place["shape"])
@@ -516,23 +522,23 @@ def _array(payload: NDArray[np.uint8], place: Mapping[str, Any]) -> NDArray[Any]
 
 
 def _aligned(size: int) -> NDArray[np.uint8]:
-    """(size,) bytes that begin at a multiple of 64, not set."""
-    whole = np.empty(size + 63, np.uint8)
-    first = -whole.ctypes.data % 64
-    return whole[first : first + size]
+    """(size,) uninitialised bytes that begin at a multiple of 64."""
+    buffer = np.empty(size + 63, np.uint8)
+    first = -buffer.ctypes.data % 64
+    return buffer[first : first + size]
 
 
 def _pieces(
     handle: int, start: int, size: int, into: NDArray[np.uint8] | None = None
 ) -> Iterator[NDArray[np.uint8]]:
-    """The `size` bytes of a file from `start` on, piece by piece; each is forgotten for the next, or kept in
-    its place of `into`.
+    """The `size` bytes of a file from `start` on, piece by piece. Each overwrites the one before, or is
+    kept in its place in `into`.
 
     Raises
     ------
     OSError
     Refused
-        The file ends before.
+        The file is shorter.
     """
     scratch = np.empty(min(size, _PIECE), np.uint8) if into is None else into
     for first in range(0, size, _PIECE):
@@ -555,12 +561,12 @@ def _write_at(file: BinaryIO, data: NDArray[np.uint8], at: int) -> None:
 
 
 def open_store() -> Store | None:
-    """The store that the user's environment names; None for a user who has no home folder.
+    """The store of the environment's folder and limit; None for a user without a home folder.
 
     Raises
     ------
     InputError
-        ILLUM_CACHE_SIZE says no size.
+        ILLUM_CACHE_SIZE is no size.
     """
     folder = default_folder()
     try:
@@ -570,12 +576,12 @@ def open_store() -> Store | None:
 
 
 def default_folder() -> Path | None:
-    """Where entries are kept: ILLUM_CACHE, else `illum` in the user's cache folder (XDG_CACHE_HOME).
+    """The folder of entries: ILLUM_CACHE, else `illum` in the user's cache folder (XDG_CACHE_HOME).
 
     None for a user without a home folder.
     """
-    if own := os.environ.get("ILLUM_CACHE"):
-        return Path(own)
+    if folder := os.environ.get("ILLUM_CACHE"):
+        return Path(folder)
     base = os.environ.get("XDG_CACHE_HOME", "")
     if not os.path.isabs(base):
         base = os.path.join(os.environ.get("HOME", os.path.expanduser("~")), ".cache")
@@ -583,12 +589,12 @@ def default_folder() -> Path | None:
 
 
 def default_limit() -> int:
-    """Bytes that ILLUM_CACHE_SIZE allows, `LIMIT` by default."""
+    """The limit that ILLUM_CACHE_SIZE sets, by default `LIMIT` [bytes]."""
     return size_of(os.environ["ILLUM_CACHE_SIZE"]) if os.environ.get("ILLUM_CACHE_SIZE") else LIMIT
 
 
 def size_of(text: str) -> int:
-    """Bytes that a text such as `500M` or `4G` means.
+    """The number of bytes in a text such as `500M` or `4G`.
 
     Raises
     ------

@@ -13,6 +13,6 @@ def schema() -> None:
     An editor that knows YAML schemas completes and checks a scene that begins with
       # yaml-language-server: $schema=scene.schema.json
     """
-    from illumcli.commands.schema import run
+    from illumcli.commands.schema import schema_text
 
-    click.echo(run(), nl=False)
+    click.echo(schema_text(), nl=False)

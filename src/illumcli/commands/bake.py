@@ -1,4 +1,4 @@
-"""Bake several inputs: faults of any of them are known before the first ray, and the others are baked."""
+"""Bake several inputs: faults are reported before the first ray, and the other inputs are baked."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from illumcli.records import Value
 
 
 class BakeRequest(Value):
-    """What all inputs are baked with."""
+    """The settings that all inputs are baked with."""
 
     settings: BakeSettings
     patterns: tuple[str, ...]
-    """Of the outputs' names; `{scene}` is the input's name without its suffix."""
+    """Patterns of the outputs' names; `{scene}` is the input's name without its suffix."""
     options: BakeOptions = BakeOptions()
     keep_going: bool = True
 
@@ -30,7 +30,7 @@ class BakeRequest(Value):
         return [Path(expand(pattern, {"scene": path.stem})) for pattern in self.patterns]
 
     def prepare(self, path: Path) -> BakeWork:
-        """An input whose meshes were read."""
+        """The work of one input; reads its meshes."""
         return prepare_bake(path, self.outputs(path), self.settings, self.options)
 
 
@@ -42,34 +42,33 @@ def bake_inputs(
     written: Callable[[Path, list[Path], BakeReport], None],
     tell: Tell,
 ) -> bool:
-    """Bake every input; is the report file kept, since it would hold the same?
+    """Bake every input. True if the report file is kept because it would be the same.
 
-    `written` gets each input that is done, its files and report, `tell` the fault of each that failed.
+    `written` is called with each finished input, its files and report; `tell` with the errors of the others.
 
     Raises
     ------
     IllumError
-        At the end, where any input failed; at once, where files have equal names or the report cannot be
-        written.
+        At the end if any input failed; at once if files have equal names or the report cannot be written.
     """
     batch = Batch("inputs", len(inputs), request.keep_going, tell)
     entries = BatchReport(report, [{"input": str(path)} for path in inputs])
     check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
 
-    # faults that can be known before the first ray; only a lone input's meshes are held meanwhile
-    lone: BakeWork | None = None
+    # Find faults before the first ray. The meshes of a single input are kept for its bake.
+    single: BakeWork | None = None
     for index in batch.due():
         with batch.piece(index):
             work = request.prepare(inputs[index])
             entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
-            lone = work if len(inputs) == 1 else None
+            single = work if len(inputs) == 1 else None
             del work
     entries.look(request.options.force)
 
-    # the bakes
+    # Bake.
     for index in batch.due():
         with batch.piece(index):
-            work = lone or request.prepare(inputs[index])
+            work = single or request.prepare(inputs[index])
             paths, done = bake_prepared(work, request.options.threads, progress)
             entries.add(index, done.as_data())
             written(inputs[index], paths, done)

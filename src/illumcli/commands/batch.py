@@ -1,4 +1,4 @@
-"""Several pieces of work: a failure of one is printed, and the others are done."""
+"""Several pieces of work: if one fails, its error is reported and the others are done."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Tell = Callable[[str], None]
 class Batch:
     """`count` pieces of work, called `what`, and their failures; `tell` gets the text of each failure.
 
-    Without `keep_going` the pieces after one that failed are not done. The error of a lone piece is raised.
+    Without `keep_going` the pieces after one that failed are not done. The error of a single piece is raised.
     """
 
     def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
@@ -28,7 +28,7 @@ class Batch:
         self._keep_going, self._tell = keep_going, tell
 
     def due(self) -> Iterator[int]:
-        """The indices of the pieces that are still to be done."""
+        """The indices of the pieces that have not failed, until the batch has to stop."""
         for number in range(self._count):
             if self.failures and not self._keep_going and number > min(self.failures):
                 return
@@ -37,7 +37,7 @@ class Batch:
 
     @contextmanager
     def piece(self, number: int, label: str = "") -> Iterator[None]:
-        """An error inside is a failure of this piece; its text follows the label."""
+        """Note an error inside as a failure of this piece; its text follows the label."""
         try:
             yield
         except Exception as error:
@@ -48,7 +48,7 @@ class Batch:
             self._tell(f"{label}: {failure}" if label else str(failure))
 
     def finish(self, *also: str) -> None:
-        """Raise how many pieces failed, and the lines of `also`, with the exit code of the first failure."""
+        """If pieces failed, raise their number and the lines of `also`, with the exit code of the first."""
         if self.failures:
             failed = f"{len(self.failures)} of {self._count} {self._what} failed"
             error = IllumError("\n".join([failed, *also]))
@@ -59,7 +59,7 @@ class Batch:
 class BatchReport:
     """The report of a batch: an entry for each piece, with the content that the piece was planned to have.
 
-    `path` is None where no report is asked for.
+    `path` is None if no report is written.
     """
 
     def __init__(self, path: Path | None, entries: list[dict[str, Any]]) -> None:
@@ -68,23 +68,23 @@ class BatchReport:
         self._is_kept = False
 
     def plan(self, number: int, content: str) -> None:
-        """Say what content a piece will have."""
+        """Set the content that a piece will have."""
         self._contents[number] = content
 
     def look(self, force: bool) -> None:
-        """See whether a report of the same content is there; refuse a different file without `force`."""
+        """Check whether a report of the same content exists; without `force` refuse a different file."""
         if self._path is not None:
             refuse_suffix(self._path, "a report", ".json")
             self._is_kept = is_kept(self._path, self._contents, report_contents, force)
 
     def add(self, number: int, entry: dict[str, Any]) -> None:
-        """Take the entry of a piece that is done."""
+        """Set the entry of a finished piece."""
         self._entries[number] = entry
 
     def finish(self, batch: Batch) -> bool:
-        """Write the report, or refresh the date of the one that is kept, and end the batch; is it kept?
+        """Write the report, or refresh the date of the existing one, and end the batch. True if it is kept.
 
-        A report of the same contents is not kept where a piece failed this time.
+        A report of the same contents is replaced if a piece failed this time.
         """
         for number, failure in batch.failures.items():
             self._contents[number] = INCOMPLETE

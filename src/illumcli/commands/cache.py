@@ -1,4 +1,4 @@
-"""What is kept between runs: list it, verify it, take some or all of it away."""
+"""The cache on disk: list, verify, prune or remove its entries."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from illumcli.records import Value
 
 
 class Listing(Value):
-    """The entries of the store and how much they may take."""
+    """The entries of the store, and their limit [bytes]."""
 
     folder: Path
     limit: int
     entries: tuple[tuple[Entry, str], ...]
-    """With the buffer that each holds, the least recently used first."""
+    """Each with the name of its buffer, the least recently used first."""
 
     @property
     def bytes(self) -> int:
@@ -35,35 +35,35 @@ class Listing(Value):
 
 
 def listing() -> Listing:
-    """What the store holds."""
+    """The entries of the store."""
     store = _opened()
-    found = []
+    entries = []
     for entry in store.entries():
         try:
             buffer = described(entry.path)["about"]["buffer"]
         except FileNotFoundError:
             continue
-        except (OSError, Refused, LookupError, TypeError):  # the last two: a description of something else
+        except (OSError, Refused, LookupError, TypeError):  # the last two: the description of another file
             buffer = None
-        # a name is printed, and may have been made up to move the terminal's cursor
-        named = isinstance(buffer, str) and buffer.isprintable()
-        found.append((entry, str(buffer) if named else "damaged"))
-    return Listing(store.folder, store.limit, tuple(found))
+        # The name is printed: control characters in a forged one could move the terminal's cursor.
+        is_name = isinstance(buffer, str) and buffer.isprintable()
+        entries.append((entry, str(buffer) if is_name else "damaged"))
+    return Listing(store.folder, store.limit, tuple(entries))
 
 
-def table(found: Listing) -> str:
+def table(listed: Listing) -> str:
     """A line per entry, and the sum."""
     now = time.time()
     lines = [
         f"{entry.bytes:>14,}  {ago(now - entry.used):>8}  {entry.key}  {buffer}"
-        for entry, buffer in found.entries
+        for entry, buffer in listed.entries
     ]
-    total = f"{found.bytes:,} of {found.limit:,} bytes in {len(found.entries)} entries, {found.folder}"
+    total = f"{listed.bytes:,} of {listed.limit:,} bytes in {len(listed.entries)} entries, {listed.folder}"
     return "\n".join([*lines, total])
 
 
 def ago(seconds: float) -> str:
-    """How long ago, in one unit."""
+    """A time span in its largest unit."""
     for size, unit in ((86400, "d"), (3600, "h"), (60, "min")):
         if seconds >= size:
             return f"{seconds / size:.0f} {unit}"
@@ -71,17 +71,18 @@ def ago(seconds: float) -> str:
 
 
 class Verified(Value):
-    """What is sound, and what was wrong with the rest."""
+    """The result of verifying all entries."""
 
     sound: int
+    """Number of entries without a fault."""
     faults: Mapping[Path, str]
-    """By entry, those removed and those that stay."""
+    """Entry -> what is wrong with it."""
     stayed: Mapping[Path, str]
-    """Of these, the ones that could not be removed, and why."""
+    """Those of `faults` that could not be removed, and why."""
 
 
 def verify() -> Verified:
-    """Read every entry and remove those that are not sound."""
+    """Read every entry and remove those with faults."""
     store = _opened()
     count = len(store.entries())
     faults = store.faults()
@@ -90,7 +91,7 @@ def verify() -> Verified:
 
 
 def prune(size: str | None = None) -> Pruned:
-    """Take the least recently used entries away until the rest has at most `size`, the limit by default."""
+    """Remove the least recently used entries until the rest has at most `size`, by default the limit."""
     store = _opened()
     try:
         return store.prune(store.limit if size is None else size_of(size))
@@ -99,12 +100,12 @@ def prune(size: str | None = None) -> Pruned:
 
 
 def clear() -> Pruned:
-    """Take everything away."""
+    """Remove all entries."""
     return _opened().prune(0)
 
 
 def refuse_stayed(stayed: Mapping[Path, str]) -> None:
-    """Raise OutputError where entries could not be removed."""
+    """Raise OutputError if entries could not be removed."""
     if stayed:
         lines = [f"{path}: cannot be removed: {fact}; check its permissions" for path, fact in stayed.items()]
         raise OutputError("\n".join(lines))

@@ -1,4 +1,4 @@
-"""Validate scenes: every problem of every file, and everything that would stop a render from starting."""
+"""Validate scenes: every problem of every file, and all that would prevent a render from starting."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from illumcli.scene.scene_file import unused_lines
 
 
 class SceneChecks(Value):
-    """What is valid and what is not."""
+    """Valid scenes, and the problems of the others."""
 
     valid: list[Path]
-    """Scenes without a problem, whose files are there."""
+    """Scenes without a problem, whose files exist."""
     unused: list[str]
-    """A line for every value of theirs that has no effect."""
+    """A line for every value that has no effect."""
     problems: list[str]
-    """A line for every problem of the others."""
+    """A line for every problem."""
 
 
 def check_scenes(paths: Sequence[Path], overrides: Sequence[str] = ()) -> SceneChecks:
@@ -31,7 +31,7 @@ def check_scenes(paths: Sequence[Path], overrides: Sequence[str] = ()) -> SceneC
     Raises
     ------
     LimitError
-        Scenes that are valid and too large, where no scene has a problem.
+        Scenes are valid but too large, and no scene has another problem.
     """
     valid: list[Path] = []
     unused: list[str] = []

@@ -27,11 +27,11 @@ class Comparison(Value):
     layers: tuple[LayerDifference, ...]
     only_in_reference: tuple[str, ...]  # channels
     only_in_test: tuple[str, ...]
-    heat_scale: float | None  # the difference that is brightest in the heat image, where there is one
+    heat_scale: float | None  # the difference that is brightest in the heat image; None without one
     heat_is_kept: bool
 
     def as_data(self) -> dict[str, Any]:
-        """The comparison as JSON holds it; what is infinite or not a number is null."""
+        """The comparison for JSON; infinite values and NaN are null."""
         return {
             "reference": str(self.reference),
             "test": str(self.test),
@@ -55,30 +55,32 @@ def compare_images(
     Parameters
     ----------
     names
-        Layers to compare; all that both files have when empty.
+        Layers to compare; if empty, all that both files have.
     flips
-        Whether FLIP is computed for layers with R, G and B; it takes far longer than all else.
+        True to compute FLIP for layers with R, G and B; it takes far longer than the other measures.
     heat_file
-        PNG of the largest difference over the channels of the first layer, in false colours. One that is
-        there with the same content is kept.
+        PNG of the largest difference over the channels of the first layer, in false colours. An existing
+        one with the same content is kept.
 
     Raises
     ------
     InputError
         Unreadable files, files of different size or kind, unknown layers.
     OutputError
-        The heat image cannot be written; a different file is there and `force` is not given.
+        The heat image cannot be written; a different file exists and `force` is not given.
     """
     if heat_file is not None:
         refuse_suffix(heat_file, "a heat picture", ".png")
     a, b = read_pair(reference, test)
     layers = shared_layers(a, b, names, f"{reference}, {test}")
 
-    # whether the heat image is there already is known before anything is measured
+    # Before measuring, check whether the heat image can be written or exists already.
     content, kept = "", False
     if heat_file is not None:
         content = digest((__version__, (file_digest(reference), file_digest(test)), next(iter(layers))))
         kept = is_kept(heat_file, [content], image_contents, force)
+
+    # Measure, and write the heat image.
     differences = layer_differences(a, b, layers, flips)
     if heat_file is not None and kept:
         refresh(heat_file)

@@ -1,4 +1,4 @@
-"""Limits that the differences of two images must keep."""
+"""Limits on the differences of two images."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ LIMITS = {
     "max_flip": "FLIP",
     "max_difference": "largest difference",
 }
-"""Name of a limit -> the measure that it limits."""
+"""Limit -> the measure that it limits."""
 
 
 def refuse_beyond_limits(comparison: Comparison, limits: Mapping[str, float]) -> None:
-    """Nothing, where every layer keeps every limit; limits by their names in `LIMITS`.
+    """Check that every layer keeps every limit; their names are those of `LIMITS`.
 
     Raises
     ------
     ThresholdError
-        Each measure beyond its limit; NaN is beyond any.
+        Lists each measure beyond its limit; NaN is beyond any.
     InputError
-        A limit on FLIP where no layer has one.
+        FLIP is limited, but no layer has it.
     """
     if "max_flip" in limits and not any(layer.has_colors for layer in comparison.layers):
         raise InputError(
@@ -50,7 +50,7 @@ def refuse_beyond_limits(comparison: Comparison, limits: Mapping[str, float]) ->
 
 
 def measures_of(layer: LayerDifference) -> dict[str, float]:
-    """Name of a limit -> the value that it limits."""
+    """Limit -> the value that it limits."""
     difference = layer.difference
     measures = {
         "max_rmse": difference.rmse,

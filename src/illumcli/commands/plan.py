@@ -27,13 +27,13 @@ def plan_scene(
     as_json: bool = False,
     cache: bool = True,
 ) -> str:
-    """The plan of a scene as a table, or as JSON; with `cache` for what the store holds now."""
+    """The plan of a scene as a table or JSON; with `cache`, of a run that loads what the store holds now."""
     loaded = load(path, overrides)
     graph, outputs = build(loaded.scene, loaded), outputs_of(loaded.scene, only)
     refuse_rays(graph, outputs)
     run = Run(cache=Cache(open_store() if cache else None))
 
-    # nothing is computed: what the store does not hold is not known
+    # Compute nothing: object bounds and cameras are known only if the store has them.
     graph = place_and_cull(graph, outputs, run, only_cached=True)
     plans = [plan_view(graph, outputs, view, run.cache, look=True) for view in graph.views]
     expected = expected_memory(loaded, loaded.scene)
@@ -48,7 +48,7 @@ def refuse_too_large(path: Path, overrides: Sequence[str] = ()) -> None:
 
 
 def table(parts: Sequence[Mapping[str, Any]]) -> str:
-    """Plans in words, one per view: what runs once, what per tile, what does not and why."""
+    """Plans as text, one per view: what runs once, what runs per tile, what does not run and why."""
     return "\n\n".join("\n".join(_lines(part)) for part in parts)
 
 

@@ -1,4 +1,4 @@
-"""Render a scene: prepare, plan, execute, write one image set per camera."""
+"""Render a scene: prepare, plan, execute, write the images of each camera."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from illumcli.render_graph.schedule import shared_keys
 
 
 def render_scene(job: RenderJob, progress: Progress = no_progress) -> tuple[list[Path], Report]:
-    """Render a scene; the paths of every image, written or kept, and the report.
+    """Render a scene. Returns the paths of all images, written or kept, and the report.
 
     Raises
     ------
     InputError, LimitError, OutputError
-        Before anything is rendered, where it can be known then.
+        Before anything is rendered, if the fault can be found by then.
     """
     start = time.perf_counter()
     paths, report = render_prepared(prepared(job), progress)
@@ -61,22 +61,22 @@ def render_prepared(
 def rendered(
     work: Work, cache: Cache = NO_CACHE, progress: Progress = no_progress, following: Work | None = None
 ) -> Report:
-    """Render what is due and say what happened; in the memory of the cache remains what `following` reads."""
+    """Render the files that are due; the cache's memory keeps the buffers that `following` reads."""
     start = time.perf_counter()
     options, outputs = work.job.options, work.outputs
     run = Run(RenderStats(), cache, options.threads or len(os.sched_getaffinity(0)))
     path, due = str(work.loaded.path), work.due()
 
-    # what the scene decides for all views: where cameras are, which objects matter
+    # For all views: place the cameras, and cull objects.
     graph = work.graph
     if due:
-        # repairs are refused in all objects, seen or not
+        # With `strict`, repairs of objects that no view sees are refused too.
         graph = place_cameras(graph, run) if options.strict else place_and_cull(graph, outputs, run)
         if cache.memory is not None:
             cache.memory.wanted = wanted_by(following, graph, run)
     skipped = why_not(graph, outputs)
 
-    # each view that any file is due of
+    # Render each view that has files to write.
     reused: dict[str, Mapping[str, str]] = {}
     repaired: Repairs = {}
     standard_error: dict[str, dict[str, float]] = {}
@@ -105,6 +105,7 @@ def rendered(
         if outcome.audited is not None:
             audited_error[view.name] = outcome.audited.as_data()
 
+    # Refresh the files that are kept, and report.
     kept = [target.path for target in work.targets if target not in due]
     for image in kept:
         refresh(image)

@@ -1,4 +1,4 @@
-"""Render several scenes: what is wrong with any of them is told before the first ray, the others are done."""
+"""Render several scenes: faults are reported before the first ray, and the other scenes are rendered."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 
 class Rendered(Value):
-    """A scene that is done."""
+    """A rendered scene."""
 
     scene: Path
     paths: list[Path]
     report: Report
     counts: tuple[str, ...] = ()
-    """What `target_error` chose, as `-D` has it."""
+    """The overrides that `target_error` chose."""
 
 
 def render_scenes(
@@ -44,47 +44,48 @@ def render_scenes(
     written: Callable[[Rendered], None],
     tell: Tell,
 ) -> bool:
-    """Render every scene; is the report kept, since it holds the same as it would?
+    """Render every scene. True if the report is kept because it would be the same.
 
-    `written` gets each scene that is done, `tell` the fault of each that is not.
+    `written` is called with each rendered scene, `tell` with the error of each that failed.
 
     Raises
     ------
     IllumError
-        At last, where any scene failed; at once, where files have one name or the report cannot be written.
+        At the end if any scene failed; at once if files have equal names or the report cannot be written.
     """
     batch = Batch("scenes", len(scenes), options.keep_going, tell)
     works: dict[int, Work] = {}
-    whole = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
+    entries = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
 
-    # all that can be known before the first ray
+    # Find faults before the first ray.
     for number in batch.due():
         with batch.piece(number):
             works[number] = work = prepared(RenderJob(scenes[number], options))
             work.due()
             names = [str(target.path) for target in work.targets]
-            whole.plan(number, digest((work.content, names, options.target_error)))
+            entries.plan(number, digest((work.content, names, options.target_error)))
     check_unique([str(path) for path, _ in _files(works)])
-    whole.look(options.force)
+    entries.look(options.force)
 
+    # Render.
     for number in batch.due():
         with batch.piece(number):
             done = _rendered(works.pop(number), progress)
             if report is not None:
-                whole.add(number, done.report.as_data())
+                entries.add(number, done.report.as_data())
             written(done)
-    return whole.finish(batch)
+    return entries.finish(batch)
 
 
 def _files(works: dict[int, Work]) -> list[tuple[Path, str]]:
-    """Every file once: a scene that is named twice makes the same files twice."""
+    """Every file once, even if a scene is given twice."""
     return list(
         dict.fromkeys((target.path, target.content) for work in works.values() for target in work.targets)
     )
 
 
 def _rendered(work: Work, progress: Progress) -> Rendered:
-    """A scene rendered, with as many samples as the error that is asked for takes."""
+    """Render a scene, with the sample counts that its target error needs."""
     start = time.perf_counter()
     job, options = work.job, work.job.options
     if options.target_error is None:

@@ -1,4 +1,4 @@
-"""What happened when a scene was rendered."""
+"""The report of a render."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from illumcli.versions import versions
 
 
 class Report(Value):
-    """What happened."""
+    """What a render did: files, repairs, times, counts, errors."""
 
     scene: str
     scene_hash: str
@@ -31,10 +31,10 @@ class Report(Value):
     seconds: Mapping[str, float] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
     ray_loop: str | None = None
-    """How rays were traced, if any were."""
+    """Name of the loop that traced the rays; None if no ray was traced."""
     saved: Mapping[str, int] = field(default_factory=dict)
-    """Work that was avoided: points that a light does not reach (`incident`) or that are in its shadow
-    (`unshadowed`), polygons of culled objects, samples that adaptive sampling left out."""
+    """Avoided work: points that a light does not reach (`incident`) or that are in its shadow (`unshadowed`),
+    polygons of culled objects, samples that adaptive sampling left out."""
     refined: int = 0
     """Pixels that adaptive antialiasing gave all samples."""
     reused: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
@@ -42,15 +42,15 @@ class Report(Value):
     warnings: tuple[str, ...] = ()
     clamped: int = 0
     error: Mapping[str, float] = field(default_factory=dict)
-    """Asked for, reached, and by which counts, where an error was asked for."""
+    """The target error, the error reached, and the sample counts; empty without a target."""
     standard_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    """Camera -> mean and root mean square of its layer `error`, where that was rendered."""
+    """Camera -> mean and root mean square of its layer `error`, if that was rendered."""
     audited_error: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)
     """Camera -> RMSE of its layer with reconstructed obscurance, from rays that are used nowhere else."""
     total_seconds: float = 0.0
 
     def with_counts(self, stats: RenderStats) -> Report:
-        """The report with what was counted."""
+        """The report with the counts of a run."""
         return replace(
             self,
             seconds=dict(stats.seconds),
@@ -70,11 +70,11 @@ class Report(Value):
         return replace(self, **equal)
 
     def as_data(self) -> dict[str, Any]:
-        """The report as JSON has it, with versions and the peak of memory."""
+        """The report for JSON, with versions and peak memory."""
         data = {part.name: getattr(self, part.name) for part in fields(self)} | repairs_data(self.repairs)
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory(), "versions": versions()}
 
 
 def report_text(entries: Sequence[Mapping[str, Any]]) -> str:
-    """One entry, or a list of several, as JSON; each says its `content`, the first the file's hash."""
+    """One entry, or a list of several, as JSON. Each has its `content`, the first one the file's hash."""
     return sealed_json(entries, in_a_list=len(entries) > 1)

@@ -19,15 +19,15 @@ NULL = {"type": "null"}
 REFERENCE = "#/$defs/"
 
 
-def run() -> str:
+def schema_text() -> str:
     """The schema as JSON text; ``schemas/scene.schema.json`` is this text."""
     return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def schema() -> dict[str, Any]:
-    """The schema of scenes, all members of the open families included.
+    """The schema of scenes, with all members of the open families.
 
-    A scene that extends another need not say what the other says, and may take parts of it away.
+    A scene that extends another may leave out required keys, and remove keys of the other by null.
     """
     scene_schema = schema_of(Scene)
     scene_schema["properties"] = {"extends": EXTENDS, **scene_schema["properties"]}
@@ -41,32 +41,32 @@ def schema() -> dict[str, Any]:
         "if": {"required": ["extends"]},
         "then": partial.of(scene_schema),
         "else": scene_schema,
-        "$defs": parts | partial.made,
+        "$defs": parts | partial.definitions,
     }
 
 
 class _Partial:
-    """Schemas of mappings that complete others: no key is required, and null removes one.
+    """Schemas of mappings that are merged into others: no key is required, and null removes one.
 
-    Parts of lists replace others, so they keep their schema.
+    Lists replace others as a whole, so their parts keep their schema.
     """
 
     def __init__(self, parts: Mapping[str, Any]) -> None:
         self._parts = parts
-        self.made: dict[str, Any] = {}
-        """Schemas by name, of the parts that were needed."""
+        self.definitions: dict[str, Any] = {}
+        """The partial schemas that others refer to, by name."""
 
     def of(self, schema: Mapping[str, Any]) -> dict[str, Any]:
-        """The schema of mappings that complete one which `schema` describes."""
-        made = {key: value for key, value in schema.items() if key not in ("required", "discriminator")}
-        if "$ref" in made:
-            made["$ref"] = self._reference(made["$ref"])
+        """The schema of mappings that are merged into one of `schema`."""
+        merged = {key: value for key, value in schema.items() if key not in ("required", "discriminator")}
+        if "$ref" in merged:
+            merged["$ref"] = self._reference(merged["$ref"])
         for key in ("properties", "patternProperties"):
-            if key in made:
-                made[key] = {name: self._or_null(self.of(part)) for name, part in made[key].items()}
-        if alternatives := [each for key in ("oneOf", "anyOf") for each in made.pop(key, ())]:
-            made["anyOf"] = [self.of(each) for each in alternatives]  # without its tag it may be any
-        return made
+            if key in merged:
+                merged[key] = {name: self._or_null(self.of(part)) for name, part in merged[key].items()}
+        if alternatives := [each for key in ("oneOf", "anyOf") for each in merged.pop(key, ())]:
+            merged["anyOf"] = [self.of(each) for each in alternatives]  # without a tag it may be any of them
+        return merged
 
     def _or_null(self, schema: dict[str, Any]) -> dict[str, Any]:
         about: dict[str, Any] = {key: schema.pop(key) for key in ("description", "default") if key in schema}
@@ -74,7 +74,7 @@ class _Partial:
 
     def _reference(self, reference: str) -> str:
         name = reference.removeprefix(REFERENCE)
-        if f"{name}.part" not in self.made:
-            self.made[f"{name}.part"] = {}  # it may refer to itself
-            self.made[f"{name}.part"] = self.of(self._parts[name])
+        if f"{name}.part" not in self.definitions:
+            self.definitions[f"{name}.part"] = {}  # set first: it may refer to itself
+            self.definitions[f"{name}.part"] = self.of(self._parts[name])
         return f"{reference}.part"

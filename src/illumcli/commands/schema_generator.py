@@ -14,11 +14,11 @@ from illumcli.shading.rates import RATES
 from illumcli.visibility.samplers import SAMPLERS
 
 DIALECT = GenerateJsonSchema.schema_dialect
-MAY_BE_LEFT_OUT = ("projection",)  # of the keys that say what a mapping is
+MAY_BE_LEFT_OUT = ("projection",)  # of the keys that tag a mapping
 
 
 def schema_of(cls: type[Description]) -> dict[str, Any]:
-    """The schema of one description; those it is made of are under `$defs`."""
+    """The schema of one description; its parts are under `$defs`."""
     return cls.model_json_schema(schema_generator=_Schema)
 
 
@@ -27,11 +27,11 @@ TABLES: tuple[Mapping[str, str], ...] = (
     {name: rate.text for name, rate in RATES.items()},
     {name: sampler.text for name, sampler in SAMPLERS.items()},
 )
-"""What the rows of tables mean whose names are choices."""
+"""Name -> text of the rows of tables whose names are choices."""
 
 
 def _with_rows(part: dict[str, Any], text: str) -> str:
-    """A field's text, with what each choice means where the choices are the rows of a table."""
+    """A field's text; if its choices are the rows of a table, with the text of each."""
     for inner in _inner(part):
         for table in TABLES:
             if inner.get("enum") == list(table):
@@ -40,12 +40,12 @@ def _with_rows(part: dict[str, Any], text: str) -> str:
 
 
 def _inner(part: dict[str, Any]) -> list[dict[str, Any]]:
-    """The parts of a field's schema in which its choices may stand."""
+    """The parts of a field's schema that may hold its choices."""
     return [part, part.get("items", {}), *part.get("anyOf", ())]
 
 
 def _describe_choices(part: dict[str, Any], text: str) -> None:
-    """Put what a field's text says of each choice beside the choices, as editors show it."""
+    """Put the sentence about each choice beside the choices, where editors show it."""
     for inner in _inner(part):
         if "enum" in inner and (sentences := choices(text, inner["enum"])):
             inner["enumDescriptions"] = sentences
@@ -84,7 +84,7 @@ class _Schema(GenerateJsonSchema):
         return description
 
     def tuple_schema(self, schema: Any) -> JsonSchemaValue:
-        """A list of equal parts says so once."""
+        """A list whose parts have equal schemas has that schema once."""
         listed = super().tuple_schema(schema)
         parts = listed.get("prefixItems", [])
         if parts and all(part == parts[0] for part in parts):
@@ -93,6 +93,6 @@ class _Schema(GenerateJsonSchema):
         return listed
 
     def dict_schema(self, schema: Any) -> JsonSchemaValue:
-        """Keys that are no names are refused."""
+        """Keys that are not names are refused."""
         keyed = super().dict_schema(schema)
         return {**keyed, "additionalProperties": False} if "patternProperties" in keyed else keyed

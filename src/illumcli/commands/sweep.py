@@ -37,17 +37,17 @@ def sweep_scene(
     progress: Progress = no_progress,
     written: Callable[[Outcome], None] = lambda outcome: None,
 ) -> SweepResult:
-    """Render every variant and write the files about all of them; `written` gets the outcome of each as soon
-    as it is known.
+    """Render every variant and write the files about all of them; `written` is called with each outcome as
+    soon as it is known.
 
-    A variant that fails is noted and the others are rendered. Files that are there with the same content are
-    kept, so that a sweep that was stopped goes on where it was.
+    If a variant fails, the others are still rendered. Existing files with the same content are kept, so a
+    sweep that was stopped continues where it was.
 
     Raises
     ------
     IllumError
-        At the end, where any variant failed; before anything is rendered, where all failed, one did and
-        `options` stop at the first, or what holds for all of them is wrong.
+        At the end if any variant failed. Before anything is rendered if all variants have faults, if one has
+        and `options` stop at the first, or if the fault concerns all of them.
     """
     start = time.perf_counter()
     options, files = options or RenderOptions(), files or SweepFiles()
@@ -66,7 +66,7 @@ def sweep_scene(
     warnings += of_images
     seconds = time.perf_counter() - start
 
-    # the files about all of them
+    # Write the files about all variants.
     unchanged: list[str] = []
     has_images = any(outcome.report for outcome in outcomes)
     if has_images:
@@ -154,7 +154,7 @@ def _rendered(
         written(outcome)
         return outcome
 
-    # one variant after the other; buffers that the next one reads stay in memory
+    # Render one variant after the other; buffers that the next one reads stay in memory.
     for index in batch.due():
         own, number = ahead.pop(index, None), following[index]
         if number is not None and number not in ahead:
@@ -190,7 +190,7 @@ def _attempt(
     batch: Batch,
     written: Callable[[Outcome], None],
 ) -> Outcome:
-    """The outcome after a step; a fault of the step is noted."""
+    """The outcome after a step, or with the step's error."""
     with batch.piece(outcome.number - 1):
         return step(outcome)
     failed = replace(outcome, error=batch.failures[outcome.number - 1])

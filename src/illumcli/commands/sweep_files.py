@@ -24,20 +24,20 @@ class SweepFiles(Value):
     table: Path | None = None
     report: Path | None = None
     reference: str | None = None
-    """What errors in the table are against: a variant's number, or an image file."""
+    """Image that the table's errors are relative to: a variant's number, or a file."""
 
 
 class PlannedFiles(Value):
-    """The files and what they will hold."""
+    """The files to write, with the hashes of their contents."""
 
     files: SweepFiles
     reference: Reference | None
     contents: dict[int, str]
-    """By the variants' numbers; those that failed have none."""
+    """Number of a variant -> hash of its content; variants that failed have none."""
     kept: tuple[Path, ...]
 
     def write(self, outcomes: Sequence[Outcome]) -> list[str]:
-        """Write all but those that are kept; a line for each that failures leave as it is."""
+        """Write the files that are not kept. Returns a message for each that failures leave unchanged."""
         from illumcli.files.atomic import write_text
 
         files, unchanged = self.files, []
@@ -61,18 +61,18 @@ class PlannedFiles(Value):
 
 
 def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> PlannedFiles:
-    """What is to be written, after refusing whatever can be known to fail; nothing is rendered yet.
+    """Plan the files, and refuse those that are certain to fail; nothing is rendered yet.
 
     Raises
     ------
     InputError
-        A reference that is not there, is no image or does not fit; a suffix that is not written.
+        The reference does not exist, is no image or does not fit; a file has an unknown suffix.
     OutputError
-        A file that cannot be written; another file in its place, unless `force` is given.
+        A file cannot be written; a different one exists and `force` is not given.
     LimitError
-        A contact sheet that does not fit into memory.
+        The contact sheet does not fit into memory.
     """
-    # suffixes, and the size of the sheet
+    # Refuse wrong suffixes, and a sheet that is too large.
     kinds = ((files.sheet, "a contact sheet", ".png"), (files.table, "a table", ".csv"))
     for path, what, suffix in (*kinds, (files.report, "a report", ".json")):
         if path is not None:
@@ -80,7 +80,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
     if files.sheet is not None:
         refuse_large_sheet(files.sheet, outcomes)
 
-    # what each file will hold, and whether it is there already
+    # Hash the contents of each file, and find the files that exist already.
     reference = None if files.reference is None else reference_of(files.reference, outcomes)
     contents = {
         outcome.number: digest(
@@ -106,7 +106,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
 
 
 def content_of_all(contents: Sequence[str]) -> str:
-    """The content of a file about all variants; incomplete where one of them failed."""
+    """The content of a file about all variants; incomplete if one of them failed."""
     return INCOMPLETE if INCOMPLETE in contents else digest(contents)
 
 

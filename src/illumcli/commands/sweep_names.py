@@ -10,7 +10,7 @@ from illumcli.scene.variants import Variant
 
 
 def default_pattern(variants: Sequence[Variant]) -> str:
-    """A name that tells the variants apart: by frame where they differ, else by every value that does."""
+    """A pattern that names every variant: by frame if frames differ, otherwise by the values that differ."""
     if len({variant.frame for variant in variants}) > 1:
         return "{scene}.{frame:04d}.png"
     differ = [
@@ -20,24 +20,25 @@ def default_pattern(variants: Sequence[Variant]) -> str:
 
 
 def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:
-    """Raise InputError where a pattern must give several variants one name; no scene is read for it.
+    """Raise InputError if a pattern gives several variants the same name; reads no scene.
 
-    A scene may still have equal names: those of values that are written differently, of cameras and layers.
+    Names may still turn out equal: of equal values that are written differently, of cameras and layers.
     """
-    # camera and layer tell variants apart that change them
+    # Variants may differ in cameras or layers, which are in their names.
     named = fields(pattern)
     if named & {"camera", "layer"} and any(
         path.partition(".")[0] in ("camera", "cameras", "outputs") for path in variants[0].values
     ):
         return
-    # variants by what of them is in the name
+
+    # Group the variants by those of their values that are in the name.
     same: dict[tuple[str | int | None, ...], list[int]] = {}
     used = [path for path in variants[0].values if path in named]
     for number, variant in enumerate(variants, 1):
         values = [variant.values.get(path) for path in used]
         same.setdefault((*values, variant.frame if "frame" in named else None), []).append(number)
 
-    # any two that have all of it in common
+    # Refuse groups of several variants.
     for numbers in same.values():
         if len(numbers) > 1:
             listed = ", ".join(map(str, numbers[:5])) + (", ..." if len(numbers) > 5 else "")

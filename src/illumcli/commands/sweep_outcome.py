@@ -1,4 +1,4 @@
-"""What becomes of the variants of a sweep."""
+"""Outcomes of the variants of a sweep."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PlannedVariant(Value):
 
 
 class Outcome(Record):
-    """What became of one variant so far."""
+    """The state of one variant."""
 
     number: int
     """From 1."""
@@ -36,7 +36,7 @@ class Outcome(Record):
     planned: PlannedVariant | None = None
     """None where the scene has a fault with these values."""
     report: Report | None = None
-    """Once it is rendered, or kept."""
+    """Set once the images are rendered or kept."""
     error: IllumError | None = None
 
     @property
@@ -51,10 +51,10 @@ class Outcome(Record):
 
 
 class SweepResult(Record):
-    """What became of a sweep."""
+    """The result of a sweep."""
 
     outcomes: tuple[Outcome, ...]
     kept: tuple[Path, ...]
-    """Of the files about all variants, those that were the same already."""
+    """Those files about all variants that existed with the same content."""
     warnings: tuple[str, ...]
     seconds: float

@@ -1,4 +1,4 @@
-"""The image that `--reference` names: what errors in the table of a sweep are against."""
+"""The image that `--reference` names: errors in a sweep's table are relative to it."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Reference(Record):
 
     content: str
     number: int | None = None
-    """Of the variant whose image it is."""
+    """Number of the variant whose image it is; None for another image."""
     pixels: NDArray[np.float32] | None = None
-    """(H, W, 1 or 3) of another image."""
+    """(H, W, 1 or 3) of another image; None for a variant's."""
 
 
 class _Kind(Value):
-    """What two images must have in common to be compared."""
+    """The properties that images must share to be compared."""
 
     height: int
     width: int
@@ -42,7 +42,7 @@ def reference_of(text: str, outcomes: Sequence[Outcome]) -> Reference:
     Raises
     ------
     InputError
-        It is not there, is no image, or differs in size or kind from that of some variant.
+        It does not exist, is no image, or differs in size or kind from the image of a variant.
     """
     variants = {each.number: each.planned for each in outcomes if each.planned is not None}
     number = _variant_number(text, len(outcomes), variants)
@@ -81,7 +81,7 @@ def _kind(variant: PlannedVariant) -> _Kind:
 
 
 def _difference(kind: _Kind, reference: _Kind) -> str:
-    """How an image differs from the reference; empty where both can be compared."""
+    """How an image differs from the reference; empty if they can be compared."""
     if (kind.height, kind.width) != (reference.height, reference.width):
         size = f"{reference.width} x {reference.height}"
         return f"is {kind.width} x {kind.height}, the reference {size}"
@@ -99,8 +99,8 @@ def channel_count(names: Collection[str]) -> int:
 
 
 def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
-    """(H, W, 3) R, G and B of an image, or (H, W, 1) its first channel where it has none, and
-    whether they are encoded."""
+    """(H, W, 3) R, G and B of an image, or (H, W, 1) its first channel if it has no colours; and whether the
+    values are display values."""
     from illumcli.images.reader import read_image
 
     image = read_image(path)
@@ -109,14 +109,14 @@ def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
 
 
 def written_colors(path: Path) -> tuple[NDArray[np.float32], bool]:
-    """`colors` of an image that this sweep wrote.
+    """The `colors` of an image that this sweep wrote.
 
     Raises
     ------
     OutputError
-        It is no longer there.
+        It does not exist any more.
     """
     try:
         return colors(path)
     except InputError as error:
-        raise OutputError(f"{path}: was written, and others took it away; run the sweep again") from error
+        raise OutputError(f"{path}: was written, but has been removed since; run the sweep again") from error

@@ -13,12 +13,11 @@ from illumcli.commands.sweep_reference import written_colors
 from illumcli.memory import refuse_beyond
 
 SHEET_BYTES = 9
-"""Of each pixel of a contact sheet: three colours, held as cells, as rows and as the sheet."""
+"""Bytes per pixel of a contact sheet: three colours, each in its cell, its row and the sheet."""
 
 
 def refuse_large_sheet(path: Path, outcomes: Sequence[Outcome]) -> None:
-    """Raise LimitError where the images of a contact sheet, all as high as the highest, do not fit into
-    memory."""
+    """Raise LimitError if a contact sheet does not fit into memory; all cells are as high as the highest."""
     from illumcli.images.contact_sheet import CELL_WIDTH
 
     images = [outcome.planned for outcome in outcomes if outcome.planned is not None]

@@ -36,7 +36,7 @@ def _pixels(reference: Reference, outcomes: Sequence[Outcome]) -> NDArray[np.flo
 
 
 def _row(outcome: Outcome, content: str, paths: Sequence[str]) -> list[Cell]:
-    """Values of a variant and what it took."""
+    """Values of a variant, its file and state, and the time and rays it took."""
     report = outcome.report
     file = outcome.paths[0] if outcome.paths else ""
     values = [outcome.variant.values.get(path, "") for path in paths]
@@ -56,5 +56,5 @@ def _measures(outcome: Outcome, against: NDArray[np.float32] | None) -> list[Cel
     mean = f"{pixels.mean(dtype=np.float64):.9g}"
     if against is None:
         return [mean]
-    apart = difference(against, pixels)
-    return [mean, f"{apart.rmse:.9g}", f"{apart.largest:.9g}"]
+    error = difference(against, pixels)
+    return [mean, f"{error.rmse:.9g}", f"{error.largest:.9g}"]

@@ -1,4 +1,4 @@
-"""From a job to what rendering it takes: its graph, its outputs and the files they are to fill."""
+"""The work of a job: its graph, its layers and the files to write."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
 from illumcli.scene.spec import Scene
 
 BAND_ROWS = math.isqrt(MAX_TILE_SAMPLES)
-"""No band of tiles is higher [pixels]."""
+"""Greatest height of a band of tiles [pixels]."""
 BYTES = {"half": 2, "float": 4, "uint": 4, "uint8": 1, "uint16": 2}
 
 
 class Work(Value):
-    """A scene to render: its graph, the layers asked for and the files they are to fill."""
+    """A scene to render: its graph, the requested layers and the files to write."""
 
     job: RenderJob
     loaded: SceneFile
@@ -52,16 +52,16 @@ class Work(Value):
 
     @property
     def content(self) -> str:
-        """Hash of all that the pixels of its files depend on."""
+        """Hash of everything that the pixels of its files depend on."""
         return digest([target.content for target in self.targets])
 
     def due(self) -> list[Target]:
-        """The files that are to be written: not those that are there already with the same content.
+        """The files to write, without those that exist with the same content.
 
         Raises
         ------
         OutputError
-            A different file is there and the job does not force; a file cannot be written.
+            A different file exists and the job has not `force`; a file cannot be written.
         LimitError
             Memory or disk cannot hold what is due.
         """
@@ -72,12 +72,12 @@ class Work(Value):
 
 
 def prepared(job: RenderJob) -> Work:
-    """What rendering a job takes. Reads no mesh.
+    """The work of a job. Reads no mesh.
 
     Raises
     ------
     InputError, LimitError
-        All that can be known before anything is rendered.
+        Any fault that can be found before rendering.
     """
     return work_of(job, load(job.scene, job.options.overrides))
 
@@ -93,9 +93,10 @@ def work_of(job: RenderJob, loaded: SceneFile, files: FileFingerprints | None = 
 
 
 def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[Layer, ...]) -> list[Target]:
-    """The files of all views: per `.exr` pattern one with every layer, per `.png` pattern one per layer.
+    """The files of all views: one with all layers per `.exr` pattern, one of each layer per `.png` pattern.
 
-    The scene's own patterns lead to where it may read; those of the command line anywhere.
+    Patterns of the scene must lead to folders that the scene may read; those of the command line may lead
+    anywhere.
     """
     given = job.options.pattern
     patterns = (given,) if given else graph.scene.outputs.files
@@ -118,8 +119,7 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
 
 
 def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str) -> str:
-    """Hash of everything that a file's pixels depend on: what its layers are computed from, and how it codes
-    them."""
+    """Hash of everything that a file's pixels depend on: the buffers of its layers, and their encoding."""
     film = graph.scene.film
     coded = (suffix, view.name, [layer.name for layer in layers], graph.scene.outputs.colour)
     shown = (film.background, film.exposure if suffix == ".png" else 0.0)
@@ -128,7 +128,7 @@ def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str)
 
 
 def unused_keys(work: Work) -> list[str]:
-    """What the scene says and what changes nothing, and what its pictures lack, a line each."""
+    """A line for each value of the scene that has no effect, and for each part that its pictures lack."""
     files = () if work.job.options.pattern else work.scene.outputs.files
     layers = [layer.name for layer in work.outputs]
     lacking = lacking_lines(work.loaded, work.scene, layers)
@@ -136,7 +136,7 @@ def unused_keys(work: Work) -> list[str]:
 
 
 def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
-    """Raise LimitError where memory or disk cannot hold what is due; nothing has been read or made yet."""
+    """Raise LimitError if memory or disk cannot hold the files that are due; reads and writes nothing."""
     values = sum(len(layer.channels) for layer in work.outputs) + 1
     expected = expected_memory(work.loaded, work.scene) if due else {}
     for target in due:

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 
 
 class ViewOutcome(Value):
-    """What became of a view, beside its files."""
+    """The result of writing a view."""
 
     clamped: int
     """Values beyond the range of half."""
     sums: ErrorSums
-    """Of the layer `error`."""
+    """Sums over the layer `error`."""
     audited: AuditedError | None = None
-    """The error of what is reconstructed."""
+    """The error of reconstructed obscurance."""
 
 
 def write_view(
@@ -49,13 +49,16 @@ def write_view(
     from illumcli.images.writer import ImageWriter
 
     view, space, development = plan.view, shared["render_space"], work.development
-    sums, done, pixels = ErrorSums(), 0, plan.view.width * plan.view.height
+
+    # Called after each tile: report the progress.
+    done, pixels = 0, view.width * view.height
 
     def advance(count: int) -> None:
         nonlocal done
         done += count
         progress(view.name, done, pixels)
 
+    # Called by the threads for each tile: turn layers into values of the files.
     audit = _audit(work, plan)
 
     def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
@@ -64,6 +67,8 @@ def write_view(
         files = {str(target.path): development.pixels(target, tile, layers, space) for target in targets}
         return files | ({"error": layers["error"]} if "error" in layers else {})
 
+    # Open all files; each gets its name only when all of it is written.
+    sums = ErrorSums()
     with ExitStack() as files:
         writers = [
             files.enter_context(
@@ -78,6 +83,8 @@ def write_view(
             )
             for target in targets
         ]
+
+        # Render and write band by band.
         for band in bands(plan, shared, run, advance, develop=develop):
             start = time.perf_counter()
             if "error" in band.layers:
@@ -85,9 +92,13 @@ def write_view(
             for target, writer in zip(targets, writers, strict=True):
                 writer.write_band(band.y, band.layers[str(target.path)])
             run.stats.add({"write": time.perf_counter() - start}, {})
+
+        # Finish and verify the files.
         start = time.perf_counter()
         clamped = sum(writer.close().clamped for writer in writers)
         run.stats.add({"write": time.perf_counter() - start}, {})
+
+    # Measure the error of reconstructed obscurance.
     if audit is None:
         return ViewOutcome(clamped, sums)
     start, auditing = time.perf_counter(), Run(threads=run.threads)
@@ -97,7 +108,7 @@ def write_view(
 
 
 def _audit(work: Work, plan: Plan) -> Audit | None:
-    """The audit of a view; None where nothing is reconstructed, or the job asks for none."""
+    """The audit of a view; None if nothing is reconstructed, or the job has no audit."""
     if not (work.job.options.audit and reconstructs(work.scene)):
         return None
     from illumcli.accuracy.audit import Audit, audited_layer
@@ -107,7 +118,7 @@ def _audit(work: Work, plan: Plan) -> Audit | None:
 
 
 def metadata(scene: Scene, target: Target, space: RenderSpace) -> Mapping[str, Any]:
-    """What a file says of itself."""
+    """The metadata of a file."""
     return {
         "Software": f"illum {__version__}",
         "illum:version": __version__,

@@ -15,10 +15,12 @@ from illumcli.render_space import RenderSpace
 
 
 class ObjectBounds(Record):
-    """Transform, bounding box and size of each of O objects, and the render space that holds them all."""
+    """Transform and bounding box of the polygons of each of O objects, and the render space of all."""
 
     matrices: tuple[NDArray[np.float64], ...]  # (4, 4) each, object to scene
-    low: NDArray[np.float64]  # (O, 3) lowest corner of what its polygons use [scene units]; inf without any
+    low: NDArray[
+        np.float64
+    ]  # (O, 3) lowest corner of each box [scene units]; inf for an object without polygons
     high: NDArray[np.float64]  # (O, 3) highest corner; -inf without polygons
     polygons: NDArray[np.int64]  # (O,) number of polygons
     render_space: RenderSpace
@@ -27,7 +29,7 @@ class ObjectBounds(Record):
 def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> ObjectBounds:
     """The bounds of mesh i under matrix i.
 
-    The render space is centred in the box around them all and has half its diagonal as its radius.
+    The render space has the centre of the box around all objects, and half its diagonal as its radius.
     """
     # A box for each object.
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
@@ -49,7 +51,7 @@ def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]
 def _transformed_box(
     mesh: Mesh, matrix: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner, (3,) each, of the box around what the polygons use [scene units]."""
+    """Lowest and highest corner, (3,) each, of the box around all vertices in polygons [scene units]."""
     used = used_vertices(mesh)
     parts = [
         box_corners(points[used[rows]] if not used[rows].all() else points)
@@ -64,19 +66,19 @@ def box_corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArr
     """Lowest and highest corner, (3,) each, of the box around (N, 3) points; the origin if there are none."""
     if not len(points):
         return np.zeros(3), np.zeros(3)
-    # a column at a time: along the other axis numpy goes three numbers at a time
+    # By columns: along the other axis numpy processes three numbers at a time.
     low, high = ([reach(column) for column in points.T] for reach in (np.min, np.max))
     return np.array(low), np.array(high)
 
 
 def take_used(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of one point per vertex of the mesh, (V, 3), those whose vertex some polygon uses."""
+    """The points, of (V, 3) for all vertices of the mesh, whose vertices polygons use."""
     mask = used_vertices(mesh)
     return points if mask.all() else points[mask]
 
 
 def used_vertices(mesh: Mesh) -> NDArray[np.bool_]:
-    """(V,) True for vertices that some polygon uses."""
+    """(V,) True for vertices that polygons use."""
     mask = np.zeros(len(mesh.vertices), np.bool_)
     mask[mesh.corners] = True
     return mask
@@ -91,7 +93,7 @@ def transformed_vertices(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.
 def transformed_blocks(
     mesh: Mesh, matrix: NDArray[np.float64]
 ) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-    """The same in blocks: which vertices, and where they are."""
+    """Blocks of vertices, and their positions in the scene, (N, 3) [scene units]."""
     for rows in row_blocks(len(mesh.vertices)):
         yield rows, mesh.vertices[rows] @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -99,8 +101,8 @@ def transformed_blocks(
 def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
     """The largest diagonal of a polygon's bounding box [scene units].
 
-    0 for a mesh that is flat across one of its own axes and whose normals all point along it, as a floor is:
-    it stands for no curved surface.
+    0 for a mesh that is flat across one of its own axes and whose normals all point along it, such as a
+    floor: it does not approximate a curved surface.
     """
     if not mesh.polygon_count:
         return 0.0
@@ -119,9 +121,9 @@ def widest_polygon(mesh: Mesh, matrix: NDArray[np.float64]) -> float:
 def implied_widths(
     flat: Sequence[bool], meshes: Sequence[Mesh], object_bounds: ObjectBounds
 ) -> NDArray[np.float64]:
-    """(O,) largest polygon diagonal of each object whose normals imply a smooth surface, else 0.
+    """(O,) largest polygon diagonal of each object whose normals imply a smooth surface, otherwise 0.
 
-    It bounds how far off its polygons an object's shadow rays start [scene units].
+    It is an upper bound on the shadow-ray offset of each object [scene units].
     """
     each = zip(flat, meshes, object_bounds.matrices, strict=True)
     widths = [0.0 if is_flat else widest_polygon(mesh, matrix) for is_flat, mesh, matrix in each]

@@ -1,4 +1,4 @@
-"""Connected components of a graph, computed on whole arrays."""
+"""Connected components of a graph, by array operations."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def components(
 ) -> NDArray[np.integer[Any]]:
     """(count,) the lowest node that each of `count` nodes is connected to.
 
-    Where an edge joins two roots, the larger one is hooked below the smaller, then the trees are flattened;
-    repeated until no edge joins two roots.
+    If an edge joins two roots, the larger becomes a child of the smaller, then the trees are flattened. This
+    is repeated until no edge joins two roots.
 
     Parameters
     ----------

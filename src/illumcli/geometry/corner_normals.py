@@ -37,23 +37,23 @@ Weights: TypeAlias = Literal["equal", "area", "angle"]
 DEFAULT_CREASE = 40.0
 """[degrees] Sharper edges of meshes without normals or smoothing groups stay sharp.
 
-Below the edges that parts are made with on purpose, 45 (chamfers, octagons), 60 (hexagons) and 90, also
-where a chamfer of a coarse cylinder is measured between its flat sides (41 for six sides); above those of
-curved surfaces: cylinders of nine sides and more, all but 0.5 % of the edges of scans, 1 % of a coarse model.
+It is below the angles of intended edges: 45 (chamfers, octagons), 60 (hexagons) and 90, and 41 for a chamfer
+of a cylinder of six sides, measured between its flat sides. It is above those of curved surfaces: cylinders
+of nine sides and more, all but 0.5 % of the edges of scans, 1 % of a coarse model.
 """
 MAX_AT_EDGE = 8
-"""Polygons that meet at one edge: each is compared with at most so many, less 1, that follow it."""
+"""At an edge of more polygons than this, each is compared only with the next `MAX_AT_EDGE` - 1."""
 SAME_ANGLE = 1e-9
 """Polygons that meet at exactly the crease angle are still averaged [rad]."""
 
 
 class CornerNormals(Record):
-    """Unit normals and which of them each corner has. Arrays are read-only."""
+    """Unit normals, and the index of each corner's. Arrays are read-only."""
 
     normals: Vectors  # (K, 3) float64; rows that no corner uses may be zero
     index: NDArray[np.int32]  # (C,) row of `normals`, -1 where neither vertex nor polygon has a normal
     repairs: Mapping[str, int]
-    """What was wrong and was repaired: class -> number of corners."""
+    """Class of repair -> number of corners."""
 
     def __post_init__(self) -> None:
         self.normals.setflags(write=False)
@@ -68,29 +68,29 @@ def corner_normals(
     polygon_method: PolygonMethod = "newell",
     turned: NDArray[np.bool_] | None = None,
 ) -> CornerNormals:
-    """The normal of every corner: the file's own where it has one, or the mean of the polygons at the vertex.
+    """The normal of every corner: the file's, or the mean of the polygons at the vertex if it has none.
 
     Parameters
     ----------
     weights : {"angle", "area", "equal"}
-        How much a polygon counts at its vertex. Only `angle` does not depend on how faces are cut into
+        Weight of a polygon at its vertex. Only `angle` does not depend on how faces are divided into
         polygons.
     crease : float, optional
-        [degrees] Edges whose polygons meet at more than this are sharp. A corner averages the polygons that
-        can be reached around its vertex from its own without crossing a sharp edge; from 180 on all of them.
-        By default the file's smoothing groups decide, and `DEFAULT_CREASE` for polygons without any.
+        [degrees] Edges whose polygons meet at a larger angle are sharp. The normal of a corner is the mean of
+        the polygons that can be reached around its vertex without crossing a sharp edge; from 180 on, of all.
+        By default the file's smoothing groups decide, and `DEFAULT_CREASE` for polygons without a group.
     use_file : bool
         Use the file's normals. Those that are zero or not finite are computed instead, and counted.
     polygon_method : {"newell", "cross", "edge_average", "plane"}
         How the polygons' own normals are computed.
     turned : (P,) bool, optional
-        Polygons that are seen from their other side, where the file's normals are not used.
+        Polygons that face the other side; not used with the file's normals.
 
     Returns
     -------
     CornerNormals
-        Where the polygons at a vertex cancel (two sheets back to back) a corner has its polygon's normal;
-        counted.
+        If the polygons at a vertex cancel (two sheets back to back), a corner has its polygon's normal, and
+        is counted.
     """
     if not use_file or mesh.normals is None or mesh.corner_normals is None:
         return _computed(mesh, weights, crease, polygon_method, turned)
@@ -116,7 +116,7 @@ def _computed(
     method: PolygonMethod,
     turned: NDArray[np.bool_] | None = None,
 ) -> CornerNormals:
-    """Normals averaged from those of polygons; those that are `turned`, (P,), count with their other side."""
+    """Means of polygons' normals; those of `turned` polygons, (P,), are reversed."""
     polygons = _Polygons(mesh, method, weights, turned, bool((np.diff(mesh.starts) > 3).any()))
 
     # A crease of 0 averages nothing.
@@ -133,12 +133,12 @@ def _computed(
     limit = np.radians(DEFAULT_CREASE if crease is None else crease)
     creased = _creased(pool, by_angle, means, polygons, limit) if limit < np.pi else np.zeros(0, np.intp)
     if creased.size:
-        part, own = polygons.around(creased)
+        part, chosen = polygons.around(creased)
         fan = np.full(len(part.mesh.corners), -1)
-        fan[own] = _fans_between_edges(part, own, limit)
+        fan[chosen] = _fans_between_edges(part, chosen, limit)
         fan_means, fan_is_cancelled = _pool_means(fan, part)
         pool = pool.copy()
-        pool[creased] = len(means) + fan[own]
+        pool[creased] = len(means) + fan[chosen]
         means = np.concatenate([means, fan_means])
         is_cancelled = np.concatenate([is_cancelled, fan_is_cancelled])
 
@@ -146,8 +146,8 @@ def _computed(
     index, repairs = pool.astype(np.int32, copy=False), {}
     cancelled = np.flatnonzero(is_cancelled[index])
     if cancelled.size:
-        part, own = polygons.around(cancelled)
-        normals, row = part.normals(), polygon_of_corners(part.mesh)[own]
+        part, chosen = polygons.around(cancelled)
+        normals, row = part.normals(), polygon_of_corners(part.mesh)[chosen]
         is_valid = dot(normals, normals)[row] > 0
         index = index.copy()
         index[cancelled] = np.where(is_valid, len(means) + row, -1)
@@ -158,23 +158,23 @@ def _computed(
 
 
 class _Polygons(Record):
-    """Polygons of a mesh, and what counts of them at their corners."""
+    """Polygons of a mesh, with their normals and weights at corners."""
 
     mesh: Mesh
     method: PolygonMethod
     weights: Weights
-    turned: NDArray[np.bool_] | None  # (P,) which count with their other side
+    turned: NDArray[np.bool_] | None  # (P,) True for those whose normals are reversed
     has_larger: bool
-    """Has the whole mesh polygons of more than three corners?"""
+    """True if the mesh has polygons of more than three corners, in these or other blocks."""
 
     def blocks(self) -> Iterator[tuple[slice, _Polygons]]:
-        """Consecutive polygons, and the numbers of their corners."""
+        """Blocks of consecutive polygons, with the range of their corners."""
         for polygons, corners, part in blocks(self.mesh):
             turned = None if self.turned is None else self.turned[polygons]
             yield corners, replace(self, mesh=part, turned=turned)
 
     def around(self, corners: NDArray[np.intp]) -> tuple[_Polygons, NDArray[np.intp]]:
-        """The polygons of some corners in their order, and which of their own corners these are."""
+        """The polygons of some corners, in their order, and the indices of these corners among theirs."""
         owner = np.searchsorted(self.mesh.starts, corners, side="right") - 1
         which, row = np.unique(owner, return_inverse=True)
         size = np.diff(self.mesh.starts)[which]
@@ -206,14 +206,14 @@ class _Polygons(Record):
 
 
 def _pools(mesh: Mesh) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    """Which corners are averaged together, by the file's smoothing groups.
+    """The corners that are averaged together, by the file's smoothing groups.
 
     Returns
     -------
     pool : (C,) int
-        Corners of equal numbers are averaged.
+        Corners with equal numbers are averaged.
     by_angle : (C,) bool or None
-        True where the angle between polygons decides too, because the file has no group; None: everywhere.
+        True for corners without a group, where the angle between polygons decides; None: for all corners.
     """
     if mesh.polygon_smoothing is None:
         return mesh.corners, None
@@ -228,7 +228,7 @@ def _pools(mesh: Mesh) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
 def _pool_means(pool: NDArray[Any], polygons: _Polygons) -> tuple[Vectors, NDArray[np.bool_]]:
     """(K, 3) unit mean of the polygon normals at the corners of each pool, and (K,) where they cancel.
 
-    `pool`, (C,), is the number of each corner's pool, -1 for corners that do not count.
+    `pool`, (C,), is the number of each corner's pool, -1 for corners without one.
     """
     count = int(pool.max(initial=-1)) + 1
     sums, total = np.zeros((count, 3), order="F"), np.zeros(count)

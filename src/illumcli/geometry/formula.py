@@ -78,7 +78,7 @@ _UNARY: dict[type[ast.unaryop], _Parts] = {
 
 
 class Formula(Value):
-    """A checked formula of the given variables; made by `parse`."""
+    """A formula of the given variables that `parse` has checked."""
 
     text: str
     variables: tuple[str, ...]
@@ -95,7 +95,7 @@ class Formula(Value):
             return _full(_evaluate(self.tree, scope).value, np.broadcast_shapes(*(a.shape for a in arrays)))
 
     def gradient(self, *values: ArrayLike) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-        """The value, and the derivative by each variable in order; float64 in the values' common shape."""
+        """The value, and its derivative by each variable, in order; float64 in the values' common shape."""
         arrays = [np.asarray(value, np.float64) for value in values]
         one = np.ones(())
         scope = {name: Dual(a, {name: one}) for name, a in zip(self.variables, arrays, strict=True)}
@@ -171,10 +171,13 @@ def _refusal(place: int, fact: str) -> ValueError:
 
 
 def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) -> None:
-    """Raise ValueError where `node`, or anything below it, is not on the list."""
+    """Raise ValueError if `node`, or anything below it, is not on the list of accepted nodes."""
+    # Limit the depth of the tree.
     place = node.col_offset + indent
     if depth > MAX_DEPTH:
         raise _refusal(place, f"nested more than {MAX_DEPTH} deep")
+
+    # Check the node by its type: a number, a name, an operator or a function.
     parts: list[ast.expr]
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
@@ -199,6 +202,8 @@ def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) 
             parts = args
         case _:
             raise _refusal(place, f"not part of a formula; there are {ALLOWED} {', '.join(FUNCTIONS)}")
+
+    # Check its operands or arguments.
     for part in parts:
         _check(part, variables, indent, depth + 1)
 

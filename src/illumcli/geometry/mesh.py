@@ -1,4 +1,4 @@
-"""Mesh: polygons over shared vertices, exactly as the file has them."""
+"""Mesh: polygons over shared vertices, exactly as in the file."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class Mesh(Record):
     """The file's properties per vertex, (V,) or (V, k); vertex colours are `color`, (V, 3) linear."""
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """Material name -> keys of a scene's material, from the file's own library. Paths of textures
-    begin with the mesh's folder; in a mesh that is kept between runs they are relative to it."""
+    begin with the mesh's folder; in a cached mesh they are relative to it."""
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
-    """Material name -> key -> what replaces the texture there; white by default."""
+    """Material name -> key -> the colour that replaces its texture; white by default."""
     material_repairs: Repairs = field(default_factory=dict)
-    """What differs from the material library; reported where a scene uses the material."""
+    """Differences from the material library; reported if a scene uses the material."""
     repairs: Repairs = field(default_factory=dict)
-    """What was repaired or left out while reading; places are relative to the mesh's file."""
+    """Repairs and omissions while reading; places are relative to the mesh's file."""
 
     def __post_init__(self) -> None:
         for array in [*vars(self).values(), *self.attributes.values()]:

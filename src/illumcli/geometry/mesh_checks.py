@@ -22,10 +22,10 @@ def numbered(part: str, index: int) -> str:
 
 
 def faults(mesh: Mesh, place: Place = numbered) -> Repairs:
-    """The repairs made while the mesh was read, then what rendering copes with.
+    """The repairs while the mesh was read, and the faults that rendering tolerates.
 
     Faces without area are never hit, zero normals are replaced by computed ones, faces that run clockwise
-    about their normals are turned round, unused vertices are ignored, also for the scene's size.
+    about their normals are reversed, unused vertices are ignored, for the scene's size too.
     """
     used = np.zeros(len(mesh.vertices), np.bool_)
     used[mesh.corners] = True

@@ -1,4 +1,4 @@
-"""Planar polygons of more than three corners: what interpolation over a polygon needs, computed once."""
+"""Planar polygons of more than three corners, prepared once for interpolation over the polygon."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.records import Record
 
 FLATNESS = 2.0**-10
-"""How far corners may lie off the Newell plane, as a share of the polygon's mean width.
+"""Greatest distance of corners from the Newell plane, as a share of the polygon's mean width.
 
 A square folded along its diagonal by an angle f has its corners f / (4 sqrt 2) sides, a quarter of f mean
-widths, off the plane. So no fold of more than 2^-8 radians passes as flat, and a smaller one is less than one
-step of an 8-bit image: Lambert's cosine changes by no more than the angle.
+widths, off the plane. So folds of more than 2^-8 radians are not planar, and smaller ones change an image by
+less than one step of 8 bits: Lambert's cosine changes by at most the angle.
 """
 MIN_CORNER_AREA = 1 / 64
 """Share of a quad's area that every corner must cut off with its two neighbours, for inverse bilinear
@@ -28,19 +28,19 @@ coordinates.
 The Jacobian of the bilinear map is 0 at a corner of 180 degrees, and coordinates are steep there.
 """
 MAX_CORNERS = 128
-"""Work and memory of a hit go with the corners of its polygon; larger ones are interpolated by triangles."""
+"""Larger polygons are interpolated by triangles: time and memory of a hit are proportional to the corners."""
 EQUAL_NORMALS = 1e-6
-"""Difference per component up to which unit normals are equal but for rounding."""
+"""Unit normals whose components differ by no more are equal: the difference is rounding."""
 FLAT_NORMAL = 1e-3
-"""Angle to its polygon's own normal up to which a file's normal is that one, in few digits [rad]."""
+"""A file's normal within this angle of its polygon's is the polygon's, written with few digits [rad]."""
 SAME_AREA = 1e-6
-"""Triangles of a simple polygon cover it once: their areas add up to its own, up to this share."""
+"""Greatest relative difference between a simple polygon's area and the sum of its triangles' areas."""
 
 
 class PlanarPolygons(Record):
     """The Q planar polygons of a scene that have 4 to `MAX_CORNERS` corners. Arrays are read-only.
 
-    Corners of a polygon are consecutive, in the scene's numbers as well as here.
+    Corners of a polygon are consecutive, here and among the scene's corners.
     """
 
     row: NDArray[np.int32]  # (T,) polygon of each triangle, -1 where the triangle is interpolated alone
@@ -71,8 +71,8 @@ def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = Non
     Parameters
     ----------
     normals : CornerVectors, optional
-        Given if nothing but normals is interpolated: then polygons whose corners all have the polygon's own
-        normal, as those of a box, are left out too.
+        Given if only normals are interpolated. Polygons whose corners all have the polygon's own normal, such
+        as those of a box, are then left out too.
     """
     first, size, points, vertices = _candidates(geometry)
     if not len(first):
@@ -132,7 +132,7 @@ def _candidates(geometry: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Ve
     firsts, sizes, positions, vertices = [], [], [np.zeros((0, 3))], [np.zeros(0, np.int32)]
     for placed in geometry.placed:
         mesh = placed.mesh
-        if len(mesh.corners) == 3 * mesh.polygon_count:  # none has fewer
+        if len(mesh.corners) == 3 * mesh.polygon_count:  # all have three: none has fewer
             continue
         size = np.diff(mesh.starts)
         which = np.flatnonzero((size > 3) & (size <= MAX_CORNERS))
@@ -182,7 +182,7 @@ def _turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _rows_of_triangles(geometry: SceneGeometry, first: NDArray[Any], size: NDArray[Any]) -> NDArray[np.int64]:
-    """(T,) which of the polygons with these ascending first corners each triangle is part of, -1 none."""
+    """(T,) index of each triangle's polygon among those with these ascending first corners, -1 for none."""
     corner = geometry.corners[:, 0]
     row = np.searchsorted(first, corner, side="right") - 1
     inside = (row >= 0) & (corner < (first + size)[row])
@@ -192,7 +192,7 @@ def _rows_of_triangles(geometry: SceneGeometry, first: NDArray[Any], size: NDArr
 def _smallest_corner(
     flat: NDArray[np.float64], starts: NDArray[np.int32], size: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """(Q,) the least area that any of each polygon's first four corners cuts off with its neighbours."""
+    """(Q,) the least of the areas that each polygon's first four corners cut off with their neighbours."""
     corner = [flat[starts[:-1] + k] for k in range(4)]
     cut = [_turn(corner[k - 3] - corner[k], corner[k - 1] - corner[k]) / 2 for k in range(4)]
     return np.minimum.reduce(cut)

@@ -30,8 +30,8 @@ OPPOSITE = -0.01
 """Cosine below which a normal of the file clearly points to the other side of its polygon."""
 
 BLOCK = 1 << 13
-"""Polygons whose arrays are in memory together: they stay in a processor's own cache, and a mesh of 10^7
-triangles takes no gigabytes for them."""
+"""Polygons processed at once: their arrays fit into a processor's own cache, and a mesh of 10^7 triangles
+needs no gigabytes for them."""
 
 CornerIndex: TypeAlias = NDArray[np.int32] | slice
 """A corner of every polygon."""
@@ -92,10 +92,12 @@ def reversed_polygons(mesh: Mesh) -> NDArray[np.bool_] | None:
 
 
 def unit_file_normals(normals: NDArray[np.float64]) -> tuple[Vectors, NDArray[np.bool_]]:
-    """(K, 3) the normals of a file made unit, and (K,) which of them have a direction at all."""
+    """(K, 3) the normals of a file, normalised, and (K,) True for those that have a direction."""
     largest = np.abs(normals).max(axis=1, initial=0.0)
     is_valid = (largest > 0) & np.isfinite(largest)
-    scaled = np.zeros_like(normals, order="F")  # by the largest component, against overflow of squares
+    scaled = np.zeros_like(
+        normals, order="F"
+    )  # divided by the largest component, so that squares do not overflow
     np.divide(normals, largest[:, None], out=scaled, where=is_valid[:, None])
     return unit(scaled), is_valid
 
@@ -125,7 +127,7 @@ def polygon_of_corners(mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _in_blocks(mesh: Mesh, of_polygons: Callable[[Mesh], Vectors]) -> Vectors:
-    """(P, 3) float64 what a function says of the polygons, asked block by block."""
+    """(P, 3) float64 results of a function for all polygons, called block by block."""
     if mesh.polygon_count <= BLOCK:
         return of_polygons(mesh)
     out = np.empty((mesh.polygon_count, 3), order="F")
@@ -156,7 +158,7 @@ def corner_edges(mesh: Mesh) -> tuple[Vectors, Vectors]:
     first, last = _first_and_last(mesh)
     following, previous = np.empty_like(points), np.empty_like(points)
     for p, ahead, back in zip(points.T, following.T, previous.T, strict=True):
-        # As if all corners were one polygon; then what closes each polygon.
+        # Differences of consecutive corners, then the edges that close the polygons.
         np.subtract(p[1:], p[:-1], out=ahead[:-1])
         ahead[last] = p[first] - p[last]
         np.negative(ahead[:-1], out=back[1:])

@@ -1,4 +1,4 @@
-"""What was put right or left out in the meshes of a scene, each mesh counted once."""
+"""Repairs and omissions in the meshes of a scene; each mesh counts once."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ def repairs(names: Sequence[str], computes: Sequence[bool], meshes: Sequence[Mes
     Parameters
     ----------
     names : sequence of str
-        What each object's mesh is called: its file as the scene names it, or the object.
+        Name of each object's mesh in messages: its file as the scene names it, or the object.
     computes : sequence of bool
-        Does the scene say how the object's normals are made where its file has none?
+        True for objects whose scene says how normals are computed if the file has none.
     """
     of_meshes = {id(mesh): located(mesh.repairs, name) for name, mesh in zip(names, meshes, strict=True)}
     together = dict(joined(of_meshes.values()))
-    for name, says_how, mesh in zip(names, computes, meshes, strict=True):
+    for name, is_computed, mesh in zip(names, computes, meshes, strict=True):
         index = mesh.corner_normals
-        if says_how and index is not None and len(index) and (index >= 0).all():
+        if is_computed and index is not None and len(index) and (index >= 0).all():
             note(together, NORMALS_OF_FILE, name)
     return MeshRepairs(together)
 
 
 def undirected(names: Sequence[str], wants: Sequence[bool], meshes: Sequence[Mesh]) -> MeshRepairs:
-    """Objects whose material has a grain that neither the scene nor uv direct; `wants` says which need uv."""
+    """Objects whose material has a grain of unknown direction; `wants` marks those that need uv for it."""
     without_uv: dict[str, Repair] = {}
     for name, wants_uv, mesh in zip(names, wants, meshes, strict=True):
         if wants_uv and mesh.uvs is None and mesh.polygon_count:
@@ -49,19 +49,19 @@ def undirected(names: Sequence[str], wants: Sequence[bool], meshes: Sequence[Mes
 def unnamed(
     names: Sequence[str], selects: Sequence[tuple[tuple[str, ...], bool] | None], meshes: Sequence[Mesh]
 ) -> MeshRepairs:
-    """Materials that mesh files select by name and nobody has, or nobody asked for.
+    """Materials that mesh files select by name, but which do not exist or are not imported.
 
     Parameters
     ----------
     selects : sequence
-        Of each object: among which of the scene's materials its mesh selects, and whether it has those of
-        its file; None where the object has one material.
+        For each object the materials of the scene that its mesh selects from, and whether it imports those
+        of its file; None for objects with one material.
     """
     unknown: dict[str, Repair] = {}
     for name, selected, mesh in zip(names, selects, meshes, strict=True):
         known, imports = selected or ((), False)
         missing = set(mesh.material_names) - set(known)
-        # what a library lacks is among its mesh's repairs already
+        # Materials missing in a library are among the repairs of its mesh already.
         if selected is None or not missing or (imports and mesh.materials):
             continue
         note(unknown, NOT_ASKED if missing & mesh.materials.keys() else NO_MATERIAL, name, len(missing))

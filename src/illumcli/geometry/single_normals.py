@@ -1,4 +1,4 @@
-"""Normals of one polygon or one vertex: the same functions as for a whole mesh, on a mesh of one."""
+"""Normals of one polygon or vertex, by the functions for meshes, applied to a mesh of one polygon or ring."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def vertex_normal(
     ring : (k, 3) float
         Neighbours in counter-clockwise order.
     closed : bool
-        Whether a triangle joins the last neighbour to the first.
+        True if a triangle joins the last neighbour to the first.
     """
     neighbors = np.asarray(ring, np.float64)
     first = np.arange(1, len(neighbors) + 1)

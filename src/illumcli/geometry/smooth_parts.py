@@ -22,7 +22,7 @@ they write its normal several times, with different last digits."""
 
 
 class SmoothParts:
-    """Which triangles belong to one smooth part; the parts are computed when first needed."""
+    """Tests whether triangles belong to one smooth part; the parts are computed when first needed."""
 
     def __init__(self, geometry: SceneGeometry, normals: CornerVectors) -> None:
         self._geometry = geometry
@@ -61,7 +61,7 @@ class SmoothParts:
         pair, vertex, row = self._pairs()
         of_vertex = np.zeros(len(geometry.vertices), np.int64)
         of_vertex[geometry.triangles] = geometry.objects[:, None]
-        # + 0.0 makes zeros of both signs the same bits
+        # Adding 0 gives zeros of both signs the same bits.
         x, y, z = (
             (column.take(vertex) + F(0)).view(np.uint32).astype(np.int64) for column in geometry.vertices.T
         )

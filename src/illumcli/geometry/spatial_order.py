@@ -11,16 +11,16 @@ BLOCK = 4096
 MIN_BOX = 8
 """Points in the smallest boxes."""
 BITS = 21
-"""Of a Morton code per axis; three axes fill 63."""
+"""Bits of a Morton code per axis: 63 for three axes."""
 
 
 def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
     """(N,) indices of the points in compact order.
 
-    Points are ordered along a Morton curve; then every `BLOCK` points in a row are halved again and again
-    across the longest side of their bounding box. So every 8, 16, ... 4096 in a row from the start are the
-    points of one box. Rays from consecutive points meet the same triangles, and clusters of them are compact,
-    which short stretches of a Morton curve are not.
+    Points are ordered along a Morton curve, then each run of `BLOCK` points is halved recursively across the
+    longest side of its bounding box. So every aligned run of 8, 16, ... 4096 points fills one box. Rays from
+    consecutive points hit the same triangles, and clusters of them are compact, unlike short pieces of a
+    Morton curve.
 
     References
     ----------
@@ -30,7 +30,7 @@ def compact(points: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
     if not count:
         return np.zeros(0, np.int64)
 
-    # Blocks along the curve; the last one is filled up with a point that is far out.
+    # Blocks along the curve; the last one is padded with a distant point.
     size = min(BLOCK, 1 << max(count - 1, 1).bit_length())
     order = np.concatenate([morton_order(points), np.full(-count % size, count)])
     low, high = points.min(axis=0), points.max(axis=0)

@@ -36,7 +36,7 @@ class Triangulation(Record):
 def triangulate(mesh: Mesh) -> Triangulation:
     """The polygons as triangles that cover the same area; no vertex is added.
 
-    Triangles stay as they are. A quad is cut along its shorter diagonal, a concave one along the inner one.
+    Triangles are kept. A quad is cut along its shorter diagonal, a concave one along the inner one.
     Larger convex polygons become fans around their first corner, concave ones are cut by ear clipping on
     their Newell plane. A polygon without area still gives triangles, so nothing is dropped silently.
     """
@@ -57,7 +57,7 @@ def triangulate(mesh: Mesh) -> Triangulation:
         parts.append(_fans(mesh, larger[~concave]))
         parts += [_ears(mesh, polygon) for polygon in larger[concave]]
 
-    # Back into the order of the polygons.
+    # Sort into the order of the polygons.
     corners = np.concatenate([part for part, _ in parts]).astype(np.int32)
     polygon = np.concatenate([of for _, of in parts]).astype(np.int32)
     order = np.argsort(polygon, kind="stable")
@@ -107,7 +107,7 @@ def _fans(mesh: Mesh, polygons: NDArray[np.intp]) -> tuple[NDArray[Any], NDArray
 def _ears(mesh: Mesh, polygon: np.intp) -> tuple[NDArray[Any], NDArray[Any]]:
     """(F, 3) corners of the triangles of one concave polygon, by ear clipping, and (F,) the polygon.
 
-    A fan where the polygon crosses itself so that ear clipping gives nothing.
+    A fan if the polygon crosses itself so that ear clipping yields no triangle.
     """
     from mapbox_earcut import triangulate_float64
 

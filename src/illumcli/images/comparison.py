@@ -25,7 +25,7 @@ class LayerDifference(Value):
     name: str
     channels: tuple[str, ...]
     difference: Difference
-    flip: float | None  # mean FLIP error; None unless it has R, G and B, all finite, and FLIP was asked for
+    flip: float | None  # mean FLIP error; None unless it has R, G and B, all finite, and FLIP was requested
 
     @property
     def place(self) -> tuple[int, int, str]:
@@ -35,7 +35,7 @@ class LayerDifference(Value):
 
     @property
     def has_colors(self) -> bool:
-        """Has it R, G and B?"""
+        """True if it has R, G and B."""
         return bool(color_channels(self.channels))
 
     @property
@@ -44,7 +44,7 @@ class LayerDifference(Value):
         return self.difference.largest or 1.0
 
     def as_data(self) -> dict[str, Any]:
-        """The difference as JSON holds it; what is infinite or not a number is null."""
+        """The difference for JSON; infinite values and NaN are null."""
         return {
             "layer": self.name,
             "channels": list(self.channels),
@@ -65,7 +65,7 @@ def read_pair(reference: Path, test: Path) -> tuple[Image, Image]:
     Raises
     ------
     InputError
-        Unreadable files, both of them at once; images of different size or kind.
+        Files cannot be read, both are named then; images differ in size or kind.
     """
     images: list[Image] = []
     problems: list[str] = []
@@ -138,7 +138,7 @@ def stacked(image: Image, channels: Sequence[str]) -> NDArray[np.float32]:
 
 
 def _flip(reference: NDArray[np.float32], test: NDArray[np.float32], encoded: bool) -> float | None:
-    """Mean FLIP error; None where a value is not finite."""
+    """Mean FLIP error; None if a value is not finite."""
     if np.array_equal(reference, test):
         return 0.0
     if not (np.isfinite(reference).all() and np.isfinite(test).all()):

@@ -24,16 +24,16 @@ def write_contact_sheet(
     Parameters
     ----------
     pictures : iterable of (H, W, 1 or 3) uint8
-        Display values; taken one at a time.
+        Display values; read one at a time.
     labels : sequence of str
-        As many.
+        One for each picture.
     content : str
         Hash of everything on the sheet, written into its metadata.
     """
     columns = max(1, min(len(labels), round((len(labels) * 1.6) ** 0.5)))
     cells = [_cell(picture, label) for picture, label in zip(pictures, labels, strict=True)]
 
-    # white below shorter cells, and in place of those that the last row lacks
+    # Fill white below shorter cells, and the rest of the last row.
     tallest = max(len(cell) for cell in cells)
     blank = np.full((tallest, CELL_WIDTH + _GAP, 3), 255, np.uint8)
     cells = [np.concatenate([cell, blank[len(cell) :]]) for cell in cells]
@@ -61,7 +61,7 @@ def _cell(picture: NDArray[np.uint8], label: str) -> NDArray[np.uint8]:
 
 
 def _display_buffer(pixels: NDArray[np.uint8]) -> oiio.ImageBuf:
-    """A buffer of (H, W, 3) display values, for arithmetic on them as they are."""
+    """A buffer of (H, W, 3) display values, on which OpenImageIO computes without conversion."""
     buffer = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.UINT8))
     buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels))
     return buffer

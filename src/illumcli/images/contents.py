@@ -1,4 +1,4 @@
-"""The content that an image file of ours names, without loading OpenImageIO for a PNG."""
+"""The content hash in the metadata of an image file; a PNG is read without loading OpenImageIO."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from illumcli.images import png
 
 
 def image_contents(path: Path) -> list[str]:
-    """The hash of what a PNG or EXR was made from, as its metadata say it.
+    """The content hash in the metadata of a PNG or EXR.
 
     Raises
     ------
     InputError, KeyError, ValueError
-        A file of others.
+        A file that illum did not write.
     """
     if path.suffix.lower() == ".png":
         return [png.read_texts(path)["illum:content"]]

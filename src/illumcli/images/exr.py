@@ -1,8 +1,8 @@
 """EXR files, written through OpenImageIO and read back.
 
-OpenImageIO says True for files that a full disk cut short, so an image counts as written only when every
-pixel, read back from the temporary file, hashes to what was handed over. The JPEG and TIFF libraries may end
-the process on a full disk: neither is written. A process must not fork once this module has written.
+OpenImageIO reports success for files that a full disk truncated, so an image counts as written only if the
+pixels read back from the temporary file have the hash of those written. The JPEG and TIFF libraries may end
+the process on a full disk: neither format is written. A process must not fork once this module has written.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from illumcli.images.format import WriteError
 from illumcli.images.openimageio import oiio
 from illumcli.images.reader import ImageSource
 
-HEADER = 1 << 24  # bytes in which the channels of a file written here are named
+HEADER = 1 << 24  # the channels of a file written here are named within so many bytes
 
 _HINTS: Metadata = {
     # measured on a render of 12 layers: zip at level 1 is as small as at 4 and as fast as none
     "compression": "zip:1",
-    # the colour space by the attribute the header keeps: oiio:ColorSpace costs 30 ms to look its name up
+    # the colour space as the header's own attribute: looking up oiio:ColorSpace takes 30 ms
     "colorInteropID": "lin_rec709_scene",
     "DateTime": "",  # no time of day: equal renders are equal files
 }
-# the last: deflate fails for nothing else
+# the last one: deflate fails for no other reason
 _LITTLE_MEMORY = ("OUT_OF_MEMORY", "bad_alloc", "Unable to run compression routine")
 
 
 class ExrFile:
-    """Rows to an EXR file of one part.
+    """Writes rows to an EXR file of one part.
 
     Parameters
     ----------
     channels : mapping of name to `half`, `float` or `uint`
     metadata : mapping of name to number, text or tuple of them
-        Integers of 32 bits, floats in single precision, texts and tuples of one kind stay what they are;
-        larger integers become text.
+        Integers of 32 bits, floats in single precision, texts and tuples of one kind keep their types; larger
+        integers become text.
 
     Raises
     ------
@@ -68,8 +68,8 @@ class ExrFile:
             raise WriteError(f"{reason}; install one that writes .exr")
         self._output = output
 
-        # whole numbers go through the library as floats of the same bits: it would convert them by way of
-        # floats of 24 digits; the header is told their type when all is written
+        # Integers are passed to the library as floats of the same bits, because it would round them to 24
+        # bits. Their type is set in the header when the file is closed.
         self._numbers = [name for name, kind in channels.items() if kind == "uint"]
         kinds = [oiio.TypeDesc("float" if kind == "uint" else kind) for kind in channels.values()]
 
@@ -84,7 +84,7 @@ class ExrFile:
         self._check(self._output.open(os.fspath(path), spec))
 
     def write(self, band: NDArray[Any]) -> None:
-        """Append rows, (h, W, C) with the values the file will hold, those of `uint` as bits."""
+        """Append rows, (h, W, C) with the values of the file, those of `uint` as the bits of floats."""
         band = np.ascontiguousarray(band)
         self._dtype = band.dtype.type
         self._hash.update(band.data)
@@ -99,7 +99,7 @@ class ExrFile:
         seal(self._path)
 
     def is_as_written(self) -> bool:
-        """Does the closed file hold the pixels it was given? It is read back in bands."""
+        """True if the closed file holds the pixels that were written; reads it back in bands."""
         digest = hashlib.blake2b(digest_size=32)
         try:
             with ImageSource(self._path) as source:
@@ -111,11 +111,11 @@ class ExrFile:
         return digest.digest() == self._hash.digest()
 
     def abandon(self) -> None:
-        """Close the file as it is."""
+        """Close the unfinished file."""
         self._output.close()
 
     def _check(self, success: bool) -> None:
-        """Raise where the library failed: neither its answer nor its message alone can be trusted."""
+        """Raise if the library failed, by its result or by its message: either may be missing."""
         message = self._output.geterror()
         if not success or message:
             if any(fact in message for fact in _LITTLE_MEMORY):
@@ -124,10 +124,10 @@ class ExrFile:
 
 
 def _retype_as_integers(path: Path, names: Sequence[str]) -> None:
-    """Change the type of channels in the header of an EXR from float to whole numbers of 32 bits.
+    """Change the type of channels in the header of an EXR from float to integers of 32 bits.
 
-    The file holds the same bytes for both. A header is a list of name, type, size and value; the value of
-    `channels` is one of name, type, four bytes, and the steps of sampling (OpenEXR file layout, openexr.com).
+    Their pixels have the same bytes. A header is a list of name, type, size and value; the value of
+    `channels` is a list of name, type, four bytes and the sampling steps (OpenEXR file layout, openexr.com).
     """
     with path.open("r+b") as file:
         header = bytearray(file.read(HEADER))
@@ -142,7 +142,7 @@ def _retype_as_integers(path: Path, names: Sequence[str]) -> None:
 
 
 def _set_attribute(spec: oiio.ImageSpec, name: str, value: Any) -> None:
-    """Give `spec` an attribute in a type that EXR keeps."""
+    """Set an attribute of `spec`, in a type that EXR keeps."""
     if isinstance(value, str):
         spec.attribute(name, value)
     elif isinstance(value, tuple):

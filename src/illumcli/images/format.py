@@ -1,4 +1,4 @@
-"""What the writer needs of a file format: rows in, a check of the closed file, and one kind of refusal."""
+"""The interface of file formats to the writer: append rows, check the closed file, one type of error."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ class WriteError(Exception):
 
 
 class ImageFile(Protocol):
-    """An image file that is being written; `PngFile` and `ExrFile` are such."""
+    """An image file that is being written: a `PngFile` or an `ExrFile`."""
 
     def write(self, band: NDArray[Any]) -> None:
-        """Append rows, (h, W, C) with the values the file will hold."""
+        """Append rows, (h, W, C) with the values of the file."""
 
     def close(self) -> None:
         """Finish the file."""
 
     def is_as_written(self) -> bool:
-        """Does the closed file hold what it was given?"""
+        """True if the closed file holds what was written."""
         ...
 
     def abandon(self) -> None:
-        """Close the file as it is; what is in it is worth nothing."""
+        """Close the unfinished file."""

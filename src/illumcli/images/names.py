@@ -8,7 +8,7 @@ NO_UTF8 = "the path is not UTF-8, which image files need; rename the file or its
 
 
 def no_utf8(path: str) -> bool:
-    """Does the path hold bytes that are not UTF-8?"""
+    """True if the path has bytes that are not UTF-8."""
     return any("\udc80" <= c <= "\udcff" for c in path)
 
 

@@ -1,4 +1,4 @@
-"""PNG files, made row by row from the top with nothing but zlib.
+"""PNG files, written row by row from the top with zlib alone.
 
 References
 ----------
@@ -25,11 +25,11 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOUR_TYPES = {("Y",): 0, ("R", "G", "B"): 2, ("Y", "A"): 4, ("R", "G", "B", "A"): 6}
 _LEVEL = 1  # of 9; renders become a fifth smaller at 6, in five times the time
 _FILTER = 1  # differences to the left pixel
-_PIECE = 1 << 16  # bytes compressed at once, whatever the bands: zlib's answer may depend on it
+_PIECE = 1 << 16  # bytes compressed at once, however high the bands are: zlib's output may depend on it
 
 
 class PngFile:
-    """Rows to a PNG file; colour is not premultiplied, values go to the file as they are.
+    """Writes rows to a PNG file; colour is not premultiplied, values are not converted.
 
     Parameters
     ----------
@@ -38,13 +38,13 @@ class PngFile:
     metadata : mapping of name to number, text or tuple of them
         Kept as text.
     srgb : bool
-        Whether the values are display values and the file says so. Without, they are numbers, and readers are
-        told of no curve.
+        True if values are display values, which the file then states. Otherwise they are plain numbers, and
+        the file names no transfer curve.
 
     Raises
     ------
     OSError
-        Here and in all methods but `abandon`: what the operating system refuses.
+        Here and in all methods but `abandon`: the operating system cannot write.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class PngFile:
                 self._chunk(b"iTXt", name.encode("latin-1") + b"\0\0\0\0\0" + text.encode())
 
     def write(self, band: NDArray[Any]) -> None:
-        """The next rows, (h, W, C)."""
+        """Append rows, (h, W, C)."""
         rows = band.astype(self._dtype, copy=False).reshape(len(band), -1).view(np.uint8)
         lines = np.empty((len(band), 1 + self._line), np.uint8)
         lines[:, 0] = _FILTER
@@ -92,19 +92,19 @@ class PngFile:
         del self._waiting[:ready]
 
     def close(self) -> None:
-        """The end of the file."""
+        """Finish the file."""
         self._image(self._deflate.compress(self._waiting) + self._deflate.flush())
         self._put(png_end(self._hash))
         self._file.close()
 
     def is_as_written(self) -> bool:
-        """Does the closed file hold the bytes it was given?"""
+        """True if the closed file holds the bytes that were written."""
         with self._path.open("rb") as file:
             digest = hashlib.file_digest(file, png_digest)
         return digest.digest() == self._hash.digest()
 
     def abandon(self) -> None:
-        """Close the file as it is."""
+        """Close the unfinished file."""
         with suppress(OSError):
             self._file.close()
 
@@ -127,7 +127,7 @@ def read_texts(path: Path) -> dict[str, str]:
     Raises
     ------
     ValueError
-        No PNG, or one that is cut off.
+        The file is no PNG, or it is truncated.
     """
     texts = {}
     with path.open("rb") as file:

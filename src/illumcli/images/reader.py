@@ -28,13 +28,13 @@ _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
 class Image(Record):
-    """An image as its file has it."""
+    """An image with the values of its file."""
 
     width: int
     height: int
     channels: dict[str, NDArray[Any]]
-    """By name (`R`, `Z`, `P.X`), (H, W) float32, integers as 0..1; uint32 where an EXR has whole numbers."""
-    encoded: bool  # integers, which stand for display values; else linear
+    """By name (`R`, `Z`, `P.X`), (H, W) float32, integers as 0..1; uint32 for integer channels of an EXR."""
+    encoded: bool  # True for display values, which files hold as integers; False for linear light
     metadata: dict[str, Any]
 
 
@@ -44,7 +44,7 @@ def read_image(path: str | os.PathLike[str]) -> Image:
     Raises
     ------
     InputError
-        No such file, no image, damaged, cut short, or of several parts.
+        The file does not exist, is no image, is damaged or truncated, or has several parts.
     """
     with ImageSource(Path(path)) as source:
         source.refuse_large(PLANE_BYTES)
@@ -72,8 +72,7 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def texture_bytes(path: Path) -> int:
-    """Bytes of the texture at `path` in memory, by its header alone, which is read once while the file stays
-    the same.
+    """Bytes of the texture at `path` in memory. Reads the header alone, and only once until the file changes.
 
     Raises
     ------
@@ -94,39 +93,44 @@ def _texture_bytes(path: Path, modified: int, length: int) -> int:
 
 
 def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
-    """The image with linear values; those of 8 bits stay as they are, beside a table.
+    """The image with linear values; values of 8 bits are kept, with a table that decodes them.
 
     Parameters
     ----------
     space
-        `srgb`: decoded by the sRGB curve, alpha excepted. `linear`: values as stored, integers as 0..1.
-        By default the pixels' own type says: `linear` for floats, `srgb` for integers.
+        `srgb`: decoded by the sRGB curve, except alpha. `linear`: values as stored, integers as 0..1.
+        By default `linear` for floats and `srgb` for integers.
 
     Raises
     ------
     InputError
-        As `read_image`; NaN or Inf.
+        As of `read_image`, or values are NaN or infinite.
     """
     with ImageSource(Path(path)) as source:
+        # Make room in the type of the file's values, and find the channels that have the sRGB curve.
         stored = _stored_type(source)
         source.refuse_large(stored.itemsize + 1)
         colours = [c for c, name in enumerate(source.names) if name.rpartition(".")[2] != "A"]
         is_curved = (space or ("srgb" if source.encoded else "linear")) == "srgb"
         texels = np.empty((source.height, source.width, len(source.names)), stored)
         y = invalid = 0
+
+        # Read band by band; decode all but 8-bit values.
         for band in source.bands(stored.type):
-            own = texels[y : y + len(band)]
-            own[:] = band
+            rows = texels[y : y + len(band)]
+            rows[:] = band
             y += len(band)
             if stored == np.uint8:
                 continue
             for c in source.numbers:
-                own[..., c] = numbers_of(own[..., c])
-            invalid += int(np.count_nonzero(~np.isfinite(own).all(axis=-1)))
+                rows[..., c] = numbers_of(rows[..., c])
+            invalid += int(np.count_nonzero(~np.isfinite(rows).all(axis=-1)))
             if is_curved:
-                own[..., colours] = from_srgb(own[..., colours])
+                rows[..., colours] = from_srgb(rows[..., colours])
     if invalid:
         raise InputError(f"{os.fspath(path)}: {invalid} texels are NaN or infinite; mend the texture")
+
+    # Values of 8 bits get a table per channel that decodes them.
     channels = tuple(range(texels.shape[2]))
     if stored != np.uint8:
         return Texels(texels, channels)
@@ -143,9 +147,9 @@ def _stored_type(source: ImageSource) -> np.dtype[Any]:
 
 
 def read_embedded_texture(data: bytes, name: str, space: Space) -> Texels:
-    """`read_texture` of an image that lies within another file; `name` is what it is called in messages.
+    """`read_texture` of an image inside another file; messages call it `name`.
 
-    OpenImageIO reads files alone: the image stands in a temporary one meanwhile.
+    OpenImageIO reads only files, so the image is written to a temporary one.
     """
     suffix = next((suffix for start, suffix in _SIGNATURES.items() if data.startswith(start)), "")
     try:
@@ -160,7 +164,7 @@ def read_embedded_texture(data: bytes, name: str, space: Space) -> Texels:
 
 
 class ImageSource:
-    """An open image file; every refusal is an InputError that names it."""
+    """An open image file; all errors are InputErrors that name it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -213,7 +217,7 @@ class ImageSource:
         return self.width * self.height * int(self._spec.nchannels)
 
     def refuse_large(self, each: int) -> None:
-        """Raise LimitError where the image, `each` bytes a channel of a pixel, does not fit into memory."""
+        """Raise LimitError if the image does not fit into memory with `each` bytes per channel of a pixel."""
         what = f"{self._path}: {self.width} x {self.height} pixels"
         refuse_beyond(each * self.texel_count, what, "make it smaller")
 
@@ -227,7 +231,7 @@ class ImageSource:
 
     @property
     def numbers(self) -> list[int]:
-        """The channels that hold whole numbers, which only EXR has."""
+        """Indices of the channels that hold integers of an EXR, which are no display values."""
         formats = self._spec.channelformats or [self._spec.format] * self._spec.nchannels
         return [c for c, kind in enumerate(formats) if self._format == "openexr" and kind == oiio.UINT]
 
@@ -236,13 +240,13 @@ class ImageSource:
         return self.dtype.kind in "iu" and self._format != "openexr"
 
     def order(self, names: tuple[str, ...]) -> list[int] | None:
-        """Where each of `names` is among the file's channels; None where the file has that very order."""
+        """The index of each of `names` among the file's channels; None if the order is the same."""
         if sorted(names) != sorted(self.names):
             raise self._refusal(f"it holds the channels {self.names}")
         return None if names == self.names else [self.names.index(name) for name in names]
 
     def bands(self, dtype: type[Any]) -> Iterator[NDArray[Any]]:
-        """(h, W, C) `dtype`, the whole image from the top; whole numbers of an EXR as bits of float32."""
+        """(h, W, C) `dtype`, the image in bands from the top; integers of an EXR as bits of float32."""
         spec = self._spec
         kind = {np.float16: oiio.HALF, np.uint8: oiio.UINT8, np.uint16: oiio.UINT16}.get(dtype, oiio.FLOAT)
         top, bottom, rows = spec.y, spec.y + spec.height, spec.tile_height or READ_ROWS
@@ -261,7 +265,7 @@ class ImageSource:
             band = self._input.read_tiles(0, 0, *columns, y0, y1, 0, 1, *channels, kind)
         else:
             band = self._input.read_scanlines(0, 0, y0, y1, 0, *channels, kind)
-        message = self._input.geterror()  # for JPEG the message alone tells
+        message = self._input.geterror()  # errors in a JPEG show in the message alone
         if band is None or message:
             raise self._refusal(message)
         return band.reshape(y1 - y0, spec.width, channels[1] - channels[0])
@@ -281,7 +285,7 @@ def _ends_with(path: Path, tail: bytes) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """An attribute as Python has it; floats as the shortest decimal that names the same single."""
+    """An attribute as a Python value; floats as the shortest decimal of the same single-precision number."""
     if isinstance(value, float):
         return float(str(np.float32(value)))
     return tuple(map(_plain, value)) if isinstance(value, tuple) else value

@@ -1,4 +1,4 @@
-"""Images written by bands from the top, whole or not at all: EXR by OpenImageIO, PNG by its own module."""
+"""Writes images in bands from the top, completely or not at all: EXR by OpenImageIO, PNG by `images.png`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _KINDS = {".exr": ("openexr", {"half", "float", "uint"}), ".png": ("png", {"uint
 
 
 class Written(Value):
-    """An image that is on disk under its name."""
+    """An image that has been written."""
 
     path: Path
     bytes: int
@@ -37,29 +37,29 @@ class Written(Value):
 
 
 class ImageWriter:
-    """Writes one image from top to bottom, holding no more of it than the band at hand.
+    """Writes one image from top to bottom; only one band is in memory.
 
-    An image counts as written only when what is read back from its temporary file is what was handed over.
+    An image counts as written only if its temporary file, read back, holds the values that were written.
 
     Parameters
     ----------
     path
         Ends in `.exr` or `.png`.
     channels : mapping of name to type, in the order of the bands' last axis
-        EXR: half, float or uint, which are whole numbers of 32 bits, any names. PNG: uint8 or uint16, one
-        type, named Y, Y A, R G B or R G B A.
+        EXR: half, float or uint, an integer of 32 bits, with any names. PNG: uint8 or uint16, the same for
+        all, named Y, Y A, R G B or R G B A.
     metadata : mapping of name to number, text or tuple of them
         EXR keeps integers of 32 bits, floats in single precision, texts and tuples of one kind; larger
         integers become text. PNG keeps text alone.
     srgb : bool
-        Whether a PNG holds display values, and says so; else plain numbers.
+        True if a PNG holds display values, which it then states; otherwise it holds plain numbers.
 
     Raises
     ------
     InputError
         Another suffix, or a path that is not UTF-8.
     OutputError
-        Here, in `write_band` and in `close`: the file cannot be written. Nothing of it stays behind.
+        Here, in `write_band` and in `close`: the file cannot be written. The temporary file is removed.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class ImageWriter:
         self._halves = [c for c, kind in enumerate(self._channels.values()) if kind == "half"]
         self._light = [c for c, kind in enumerate(self._channels.values()) if kind != "uint"]
 
-        # the type in which bands are written and read back
+        # The type in which bands are written and read back.
         kinds = set(self._channels.values())
         self._dtype: type[Any] = _DTYPES.get(kinds.pop(), np.float32) if len(kinds) == 1 else np.float32
 
@@ -123,7 +123,7 @@ class ImageWriter:
         self._rows = y1
 
     def close(self) -> Written:
-        """Finish the file, read it back, give it its name; return what was written."""
+        """Finish the file, read it back and give it its name."""
         if self._written is not None:
             return self._written
         with self._all_or_nothing():
@@ -161,7 +161,7 @@ class ImageWriter:
         return self._file
 
     def _stored(self, band: NDArray[Any]) -> NDArray[Any]:
-        """(h, W, C) the values the file will hold."""
+        """(h, W, C) the values as the file holds them."""
         if not self._halves:
             if band.dtype != self._dtype:
                 raise ValueError(f"{self._name}: a band of {band.dtype}, not {self._dtype.__name__}")
@@ -179,7 +179,7 @@ class ImageWriter:
 
     @contextmanager
     def _all_or_nothing(self) -> Iterator[None]:
-        """Leave no temporary file behind, whatever goes wrong; what the file refuses is an OutputError."""
+        """Remove the temporary file after any error; errors of writing become OutputErrors."""
         try:
             with os_errors_as_output_errors(self._name):
                 yield

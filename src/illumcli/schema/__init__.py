@@ -1,1 +1,1 @@
-"""Descriptions of a scene: fields with ranges and messages, open families, and what documents them."""
+"""Descriptions of a scene: fields with ranges and messages, open families, and their documentation."""

@@ -1,4 +1,4 @@
-"""What the annotations of descriptions say about a part of a scene: its class, its choices, its range."""
+"""Reads the annotations of descriptions: the class, choices and range of a part of a scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from illumcli.schema.families import Family
 
 
 class Range(NamedTuple):
-    """What a number may be, or each number of a list."""
+    """The range of a number, or of each number of a list."""
 
     ge: float | None
     gt: float | None
@@ -25,13 +25,13 @@ class Range(NamedTuple):
 
 
 def field_annotation(cls: type[Description], name: str) -> Any:
-    """The annotation of a field with its marks."""
+    """The annotation of a field with its metadata."""
     info = cls.model_fields[name]
     return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
 
 
 def split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
-    """An annotation without `None`, and its marks from the inside out."""
+    """An annotation without `None`, and its metadata from the inside out."""
     marks: tuple[Any, ...] = ()
     while True:
         parts = get_args(annotation)
@@ -44,16 +44,16 @@ def split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def inside(annotation: Any, value: Any, step: str | int) -> tuple[Any, bool]:
-    """The annotation one step of an error's location further in; and whether the step is a key or an index.
+    """The annotation one step further along an error's location; and whether the step is a key or an index.
 
-    The other steps name the choice of a union, which the text does not.
+    Other steps name the choice of a union, which is not in the scene's text.
 
     Parameters
     ----------
     annotation
-        Of the part where the step begins; None where nothing is known of it, as the answer may be.
+        Of the part where the step begins; None if it is unknown. The result may be None, too.
     value
-        What the scene has there.
+        The value of that part in the scene.
     step : str or int
     """
     plain, marks = split(annotation)
@@ -74,7 +74,7 @@ def inside(annotation: Any, value: Any, step: str | int) -> tuple[Any, bool]:
 
 
 def choices(annotation: Any) -> Iterator[tuple[Any, Any]]:
-    """What each choice is called, and its own annotation: of literals, or of a union told apart by tags."""
+    """Name and annotation of each choice: of literals, or of a union with tags."""
     plain, marks = split(annotation)
     if get_origin(plain) is Literal:
         yield from ((value, value) for value in get_args(plain))
@@ -88,12 +88,12 @@ def choices(annotation: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def number_range(annotation: Any) -> Range:
-    """The range of a number or colour; of a parameter that may vary over the surface, of its value.
+    """The range of a number or colour; for a parameter that may vary over the surface, of a constant value.
 
     Raises
     ------
     LookupError
-        It holds no number.
+        The annotation holds no number.
     """
     plain, marks = split(annotation)
     if any(isinstance(mark, Discriminator) for mark in marks):

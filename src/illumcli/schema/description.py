@@ -1,4 +1,4 @@
-"""What a scene is made of: frozen pydantic models."""
+"""Base of all parts of a scene: frozen pydantic models."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 def default_of(keys: Mapping[str, Any]) -> Any:
-    """The default of a field that holds a description: what a scene would write for it."""
+    """The default of a field that holds a description, as a scene would write it."""
     return dict(keys)
 
 
@@ -20,7 +20,7 @@ DEFAULTS: Any = default_of({})
 class Description(BaseModel):
     """A part of a scene. Unknown keys are refused, text is never read as a number, numbers are finite.
 
-    Validators of a class are built when the first scene needs them: a run pays for what its scene names.
+    The validators of a class are built when a scene first uses it: a run builds those that its scene names.
     """
 
     model_config = ConfigDict(

@@ -1,6 +1,6 @@
-"""Descriptions of classes and of their fields, read from the sources only when they are asked for.
+"""Docstrings of classes and of their fields, read from the sources when they are needed.
 
-A field is described by the string below it, which Python does not keep.
+The docstring of a field is the string below it, which Python does not keep.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cache
 
 
 def field_docs(cls: type) -> dict[str, str]:
-    """What each field of a class means, inherited ones included; fields without a text are left out."""
+    """Field -> its docstring, with inherited fields; fields without a docstring are left out."""
     docs: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         docs |= _docs_of_module(base.__module__).get(base.__qualname__, {})
@@ -22,14 +22,14 @@ def field_docs(cls: type) -> dict[str, str]:
 
 
 def summary(cls: type) -> str:
-    """The first paragraph of a class's own docstring, or of its module's where it has none."""
+    """The first paragraph of a class's own docstring, or of its module's if it has none."""
     text = vars(cls).get("__doc__") or sys.modules[cls.__module__].__doc__ or ""
     return _one_line(inspect.cleandoc(text).partition("\n\n")[0])
 
 
 def choices(text: str, names: Sequence[str]) -> list[str]:
-    """What a field's text says of each value it may have, as in "`name`: what it is."; empty where it leaves
-    one out."""
+    """The sentence of a field's text about each of its choices, as in "`name`: what it is."; empty if one is
+    missing."""
     quoted = "|".join(map(re.escape, names))
     parts = re.split(rf"`({quoted})`: ", text)
     sentences = dict(zip(parts[1::2], parts[2::2], strict=True))
@@ -38,7 +38,7 @@ def choices(text: str, names: Sequence[str]) -> list[str]:
 
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
-    """By class, by field: the texts of a module; none for what is not ours."""
+    """Class -> field -> docstring, of a module; empty for modules of other packages."""
     if not module.startswith("illumcli."):
         return {}
     tree = ast.parse(inspect.getsource(sys.modules[module]))

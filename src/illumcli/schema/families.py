@@ -1,7 +1,7 @@
-"""Open families: one module holds one member, and the module's name is its tag.
+"""Open families: each module defines one member, and the module's name is its tag.
 
-A scene names the tag; only the module of that name is imported then, so a family of thirty members costs
-a run what its scene uses. Nothing is registered and no list is kept.
+A scene names tags, and only the modules of these names are imported: the start-up time does not depend on the
+size of a family. Members are not registered in any list.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ def members(package: str) -> tuple[type[Any], ...]:
 
 @dataclass(frozen=True)
 class Family:
-    """Annotation of a field that takes any member of a family, which its key `tag` names."""
+    """Annotation of a field that takes any member of a family; the field's key `tag` names the member."""
 
     package: str
     tag: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
-        """Nothing is known of the members before a scene names one: each is validated by itself."""
+        """Members are unknown until a scene names them, so each value is validated by its own class."""
         return PlainValidator(self._validated).__get_pydantic_core_schema__(Any, handler)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -92,7 +92,7 @@ class Family:
         return chosen.model_validate(value)
 
     def meant(self, value: Any) -> type[Description] | None:
-        """The member that a mapping names or most likely means; None where there is none."""
+        """The member that a mapping names or most likely means; None if there is none."""
         name = value.get(self.tag) if isinstance(value, dict) else None
         near = nearest(name, tags(self.package)) if isinstance(name, str) else None
         return member(self.package, near) if near else None

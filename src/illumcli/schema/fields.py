@@ -1,6 +1,6 @@
-"""Types of fields: numbers in their range, vectors, colours, names, each with the sentence that refuses it.
+"""Types of fields: numbers with a range, vectors, colours, names, each with its error message.
 
-Ranges are pydantic's own (`Field(ge=0)`) and have their sentences in `messages`.
+Ranges are pydantic's (`Field(ge=0)`); their messages are in `messages`.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ Vector: TypeAlias = Triple[Number]
 
 @dataclass(frozen=True, eq=False)
 class Shorthand:
-    """Annotation of a list that may be written shorter: written out by a function before it is validated."""
+    """Annotation of a list that has a short form, which a function expands before validation."""
 
     expand: Callable[[Any], Any]
     texts: dict[str, Any] | None = None
-    """The JSON schema of texts that may stand for the list, besides one number."""
+    """The JSON schema of texts that are a short form, besides one number."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         return BeforeValidator(self.expand).__get_pydantic_core_schema__(source, handler)
@@ -52,7 +52,7 @@ def spread(value: Any) -> Any:
 
 
 HEX = "^#([0-9A-Fa-f]{3}|[0-9A-Fa-f]{6})$"
-"""A colour as style sheets write it; of three digits each stands for two equal ones."""
+"""A colour as in style sheets; each of three digits is short for two equal ones."""
 SRGB = {
     "type": "string",
     "pattern": HEX,
@@ -62,12 +62,12 @@ COLOR = "one number, three numbers or '#rrggbb' in quotes"
 
 
 def color(value: Any) -> Any:
-    """The three linear numbers of a colour: from one number, three numbers or text like `#ff8800`, in sRGB.
+    """The three linear numbers of a colour: from one number, three numbers, or text like `#ff8800` in sRGB.
 
     Raises
     ------
     ValueError
-        It is anything else.
+        The value is none of these.
     """
     if isinstance(value, str) and re.fullmatch(HEX, value):
         digits = value[1:] if len(value) == 7 else "".join(2 * digit for digit in value[1:])
@@ -80,7 +80,7 @@ def color(value: Any) -> Any:
 
 
 def _linear(code: float) -> float:
-    """Linear light of an sRGB value, as `color.from_srgb` without numpy."""
+    """Linear light of an sRGB value: `color.from_srgb` without numpy."""
     return code / 12.92 if code <= 0.04045 else float(((code + 0.055) / 1.055) ** 2.4)
 
 

@@ -1,6 +1,6 @@
-"""Sentences about values that a field refuses, from the type and the context of pydantic's errors.
+"""Messages about invalid values, from the type and the context of pydantic's errors.
 
-A rule of ours raises ValueError with its own sentence; the table below holds one for each rule of pydantic's.
+Our own rules raise ValueError with a message; the table below has one for each rule of pydantic.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ SENTENCES = {
     "model_type": "must be a mapping, is {value}",
     "model_attributes_type": "must be a mapping, is {value}",
 }
-"""By type of error; in braces what its context holds, and the value itself."""
+"""Type of an error -> message; in braces, values of the error's context and the invalid value."""
 
 
 def sentence(kind: str, context: Mapping[str, Any], value: Any) -> str | None:
-    """What is wrong with `value` by an error of this type and context; None where that alone does not say."""
+    """The message for an error of this type and context; None if it needs more than these."""
     if isinstance(context.get("error"), ValueError):
         return str(context["error"])
     if kind in SENTENCES:
@@ -39,7 +39,7 @@ def sentence(kind: str, context: Mapping[str, Any], value: Any) -> str | None:
 
 
 def no_choice(value: Any, choices: Sequence[Any]) -> str:
-    """What is wrong with a value that is none of the choices."""
+    """The message for a value that is none of the choices."""
     if isinstance(value, str) and all(isinstance(each, str) for each in choices):
         return f"no choice '{short(value)}'; {suggestion(value, choices)}"
     *others, last = map(repr, choices)
@@ -48,7 +48,7 @@ def no_choice(value: Any, choices: Sequence[Any]) -> str:
 
 
 def wrong_length(value: Sequence[Any], length: int) -> str:
-    """What is wrong with a list that has too few or too many parts."""
+    """The message for a list that has too few or too many parts."""
     numbers = " numbers" if value and all(isinstance(part, int | float) for part in value) else ""
     return f"must be a list of {length}{numbers}, has {len(value)}"
 
@@ -71,19 +71,19 @@ def describe(value: Any) -> str:
 
 
 def short(text: str, most: int = 40) -> str:
-    """`text` on one line, cut where it is long."""
+    """`text` on one line, truncated to `most` characters."""
     line = " ".join(text.split())
     return line if len(line) <= most else f"{line[: most - 1]}…"
 
 
 def suggestion(word: str, known: Sequence[str]) -> str:
-    """The way out of a misspelling: the nearest known word, or all of them where none is near."""
+    """Advice about a misspelt word: the most similar known word, or all of them if none is similar."""
     near = nearest(word, known)
     return f"did you mean '{near}'?" if near else f"there are: {', '.join(known)}"
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
-    """The known word that a misspelt one most likely stands for."""
+    """The known word most similar to a misspelt one; None if none is similar."""
     import difflib
 
     return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=0.6)), None)

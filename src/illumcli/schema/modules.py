@@ -9,12 +9,12 @@ from collections.abc import Iterable
 def modules(folders: Iterable[str]) -> tuple[str, ...]:
     """The names of the modules and packages in folders, sorted, without those that begin with an underscore.
 
-    `pkgutil` would call a folder empty where the system refuses to list it.
+    Unlike `pkgutil`, which takes a folder that cannot be listed for an empty one, this raises.
 
     Raises
     ------
     OSError
-        Such a refusal.
+        A folder cannot be listed.
     """
     names = {
         entry.name.partition(".")[0]

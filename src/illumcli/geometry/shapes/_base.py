@@ -1,4 +1,4 @@
-"""Base of all shapes: frozen parameters that make a mesh."""
+"""Base of all shapes: frozen parameters of a mesh."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from illumcli.schema.fields import Pair
 MAX_TRIANGLES = 20_000_000
 """Largest number of triangles of a shape; the ranges below keep to it."""
 TRIANGLE_BYTES = 640
-"""Memory per triangle while a mesh is made, placed and given to Embree; measured 530 to 700 [bytes]."""
+"""Memory per triangle while a mesh is built, placed and passed to Embree; measured 530 to 700 [bytes]."""
 
 Segments: TypeAlias = Annotated[int, Field(ge=3, le=4096)]
 Rings: TypeAlias = Annotated[int, Field(ge=1, le=2048)]
@@ -29,5 +29,5 @@ class Shape(Description):
         raise NotImplementedError
 
     def triangles(self) -> int:
-        """Upper bound on the number of triangles, known before the mesh is made."""
+        """Upper bound on the number of triangles, without building the mesh."""
         raise NotImplementedError

@@ -34,7 +34,7 @@ NODES_AT_ONCE = 2**20
 CONVERGED = 1e-13
 """Length of the last Newton step, in edges of a cell."""
 NODE_OFFSET = 0.1180339887
-"""By which inner nodes are off round numbers, in edges of a cell; no simple fraction."""
+"""Offset of inner nodes from round numbers, in edges of a cell; not a simple fraction."""
 MAX_NEWTON_STEPS = 12
 """Convergence is quadratic: four steps are usual, creases of f take more."""
 
@@ -63,7 +63,7 @@ class Implicit(Shape):
         return high
 
     def triangles(self) -> int:
-        """An estimate, for surfaces that cross the box several times; others are counted as they are made."""
+        """An estimate for surfaces that cross the box several times; `mesh` refuses those with too many."""
         return min(24 * self.resolution**2, MAX_TRIANGLES)
 
     def mesh(self) -> Mesh:
@@ -132,7 +132,7 @@ def _net(f: Formula, axes: list[NDArray[np.float64]]) -> tuple[Vectors, NDArray[
         raise LimitError(f"implicit: {count} triangles, at most {MAX_TRIANGLES} are made; lower `resolution`")
     refuse_beyond(TRIANGLE_BYTES * count, f"implicit: {count} triangles", "lower `resolution`")
 
-    # Where the surface crosses each of them, and the four cells around it.
+    # The crossing point on each of them, and the four cells around it.
     crossings, cells = [], []
     for (i, j, k), (a, b, c) in crossed:
         grows = inside.transpose(a, b, c)[i, j + 1, k + 1, None]
@@ -151,7 +151,7 @@ def _net(f: Formula, axes: list[NDArray[np.float64]]) -> tuple[Vectors, NDArray[
 
 
 def _inside(f: Formula, axes: list[NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Whether f is below 0 at each node of the grid; a few layers at a time, to keep only the answers."""
+    """True at nodes of the grid where f is below 0; evaluated a few layers at a time, to save memory."""
     x, y, z = axes
     inside = np.empty((len(x), len(y), len(z)), bool)
     layers = max(1, NODES_AT_ONCE // (len(y) * len(z)))

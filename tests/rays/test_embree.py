@@ -218,3 +218,12 @@ class Elsewhere:
 def test_a_library_that_is_not_there_once_is_not_used(paths, monkeypatch):
     monkeypatch.setattr(library, "_paths", lambda: iter(paths))
     assert library.embree_library.__wrapped__() is None
+
+
+@pytest.mark.parametrize("switch", LOOPS)
+def test_there_may_be_thousands_of_tracers_at_a_time(switch, monkeypatch):
+    monkeypatch.setenv(SWITCH, switch)
+    tracers = [Tracer(SQUARE + F(number), FACES) for number in range(2000)]
+    for number in (0, 1023, 1999):
+        o, d = rays(([number + 0.3, number + 0.1, number + 1], [0, 0, -1]))
+        assert tracers[number].closest(o, d).triangle.tolist() == [0]

@@ -103,6 +103,7 @@ def build_tree(
         Embree reports another error.
     """
     library = loaded_library()
+    library.rtcGetDeviceError(device)  # the device forgets errors of earlier trees
     if len(triangles):
         _attach(device, scene, vertices, triangles)
     library.rtcCommitScene(scene)

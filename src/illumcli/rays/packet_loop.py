@@ -125,16 +125,21 @@ def packet_library() -> ctypes.CDLL | None:
 
 
 @cache
+def _device() -> Handle:
+    """The device of all trees of this process, which can make about a thousand devices and no more."""
+    library = loaded_library()
+    device: Handle | None = library.rtcNewDevice(None)
+    if not device:
+        check(library.rtcGetDeviceError(None))
+        raise MemoryError
+    return device
+
+
+@cache
 def native_widths() -> tuple[int, ...]:
     """Rays per packet that Embree has kernels for on this processor, the widest first."""
-    library = loaded_library()
-    device = library.rtcNewDevice(None)
-    if not device:
-        raise MemoryError
-    try:
-        return tuple(w for w, known in NATIVE_PACKETS if library.rtcGetDeviceProperty(device, known))
-    finally:
-        library.rtcReleaseDevice(device)
+    library, device = loaded_library(), _device()
+    return tuple(w for w, known in NATIVE_PACKETS if library.rtcGetDeviceProperty(device, known))
 
 
 def missing() -> str | None:
@@ -156,14 +161,11 @@ class PacketLoop:
         assert loop is not None
         self._loop = loop
         self.width = native_widths()[0] if width is None else width
-        device = library.rtcNewDevice(None)
-        if not device:
-            check(library.rtcGetDeviceError(None))
-            raise MemoryError
+        device = _device()
         scene = library.rtcNewScene(device)
-        weakref.finalize(self, _release, device, scene)
         if not scene:
             raise MemoryError
+        weakref.finalize(self, library.rtcReleaseScene, scene)
         library.rtcSetSceneFlags(scene, ROBUST)
         build_tree(device, scene, vertices, triangles)
         self._scene: Handle = scene
@@ -257,10 +259,3 @@ def _vectors(array: Vectors) -> _Vectors:
 def _address(name: str) -> int | None:
     """Where a function of Embree is in memory."""
     return ctypes.cast(getattr(loaded_library(), name), ctypes.c_void_p).value
-
-
-def _release(device: Handle, scene: Handle | None) -> None:
-    library = loaded_library()
-    if scene:
-        library.rtcReleaseScene(scene)
-    library.rtcReleaseDevice(device)

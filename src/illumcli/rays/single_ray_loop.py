@@ -7,6 +7,8 @@ distances, and only logs Embree's errors.
 from __future__ import annotations
 
 import logging
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +28,19 @@ class SingleRayLoop:
     """An EmbreeScene over triangles."""
 
     def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
-        from embreex.rtcore_scene import EmbreeScene
-
         errors = _Errors()
         log = logging.getLogger("embreex")
         log.addHandler(errors)
         try:
-            self._scene = EmbreeScene(robust=True)
+            self._scene = _new_scene()
             if len(triangles):
                 upload(self._scene, vertices, triangles)
             # the first query builds the tree if `upload` did not, which must happen before threads start
             probe = np.zeros((1, 3), F)
             self._scene.run(probe, probe + F(1), query="OCCLUDED")
+        except MemoryError:
+            _device.cache_clear()  # embreex keeps a device that Embree could not allocate
+            raise
         finally:
             log.removeHandler(errors)
         if errors.texts:
@@ -89,6 +92,20 @@ class SingleRayLoop:
             out.open[part] = is_open.astype(F) @ np.ones(samples, F)  # exact below 2^24
             if out.is_open is not None:
                 out.is_open[part] = is_open
+
+
+def _new_scene() -> Any:
+    """An EmbreeScene of the one device of this process, which can make about a thousand and no more."""
+    from embreex.rtcore_scene import EmbreeScene
+
+    return EmbreeScene(_device(), robust=True)
+
+
+@cache
+def _device() -> Any:
+    from embreex.rtcore import EmbreeDevice
+
+    return EmbreeDevice()
 
 
 class _Errors(logging.Handler):

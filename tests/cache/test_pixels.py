@@ -8,7 +8,7 @@ import pytest
 from illumcli.cache import pixels, policy
 from illumcli.cache.codec import Misfit, codec_of, load_tile
 from illumcli.cache.memory import MemoryCache
-from illumcli.cache.pixels import PixelRecorder, common_pixels, pixel_buffer, pixel_key
+from illumcli.cache.pixels import PixelRecorder, are_among, common_pixels, pixel_buffer, pixel_key
 from illumcli.cache.store import Store, Stored
 from illumcli.film.tiles import Scattered
 from illumcli.film.view import View
@@ -92,6 +92,12 @@ def test_pixels_that_all_buffers_have(tmp_path):
 
     assert common_pixels([]).tolist() == []
     assert common_pixels([buffer([1, 5, 9]), buffer([5, 9]), buffer([2, 5, 8, 9])]).tolist() == [5, 9]
+
+
+def test_numbers_among_pixels():
+    numbers = np.array([[0, 3, 4], [9, 10, 3]])
+    assert are_among(numbers, np.array([3, 9])).tolist() == [[False, True, False], [True, False, True]]
+    assert not are_among(numbers, np.zeros(0, np.int64)).any()
 
 
 GOOD = (np.array([3, 8]), np.zeros((2, 1, 2), np.float32))

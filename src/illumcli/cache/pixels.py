@@ -63,6 +63,14 @@ def pixel_buffer(codec: BufferCodec, stored: Stored, view: View) -> PixelBuffer:
     return PixelBuffer(codec, pixels, values, view.width)
 
 
+def are_among(numbers: NDArray[np.int64], pixels: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of some numbers are those of `pixels`, which ascend."""
+    if not len(pixels):
+        return np.zeros(numbers.shape, np.bool_)
+    at = np.minimum(np.searchsorted(pixels, numbers), len(pixels) - 1)
+    return np.asarray(pixels[at] == numbers)
+
+
 def common_pixels(buffers: Sequence[PixelBuffer]) -> NDArray[np.int64]:
     """The pixels that all buffers have, ascending; none if there is no buffer."""
     common = buffers[0].pixels if buffers else np.zeros(0, np.int64)

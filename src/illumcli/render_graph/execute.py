@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.cache.pixels import PixelRecorder, common_pixels
+from illumcli.cache.pixels import PixelRecorder, are_among, common_pixels
 from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
 from illumcli.film.reconstruct import pixel_means, pixel_nearest
 from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
@@ -450,9 +450,10 @@ def _adaptive_tile(common: _Common, tile: Tile) -> tuple[Mapping[str, NDArray[An
 
     # All samples of the pixels that some layer needs them for, cached or not.
     wanted = np.logical_or.reduce([*refined.values()])
-    y, x = np.indices(wanted.shape)
-    cached = np.isin((y + tile.y) * view.width + x + tile.x, common.held)
-    _at(common, tile, wanted & cached, layers, refined, "cached")
+    y, x = np.nonzero(wanted)
+    cached = np.zeros_like(wanted)
+    cached[y, x] = are_among((y + tile.y) * view.width + x + tile.x, common.held)
+    _at(common, tile, cached, layers, refined, "cached")
     _at(common, tile, wanted & ~cached, layers, refined, "computed")
 
     count = int(np.count_nonzero(wanted))

@@ -28,6 +28,9 @@ from illumcli.progress import Progress, no_progress
 from illumcli.scene.load import SceneText, load, read_text
 from illumcli.scene.variants import Variant
 
+HELD = 256
+"""Variants that are not planned a second time when they are rendered; each holds some 80 kB until then."""
+
 
 def sweep_scene(
     path: Path,
@@ -83,17 +86,25 @@ class _Works:
         self._path = path
         self.options = options
         self._files = FileFingerprints()
+        self._held: dict[int, Work] = {}
 
     @cached_property
     def _text(self) -> SceneText:
         return read_text(self._path)
 
-    def of(self, variant: Variant) -> Work:
-        """What rendering a variant takes."""
-        overrides = tuple(variant.overrides)
-        own = replace(self.options, overrides=overrides, audit=False)
-        job = RenderJob(self._path, own, {"frame": variant.frame})
-        return work_of(job, load(self._path, overrides, self._text), self._files)
+    def of(self, outcome: Outcome) -> Work:
+        """What rendering a variant takes, held until it is dropped."""
+        if outcome.number not in self._held:
+            overrides = tuple(outcome.variant.overrides)
+            own = replace(self.options, overrides=overrides, audit=False)
+            job = RenderJob(self._path, own, {"frame": outcome.variant.frame})
+            loaded = load(self._path, overrides, self._text)
+            self._held[outcome.number] = work_of(job, loaded, self._files)
+        return self._held[outcome.number]
+
+    def drop(self, outcome: Outcome) -> None:
+        """Forget the work of a variant; it is made anew where it is asked for again."""
+        self._held.pop(outcome.number, None)
 
 
 def _planned(
@@ -107,10 +118,12 @@ def _planned(
 
     def planned(outcome: Outcome) -> Outcome:
         nonlocal warnings
-        work = works.of(outcome.variant)
+        work = works.of(outcome)
         outcome = replace(outcome, planned=_facts(work))
         told = unused_keys(work)
         warnings = told if warnings is None else [line for line in warnings if line in told]
+        if outcome.number > HELD:
+            works.drop(outcome)
         return outcome
 
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
@@ -145,24 +158,23 @@ def _rendered(
     cache = Cache(store, memory)
     done = list(outcomes)
     following = _following(done)
-    ahead: dict[int, Work] = {}
     last: Report | None = None
 
-    def images(own: Work | None, other: Work | None, outcome: Outcome) -> Outcome:
-        report = rendered(own or works.of(outcome.variant), cache, progress, other)
+    def images(upcoming: Work | None, outcome: Outcome) -> Outcome:
+        report = rendered(works.of(outcome), cache, progress, upcoming)
         outcome = replace(outcome, report=report.sharing(last))
         written(outcome)
         return outcome
 
     # Render one variant after the other; buffers that the next one reads stay in memory.
     for index in batch.due():
-        own, number = ahead.pop(index, None), following[index]
-        if number is not None and number not in ahead:
+        number, upcoming = following[index], None
+        if number is not None:
             with suppress(IllumError):  # it is told in its turn
-                ahead[number] = works.of(done[number].variant)
-        step = partial(images, own, None if number is None else ahead.get(number))
-        done[index] = _attempt(done[index], step, batch, written)
+                upcoming = works.of(done[number])
+        done[index] = _attempt(done[index], partial(images, upcoming), batch, written)
         last = done[index].report or last
+        works.drop(done[index])
         memory.retire()
 
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]

@@ -278,6 +278,11 @@ def test_the_error_changes_no_other_layer_and_comes_alone(scene, whole):
     assert {"replicate.samples", "replicate.luminance"} <= {*reached(plan.graph, plan.outputs)}
 
 
+def test_threads_share_a_small_picture_of_many_samples(scene):
+    plan = planned(load(scene, ["film={width: 64, height: 64, samples: 16, adaptive: true}"]), ["beauty"])
+    assert plan.tile_side(plan.view) == 32
+
+
 def test_the_job_reports_it_and_keeps_its_bytes_in_a_cache(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))

@@ -197,7 +197,7 @@ def bands(
         Called with the number of pixels of each finished tile.
     """
     view = plan.view
-    rows = tiles(view.width, view.height, plan.tile_side(view, side), view.samples)
+    rows = tiles(view.width, view.height, plan.tile_side(view, side), plan.samples_per_pixel)
     keeps = plan.lookup.keeps
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
     common = _Common(

@@ -77,10 +77,15 @@ class Plan(Value):
                     last[name] = number
         return last
 
+    @property
+    def samples_per_pixel(self) -> int:
+        """About how many samples a pixel has; of an adaptive picture a quarter of all, which is many."""
+        return self.view.samples if self.all_samples is None else max(1, self.view.stands_for // 4)
+
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
         min_samples = min_tile_samples(len(self.tile))
-        side = side or tile_side(view.samples, view.width * view.height, min_samples)
+        side = side or tile_side(self.samples_per_pixel, view.width * view.height, min_samples)
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side
 
     def needed_for(self, name: str) -> frozenset[str]:

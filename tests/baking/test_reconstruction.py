@@ -29,6 +29,11 @@ def points_at(position, n, objects=None):
     )
 
 
+def sphere(count):
+    n = np.random.default_rng(3).normal(size=(count, 3))
+    return n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
 def noisy(hidden, sigma, seed=1):
     noise = np.random.default_rng(seed).normal(0, sigma, len(hidden))
     return RawValues(hidden + noise, np.full(len(hidden), sigma**2))
@@ -76,6 +81,27 @@ def test_a_step_over_a_hard_edge_stays():
     values = reconstructed(points_at(step, n), noisy(truth, 0.05))
     assert np.abs(values.hidden - truth).max() < 0.06
     assert values.windows[128] > 0.7
+
+
+def test_bent_normals_lose_their_noise_too():
+    points = plane(4000)
+    x = points.position[:, 0].astype(float)
+    truth = np.stack([0.4 * x, np.sqrt(1 - 0.16 * x**2), 0 * x], axis=1)
+    raw = noisy(0.3 + 0.1 * x, 0.05)
+    bent = truth + np.random.default_rng(2).normal(0, 0.1, truth.shape)
+    values = reconstructed(points, RawValues(raw.hidden, raw.variance, bent))
+    np.testing.assert_allclose(np.linalg.norm(values.bent, axis=1), 1, rtol=1e-6)
+    assert rmse(values.bent, truth) < 0.1 / 4
+    assert values.hidden.tobytes() == reconstructed(points, raw).hidden.tobytes()
+
+
+def test_bent_normals_of_raw_values_stay_raw():
+    points = plane(300)
+    bent = sphere(300)
+    raw = noisy(np.random.default_rng(5).random(300), 0.001)
+    values = reconstructed(points, RawValues(raw.hidden, raw.variance, bent))
+    assert values.windows[1] == 1
+    np.testing.assert_allclose(values.bent, bent, atol=1e-6)
 
 
 def test_what_saw_nothing_hidden_stays_open_exactly():

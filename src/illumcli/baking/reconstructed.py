@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, Vectors
 from illumcli.baking.audit import Audit, Audited, audit
 from illumcli.baking.cells import Cells
 from illumcli.baking.context import BakeContext, SampledValues
@@ -71,6 +71,7 @@ class Trial(Record):
     raw: PointEstimates
     w: NDArray[np.float32]  # (K,)
     risk: NDArray[np.float64]  # (K,)
+    bent: Vectors | None  # (K, 3)
     windows: Mapping[int, float]  # points in a window -> share of the cells
     audit: Audit
     error_rays: int
@@ -105,8 +106,13 @@ class ReconstructedBake(Record):
         stated = errors.law.at(raw.values.neighbor_variation, samples)
         variance[closed] = np.square(stated, dtype=np.float64)
 
+        bent = None
+        if raw.values.bent is not None:
+            bent = points.n.copy()
+            bent[closed] = raw.values.bent
+
         # reconstructed values and theirs
-        made = reconstruct(points, self.cells, RawValues(hidden, variance), context.threads)
+        made = reconstruct(points, self.cells, RawValues(hidden, variance, bent), context.threads)
         w, risk = (1 - made.hidden[closed]).astype(F), made.risk[closed]
         clock.lap("reconstruct")
         mean_samples, mean_variance = (
@@ -116,7 +122,8 @@ class ReconstructedBake(Record):
         target = (context.settings.target_error or 0.0) / max(self.share, 1e-9) ** 0.5
         found = audit(sampler, values, number, target)
         clock.lap("audit")
-        return Trial(samples, raw, w, risk, made.windows, found, errors.rays)
+        directions = None if made.bent is None else made.bent[closed]
+        return Trial(samples, raw, w, risk, directions, made.windows, found, errors.rays)
 
     def ray_weights(self, trial: Trial) -> NDArray[np.float64]:
         """(K,) rays of each point for the least error, over their mean: more where neighbour rays disagree,
@@ -147,7 +154,7 @@ class ReconstructedBake(Record):
         return SampledValues(
             last.w,
             found.law.at(last.risk),
-            last.raw.values.bent,
+            last.bent,
             found.rmse(self.share),
             last.samples,
             rays,

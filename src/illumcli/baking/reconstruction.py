@@ -27,7 +27,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, column_major
+from illumcli.arrays import F, Vectors, column_major, unit
 from illumcli.baking.cells import SIZE, Cells, cells_of
 from illumcli.baking.points import Points
 from illumcli.records import Record
@@ -54,6 +54,7 @@ class RawValues(Record):
 
     hidden: NDArray[np.float64]  # (M,) 1 - w
     variance: NDArray[np.float64]  # (M,) as stated, 0 where a point is known to be open
+    bent: Vectors | None = None  # (M, 3) mean unoccluded directions
 
 
 class Reconstruction(Record):
@@ -62,6 +63,7 @@ class Reconstruction(Record):
     hidden: NDArray[np.float64]  # (M,) 1 - w in [0, 1]; exactly 0 where nothing around is hidden
     risk: NDArray[np.float64]  # (M,) expected square error, by the estimate that chose the windows
     windows: dict[int, float]  # points in a window, at most; 1 for raw values -> share of the cells
+    bent: Vectors | None = None  # (M, 3) float32 unit, in the same windows
 
 
 def rotated_cells(points: Points, threads: int) -> list[Cells]:
@@ -79,9 +81,10 @@ def _rotated_cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
 def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, threads: int) -> Reconstruction:
     """The mean of the reconstructions over each of several sets of cells."""
     if not len(raw.hidden):
-        return Reconstruction(raw.hidden, raw.variance, {})
+        return Reconstruction(raw.hidden, raw.variance, {}, raw.bent)
     features = np.concatenate([points.n.T, points.position.T]).astype(np.float64)
     hidden, risk = np.zeros(len(raw.hidden)), np.zeros(len(raw.hidden))
+    bent = None if raw.bent is None else np.zeros((len(raw.hidden), 3), order="F")
     chosen = np.zeros(len(WINDOWS) + 1)
     with ThreadPoolExecutor(threads, thread_name_prefix="reconstruct") as pool:
         for cells in rotated:
@@ -93,11 +96,14 @@ def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, thread
                 index = cells.points[block][is_point]
                 hidden[index] += at_points.hidden[is_point]
                 risk[index] += at_points.risk[is_point]
+                if bent is not None and at_points.bent is not None:
+                    bent[index] += at_points.bent[:, is_point].T
             chosen += np.bincount(best.window, minlength=len(chosen)) / len(best.window)
     count = len(rotated)
     sizes = (1, *(SIZE * each for each in WINDOWS))
     windows = dict(zip(sizes, (chosen / count).tolist(), strict=True))
-    return Reconstruction(np.clip(hidden / count, 0, 1), risk / count, windows)
+    directions = None if bent is None else unit(column_major(bent, F))
+    return Reconstruction(np.clip(hidden / count, 0, 1), risk / count, windows, directions)
 
 
 class Fits(Record):
@@ -123,6 +129,14 @@ class Fitted(Record):
 
     hidden: NDArray[np.float64]  # (B, 8)
     risk: NDArray[np.float64]  # (B, 8)
+    bent: NDArray[np.float64] | None  # (3, B, 8)
+
+
+class Directions(Record):
+    """Mean unoccluded directions, and their moments."""
+
+    bent: Vectors  # (M, 3)
+    moments: NDArray[np.float64]  # (3, 7, C + 1) of each component: sum, and sums of products with features
 
 
 class CellValues:
@@ -135,6 +149,18 @@ class CellValues:
         for block in self.blocks():
             index, share = cells.points[block], cells.filled[block].astype(np.float64)
             moments(share, raw.hidden[index], features[:, index], _sum_rows, self._moments[:, block])
+        self._directions = None if raw.bent is None else self._with_moments(raw.bent)
+
+    def _with_moments(self, bent: Vectors) -> Directions:
+        out = np.zeros((3, 1 + FEATURES, len(self._cells.points) + 1))
+        for block in self.blocks():
+            index, share = self._cells.points[block], self._cells.filled[block].astype(np.float64)
+            for sums, component in zip(out, bent.T, strict=True):
+                weighted = share * component[index]
+                _sum_rows(weighted, sums[0, block])
+                for number, feature in enumerate(self._features, 1):
+                    _sum_rows(weighted * feature[index], sums[number, block])
+        return Directions(bent, out)
 
     def blocks(self) -> list[slice]:
         """Cells that are solved together."""
@@ -175,7 +201,30 @@ class CellValues:
         return Fitted(
             np.where(is_raw, self._raw.hidden[index], value),
             np.where(is_raw, self._raw.variance[index], best.risk[block, None]),
+            None if self._directions is None else self._fitted_directions(self._directions, best, block),
         )
+
+    def _fitted_directions(
+        self, directions: Directions, best: ChosenFits, block: slice
+    ) -> NDArray[np.float64]:
+        """(3, B, 8) mean unoccluded directions, from polynomials in the windows that were chosen for w."""
+        # moments over the cells of each window
+        index, near = self._cells.points[block], self._cells.near[block]
+        size = np.array([1, *WINDOWS])[best.window[block]]
+        sums = np.zeros((MOMENTS, len(index)))
+        others = np.zeros((3, 1 + FEATURES, len(index)))
+        for k in range(WINDOWS[-1]):
+            cell = np.where(k < size, near[:, k], len(self._cells.points))
+            sums += self._moments.take(cell, axis=1)
+            others += directions.moments.take(cell, axis=2)
+
+        # polynomials of each component at the points
+        features = self._features[:, index]
+        of_window = polynomials(sums[:, :, None])
+        others = others[:, :, :, None] / of_window.count
+        fitted = np.stack([of_window.of_another(each[0], each[1:], features) for each in others])
+        raw = np.stack([component[index] for component in directions.bent.T])
+        return np.where(best.window[block, None] == 0, raw, fitted)
 
 
 def chosen_fits(fits: Sequence[Fits], cells: Cells) -> ChosenFits:

@@ -92,6 +92,24 @@ class Polynomials(Record):
         square = sum(step * step * scale for step, scale in zip(steps, self.inverse, strict=True))
         return (1 + square) / self.count
 
+    def of_another(
+        self, mean: NDArray[np.float64], products: Planes, features: Planes
+    ) -> NDArray[np.float64]:
+        """(...) where the features are (6, ...), the polynomial fitted to another quantity of the samples.
+
+        Parameters
+        ----------
+        mean : (...) float64
+            Of the quantity.
+        products : (6, ...) float64
+            Means of its products with the features.
+        """
+        forth = _substituted(self.lower, list(products - self.means * mean))
+        slopes = [value * scale for value, scale in zip(forth, self.inverse, strict=True)]
+        _substitute_back(self.lower, slopes)
+        steps = zip(slopes, features - self.means, strict=True)
+        return mean + sum(slope * step for slope, step in steps)
+
 
 def polynomials(sums: Planes) -> Polynomials:
     """The polynomial of least squares of each sum of moments, (36, ...), which are overwritten."""
@@ -123,9 +141,7 @@ def polynomials(sums: Planes) -> Polynomials:
     forth = _substituted(lower, right)
     slopes = [forth[i] * inverse[i] for i in range(FEATURES)]
     explained = sum(forth[i] * slopes[i] for i in range(FEATURES))
-    for i in reversed(range(FEATURES)):
-        for k in range(i + 1, FEATURES):
-            slopes[i] = slopes[i] - lower[k, i] * slopes[k]
+    _substitute_back(lower, slopes)
     square = np.maximum(sums[SQUARE] - hidden * hidden - explained, 0) * count
     return Polynomials(count, means, hidden, slopes, square, lower, inverse)
 
@@ -137,3 +153,10 @@ def _substituted(lower: Triangle, right: list[NDArray[np.float64]]) -> list[NDAr
         for k in range(i):
             out[i] = out[i] - lower[i, k] * out[k]
     return out
+
+
+def _substitute_back(lower: Triangle, right: list[NDArray[np.float64]]) -> None:
+    """L^-T right, in place."""
+    for i in reversed(range(FEATURES)):
+        for k in range(i + 1, FEATURES):
+            right[i] = right[i] - lower[k, i] * right[k]

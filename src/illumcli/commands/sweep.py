@@ -6,30 +6,25 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 
-from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.store import open_store
 from illumcli.commands.batch import Batch
-from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.options import RenderOptions
 from illumcli.commands.render import rendered
 from illumcli.commands.report import Report
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
-from illumcli.commands.sweep_outcome import Outcome, PlannedVariant, SweepResult
-from illumcli.commands.sweep_reference import channel_count
-from illumcli.commands.work import Work, unused_keys, work_of
+from illumcli.commands.sweep_outcome import Outcome, SweepResult, following_due
+from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
+from illumcli.commands.work import Work, unused_keys
 from illumcli.errors import IllumError
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress, no_progress
-from illumcli.scene.load import SceneText, load, read_text
 from illumcli.scene.variants import Variant
-
-HELD = 256
-"""Variants that are not planned a second time when they are rendered; each holds some 80 kB until then."""
 
 
 def sweep_scene(
@@ -56,15 +51,15 @@ def sweep_scene(
     options, files = options or RenderOptions(), files or SweepFiles()
     batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
-    # faults that can be known before the first ray
-    works = _Works(path, replace(options, pattern=options.pattern or default_pattern(variants)))
+    # Find faults before the first ray.
+    works = SweepWorks(path, replace(options, pattern=options.pattern or default_pattern(variants)))
     outcomes, warnings = _planned(works, variants, batch, written)
     if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
     planned = plan_files(files, outcomes, options.force)
 
-    # the images
+    # Render the images.
     outcomes, of_images = _rendered(works, outcomes, batch, progress, written)
     warnings += of_images
     seconds = time.perf_counter() - start
@@ -78,40 +73,11 @@ def sweep_scene(
     return SweepResult(tuple(outcomes), planned.kept if has_images else (), tuple(warnings), seconds)
 
 
-class _Works:
-    """Makes the work of a variant when it is asked for. The scene and the files that it names are read once
-    for all variants: what others write to them meanwhile is not seen."""
-
-    def __init__(self, path: Path, options: RenderOptions) -> None:
-        self._path = path
-        self.options = options
-        self._files = FileFingerprints()
-        self._held: dict[int, Work] = {}
-
-    @cached_property
-    def _text(self) -> SceneText:
-        return read_text(self._path)
-
-    def of(self, outcome: Outcome) -> Work:
-        """What rendering a variant takes, held until it is dropped."""
-        if outcome.number not in self._held:
-            overrides = tuple(outcome.variant.overrides)
-            own = replace(self.options, overrides=overrides, audit=False)
-            job = RenderJob(self._path, own, {"frame": outcome.variant.frame})
-            loaded = load(self._path, overrides, self._text)
-            self._held[outcome.number] = work_of(job, loaded, self._files)
-        return self._held[outcome.number]
-
-    def drop(self, outcome: Outcome) -> None:
-        """Forget the work of a variant; it is made anew where it is asked for again."""
-        self._held.pop(outcome.number, None)
-
-
 def _planned(
-    works: _Works, variants: Sequence[Variant], batch: Batch, written: Callable[[Outcome], None]
+    works: SweepWorks, variants: Sequence[Variant], batch: Batch, written: Callable[[Outcome], None]
 ) -> tuple[list[Outcome], list[str]]:
-    """The outcomes with what every variant will make, where it has no fault, and warnings of the scene that
-    hold in all of them."""
+    """The outcomes with the facts about every variant without a fault, and the warnings about the scene that
+    all of them have."""
     assert works.options.pattern is not None
     refuse_equal_names(variants, works.options.pattern)
     warnings: list[str] | None = None
@@ -119,9 +85,9 @@ def _planned(
     def planned(outcome: Outcome) -> Outcome:
         nonlocal warnings
         work = works.of(outcome)
-        outcome = replace(outcome, planned=_facts(work))
-        told = unused_keys(work)
-        warnings = told if warnings is None else [line for line in warnings if line in told]
+        outcome = replace(outcome, planned=planned_variant(work))
+        lines = unused_keys(work)
+        warnings = lines if warnings is None else [line for line in warnings if line in lines]
         if outcome.number > HELD:
             works.drop(outcome)
         return outcome
@@ -131,23 +97,8 @@ def _planned(
     return outcomes, warnings or []
 
 
-def _facts(work: Work) -> PlannedVariant:
-    """What is known of a variant before it is rendered."""
-    first = work.targets[0]
-    return PlannedVariant(
-        paths=tuple(target.path for target in work.targets),
-        content=work.content,
-        image_content=first.content,
-        height=first.view.height,
-        width=first.view.width,
-        channels=channel_count(work.development.channels(first)),
-        exposure=work.scene.film.exposure,
-        is_due=bool(work.due()),
-    )
-
-
 def _rendered(
-    works: _Works,
+    works: SweepWorks,
     outcomes: Sequence[Outcome],
     batch: Batch,
     progress: Progress,
@@ -157,7 +108,7 @@ def _rendered(
     store, memory = open_store() if works.options.cache else None, MemoryCache()
     cache = Cache(store, memory)
     done = list(outcomes)
-    following = _following(done)
+    following = following_due(done)
     last: Report | None = None
 
     def images(upcoming: Work | None, outcome: Outcome) -> Outcome:
@@ -170,13 +121,14 @@ def _rendered(
     for index in batch.due():
         number, upcoming = following[index], None
         if number is not None:
-            with suppress(IllumError):  # it is told in its turn
+            with suppress(IllumError):  # reported when it is its turn
                 upcoming = works.of(done[number])
         done[index] = _attempt(done[index], partial(images, upcoming), batch, written)
         last = done[index].report or last
         works.drop(done[index])
         memory.retire()
 
+    # Collect the warnings.
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
     warnings = list(dict.fromkeys(of_images))
     if store is not None:
@@ -185,22 +137,8 @@ def _rendered(
     return done, warnings
 
 
-def _following(outcomes: Sequence[Outcome]) -> list[int | None]:
-    """For each variant, the index of the next one that is due."""
-    found: list[int | None] = []
-    upcoming: int | None = None
-    for index in reversed(range(len(outcomes))):
-        found.append(upcoming)
-        planned = outcomes[index].planned
-        upcoming = index if planned is not None and planned.is_due else upcoming
-    return found[::-1]
-
-
 def _attempt(
-    outcome: Outcome,
-    step: Callable[[Outcome], Outcome],
-    batch: Batch,
-    written: Callable[[Outcome], None],
+    outcome: Outcome, step: Callable[[Outcome], Outcome], batch: Batch, written: Callable[[Outcome], None]
 ) -> Outcome:
     """The outcome after a step, or with the step's error."""
     with batch.piece(outcome.number - 1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from illumcli.commands.report import Report
@@ -11,20 +12,20 @@ from illumcli.scene.variants import Variant
 
 
 class PlannedVariant(Value):
-    """What is known of a variant before it is rendered. It holds no scene: a sweep has up to 100,000."""
+    """Facts about a variant before it is rendered. It holds no scene: a sweep has up to 100,000 variants."""
 
     paths: tuple[Path, ...]
     content: str
-    """Hash of all that the pixels of its images depend on."""
+    """Hash of everything that the pixels of its images depend on."""
     image_content: str
-    """The same of its first image."""
+    """Hash for its first image alone."""
     height: int
     width: int
     channels: int
-    """Of the first image: 3 for colours, else 1."""
+    """Channels of the first image that are compared: 3 for colours, otherwise 1."""
     exposure: float
     is_due: bool
-    """Is some image not there yet with the same content?"""
+    """True if some image has to be written."""
 
 
 class Outcome(Record):
@@ -34,7 +35,7 @@ class Outcome(Record):
     """From 1."""
     variant: Variant
     planned: PlannedVariant | None = None
-    """None where the scene has a fault with these values."""
+    """None if the scene has a fault with these values."""
     report: Report | None = None
     """Set once the images are rendered or kept."""
     error: IllumError | None = None
@@ -48,6 +49,17 @@ class Outcome(Record):
     def paths(self) -> tuple[Path, ...]:
         """The images of the variant."""
         return self.planned.paths if self.planned else ()
+
+
+def following_due(outcomes: Sequence[Outcome]) -> list[int | None]:
+    """For each variant, the index of the next one with images to render; None if there is none."""
+    following: list[int | None] = []
+    upcoming: int | None = None
+    for index in reversed(range(len(outcomes))):
+        following.append(upcoming)
+        planned = outcomes[index].planned
+        upcoming = index if planned is not None and planned.is_due else upcoming
+    return following[::-1]
 
 
 class SweepResult(Record):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from illumcli.cache.codec import (
     Misfit,
@@ -26,6 +26,9 @@ from illumcli.records import Value
 from illumcli.render_graph.build import GIVEN, Graph
 from illumcli.render_graph.keys import Keys, code
 
+CachedTiles: TypeAlias = Literal["all", "some", "none"]
+"""The pixels for which buffers of tiles are loaded."""
+
 
 class Lookup(Value):
     """Which buffers of a view are cached, and which are worth caching."""
@@ -44,8 +47,7 @@ def substitute_cached(
     view: View,
     cache: Cache,
     look: bool = False,
-    some: bool = False,
-    tiles: bool = True,
+    tiles: CachedTiles = "all",
 ) -> tuple[Graph, Lookup]:
     """The graph with nodes that load the cached buffers among all that `buffers` need, and which these are.
 
@@ -53,10 +55,9 @@ def substitute_cached(
     ----------
     look : bool
         Read nothing: an entry that exists counts as valid, and the graph cannot run.
-    some : bool
-        Buffers of tiles are kept for some pixels only; the graph loads those of pixels that all of them have.
-    tiles : bool
-        Load buffers of tiles, too.
+    tiles : {"all", "some", "none"}
+        Load buffers of tiles for all pixels; for those pixels that all of these buffers are cached for; or
+        not at all.
     """
     keys = Keys(graph.nodes, view, code())
     loaders: dict[str, Node] = {}
@@ -79,12 +80,12 @@ def substitute_cached(
                 reused[name] = known.source
         elif cache.memory is not None or is_kept(name):
             key = keys(name)
-            if some and codec_of(name) is not None:
+            if tiles == "some" and codec_of(name) is not None:
                 keeps[name] = key
-                source, loader, found = _pixel_loader(name, key, view, cache, look)
-                pixels |= {name: found} if found is not None else {}
+                source, loader, buffer = _pixel_loader(name, key, view, cache, look)
+                pixels |= {name: buffer} if buffer is not None else {}
             else:
-                source, loader = _loader(name, key, view, cache, look, tiles)
+                source, loader = _loader(name, key, view, cache, look, tiles == "all")
             if loader is not None:
                 node = loaders[name] = loader
                 reused[name] = source
@@ -100,8 +101,8 @@ def _pixel_loader(
     """Where a buffer of some pixels is loaded from, the node that does so and what it reads."""
     load = load_hits if name == "hits" else load_tile
     if cache.memory is not None and key in cache.memory.pixels:
-        found = cache.memory.pixels[key]
-        return "memory", Node(name, partial(load, found), _inputs(name)), found
+        buffer = cache.memory.pixels[key]
+        return "memory", Node(name, partial(load, buffer), _inputs(name)), buffer
     store, codec = cache.store, codec_of(name)
     if store is None or codec is None:
         return "", None, None
@@ -112,11 +113,11 @@ def _pixel_loader(
     if stored is None:
         return "", None, None
     try:
-        found = pixel_buffer(codec, stored, view)
+        buffer = pixel_buffer(codec, stored, view)
     except Misfit:
         store.reject(pixel_key(key), f"holds something else than {name.partition(':')[0]} of some pixels")
         return "", None, None
-    return "store", Node(name, partial(load, found), _inputs(name)), found
+    return "store", Node(name, partial(load, buffer), _inputs(name)), buffer
 
 
 def _loader(

@@ -46,7 +46,7 @@ def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, 
     if means := [layer for layer in outputs if not layer.data]:
         of_all = view.all_samples()
         needed = needed_buffers(graph, means, [of_all])
-        loaded, lookup = substitute_cached(graph, needed, of_all, cache, look, some=True)
+        loaded, lookup = substitute_cached(graph, needed, of_all, cache, look, tiles="some")
         all_samples = schedule(loaded, means, of_all, lookup)
     graph, lookup = substitute_cached(graph, buffers, view.centres(), cache, look)
     return schedule(graph, outputs, view, lookup, all_samples)

@@ -213,7 +213,7 @@ def uncached_plans(plan: Plan, cache: Cache) -> tuple[Plan, Plan]:
     plans = []
     for outputs, view in ((plan.sampled, centres), (others.outputs, others.view)):
         needed = needed_buffers(graph, outputs, [view])
-        loaded, lookup = substitute_cached(graph, needed, view, cache, tiles=False)
+        loaded, lookup = substitute_cached(graph, needed, view, cache, tiles="none")
         plans.append(schedule(loaded, outputs, view, lookup))
     return plans[0], plans[1]
 

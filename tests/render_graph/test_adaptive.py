@@ -187,7 +187,7 @@ objects:
   - {mesh: {shape: plane, size: [400, 400]}, material: {model: lambert, diffuse: 0.9}}
 """)
     _, stats = rendered(path, ["beauty"])
-    assert 50 <= stats.refined <= 280
+    assert 50 <= stats.refined <= 280 + 64 * 48 - 62 * 46
 
 
 def test_a_steep_slope_is_no_edge_at_the_film_s(tmp_path):
@@ -195,7 +195,18 @@ def test_a_steep_slope_is_no_edge_at_the_film_s(tmp_path):
     path.write_text(WIRE.replace("[0, 0, 5]", "[0, 1, 5.7]"))  # six pixels deeper with every row
     (tmp_path / "wire.obj").write_text("v -9 0 -90\nv 9 0 -90\nv 9 0 90\nv -9 0 90\nf 4 3 2 1\n")
     _, stats = rendered(path, ["beauty"])
-    assert stats.refined == 0
+    assert stats.refined == 40 * 40 - 38 * 38  # the film's border alone
+
+
+def test_a_shadow_s_edge_beyond_the_last_centres_is_found(tmp_path):
+    """In the lower half of the last row, where no centre lies beyond it."""
+    path = tmp_path / "scene.yaml"
+    path.write_text(WIRE + "lights: [{light: directional, direction: [0, 1, -1], irradiance: 1}]\n")
+    (tmp_path / "wire.obj").write_text(quads((-9, 9, -9, 9, 0), (-9, 9, -3, -1.985, 1)))
+    own, _ = rendered(path, ["beauty"])
+    many, _ = rendered(path, ["beauty"], overrides=["film.adaptive=false"])
+    assert 0.02 < np.ptp(many["beauty"][-2:, 20, 0]) < 0.2
+    assert own["beauty"].tobytes() == many["beauty"].tobytes()
 
 
 def test_a_texture_finer_than_pixels_wants_all_samples(tmp_path):

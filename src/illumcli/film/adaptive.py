@@ -114,10 +114,13 @@ def centres(
     )
 
 
-def edges(view: View, render_space: RenderSpace, centres: Centres, probes: Probes) -> NDArray[np.bool_]:
+def edges(
+    view: View, render_space: RenderSpace, tile: Tile, centres: Centres, probes: Probes
+) -> NDArray[np.bool_]:
     """(P,) True where centres and probes hit different objects, or normals or depths have a step.
 
-    The result is not valid at the tile's border, where neighbours are missing, except at the film's.
+    Pixels at the film's border that see something count, too: no centre lies beyond them to tell. The result is
+    not valid at the border of a tile elsewhere, where neighbours are missing.
     """
     shape, reach = centres.object.shape, view.reach
 
@@ -136,7 +139,18 @@ def edges(view: View, render_space: RenderSpace, centres: Centres, probes: Probe
     close = around(near, np.maximum, 1, straight=True) + step
     steps = bend(near) > step
     steps |= (probes.farthest.reshape(shape) < far) | (probes.nearest.reshape(shape) > close)
-    return np.asarray(differ | around(steps, np.maximum, reach)).ravel()
+    differ |= around(steps, np.maximum, reach)
+
+    # The film's border, but for empty sky.
+    sees = around(np.maximum(centres.object, probes.highest.reshape(shape)), np.maximum, reach) > 0
+    return np.asarray(differ | (sees & at_border(view, tile, reach))).ravel()
+
+
+def at_border(view: View, tile: Tile, width: int) -> NDArray[np.bool_]:
+    """(h, w) True for pixels of a tile that lie less than `width` pixels from the film's border."""
+    x, y = np.arange(tile.x, tile.x + tile.width), np.arange(tile.y, tile.y + tile.height)
+    columns, rows = ((at < width) | (at >= size - width) for at, size in ((x, view.width), (y, view.height)))
+    return np.asarray(rows[:, None] | columns)
 
 
 def _nearness_step(

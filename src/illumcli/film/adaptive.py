@@ -119,8 +119,8 @@ def edges(
 ) -> NDArray[np.bool_]:
     """(P,) True where centres and probes hit different objects, or normals or depths have a step.
 
-    Pixels at the film's border that see something count, too: no centre lies beyond them to tell. The result is
-    not valid at the border of a tile elsewhere, where neighbours are missing.
+    Pixels at the film's border that see something count, too: no centre lies beyond them to tell. It is
+    undecided elsewhere at the border of a tile, where neighbours are missing.
     """
     shape, reach = centres.object.shape, view.reach
 

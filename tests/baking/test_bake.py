@@ -156,6 +156,13 @@ def test_a_target_error_is_reached_by_reconstruction(tmp_path):
     assert sum(report.rays.values()) < sum(raw.rays.values())
 
 
+def test_a_target_that_is_not_reached_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr("illumcli.baking.reconstructed.MAX_TRIALS", 1)
+    _, report = bake(wavy(tmp_path), tmp_path / "out.npz", target_error=0.001, reconstruct=True)
+    assert report.rmse > 0.001
+    assert "trials did not reach it" in report.warnings[0]
+
+
 def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
     path = wavy(tmp_path)
     bake(path, tmp_path / "out.ply", channel="g")

@@ -122,10 +122,9 @@ def warnings_of(settings: BakeSettings, values: PointValues) -> list[str]:
     warnings = []
     rmse, target = values.statistics.rmse, settings.target_error
     if target is not None and rmse > target:
-        warnings.append(
-            f"error {rmse:.2g} is above the {target:g} asked for: no vertex casts more than {MAX_SAMPLES} "
-            "rays"
-        )
+        at_limit = max(values.statistics.samples, default=0) >= MAX_SAMPLES
+        reason = f"no vertex casts more than {MAX_SAMPLES} rays" if at_limit else "trials did not reach it"
+        warnings.append(f"error {rmse:.2g} is above the {target:g} asked for: {reason}")
     dark = dark_share(values.w)
     if dark > MOSTLY:
         warnings.append(

@@ -20,7 +20,7 @@ Vectors: TypeAlias = NDArray[np.floating[Any]]  # (N, 3)
 Ids: TypeAlias = NDArray[np.int32]  # (N,)
 
 BLOCK_ROWS = 3 << 13
-"""Rows of a block; a multiple of those that matrix products take at a time."""
+"""Rows of a block; a multiple of the rows that matrix products process at a time."""
 
 
 def column_major(values: ArrayLike, dtype: DTypeLike | None = None) -> NDArray[Any]:
@@ -32,7 +32,7 @@ def take_rows(table: NDArray[Any], index: NDArray[Any]) -> NDArray[Any]:
     """``table[index]`` for an array of indices along the first axis; components stay contiguous.
 
     `take` on the transposed table is three to four times faster than ``table[index]``. The mode `wrap` gives
-    valid indices, negative ones too, the same meaning but skips the check of their range, which doubles the
+    valid indices, negative ones too, the same meaning, but skips the check of their range, which doubles the
     speed again.
     """
     if table.ndim == 1:
@@ -51,10 +51,10 @@ def repeat_rows(vectors: Vectors, count: int) -> Vectors:
 
 
 def row_blocks(count: int) -> Iterator[slice]:
-    """Blocks of so many rows, for work whose intermediate arrays are to stay in a processor's cache.
+    """Blocks of `count` rows, for work whose intermediate arrays should stay in a processor's cache.
 
-    None is a single row, unless that is all there is: matrix products of several rows round alike wherever a
-    block begins, that of one row takes another way.
+    No block is a single row unless there is only one: the rounding of matrix products of several rows does
+    not depend on where a block begins, but products of a single row are computed differently.
     """
     firsts = range(0, max(count - 1, min(count, 1)), BLOCK_ROWS)
     for first in firsts:
@@ -80,7 +80,7 @@ def length(a: Vectors) -> Floats:
 
 
 def unit(a: Vectors) -> Vectors:
-    """(N, 3) `a` scaled to length 1; a zero vector stays zero."""
+    """(N, 3) `a` scaled to length 1; zero vectors remain zero."""
     size = length(a)
     return a * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from illumcli.records import Record
 
 Space: TypeAlias = Literal["srgb", "linear"] | None
-"""How the numbers of an image code light; None where their type decides."""
+"""The encoding of light in an image; None if it follows from the type of its numbers."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of linear R, G and B in the luminance Y (ITU-R BT.709)."""
 
@@ -20,7 +20,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 def to_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Display values of linear light, by the curve of IEC 61966-2-1 (1999), toe included.
 
-    1 stays 1. The curve goes on above 1, and below 0 the toe does; the precision is that of `linear`.
+    1 remains 1. The curve is continued above 1, its toe below 0; the precision is that of `linear`.
     """
     bright = np.maximum(linear, 0.0031308)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * bright ** (1 / 2.4) - 0.055)
@@ -33,10 +33,10 @@ def from_srgb(display: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 
 
 class Texels(Record):
-    """An image of linear values, in memory as its file has them: 8-bit integers are looked up in a table."""
+    """An image of linear values. Integers of 8 bits are kept, with a table of their linear values."""
 
     stored: NDArray[Any]  # (H, W, S) float32 linear values, or uint8; the first row is the top
-    channels: tuple[int, ...]  # C channels of those stored
+    channels: tuple[int, ...]  # C of the stored channels
     tables: NDArray[np.float32] | None = None  # (C, 256) linear value of each integer
 
     @property

@@ -1,4 +1,4 @@
-"""What can go wrong, as one family: place, fact, way out."""
+"""Errors of one family: their texts name the place, the fact and the remedy."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Iterable
 
 
 class IllumError(Exception):
-    """A run that cannot go on; its text names the place, the fact and the way out.
+    """A run cannot continue; the text names the place, the fact and the remedy.
 
-    `exit_code` is what the command line ends with: 1 a fault of the program.
+    `exit_code` is the exit code of the command line; 1 means a fault of the program.
     """
 
     exit_code = 1
@@ -27,19 +27,19 @@ class InputError(IllumError):
 
 
 class ThresholdError(IllumError):
-    """A comparison or a verification went beyond its tolerance."""
+    """A comparison or verification exceeds its tolerance."""
 
     exit_code = 3
 
 
 class LimitError(IllumError):
-    """Refused before anything was allocated: too large for the limits in force."""
+    """Too large for memory, disk or other limits; refused before anything is allocated."""
 
     exit_code = 4
 
 
 class OutputError(IllumError):
-    """An output or the cache cannot be written; nothing half-written is left."""
+    """An output or the cache cannot be written; no incomplete file remains."""
 
     exit_code = 5
 
@@ -48,14 +48,14 @@ _SMALLER = "make the film, the meshes or the samples smaller"
 LITTLE_MEMORY = f"out of memory; {_SMALLER}"
 
 _LITTLE_MEMORY_TOO = ("start new thread", "allocate lock", "allocate read lock")
-"""What Python calls RuntimeError where it has no memory."""
+"""Texts of the RuntimeErrors that Python raises if memory is short."""
 
 _NO_REASON = re.compile("error return without exception set|<.*> returned NULL without setting an exception")
-"""What Python says of a function of a library that failed and gave no reason, as without memory."""
+"""Text of the SystemError about a library function that failed without a reason, often for lack of memory."""
 
 
 def known(error: BaseException) -> IllumError | None:
-    """The same as one of ours, where its cause are the surroundings; None for a fault of the program."""
+    """The error as an IllumError if the environment caused it; None for a fault of the program."""
     match error:
         case IllumError():
             return error
@@ -67,13 +67,15 @@ def known(error: BaseException) -> IllumError | None:
             if error.errno in (errno.EMFILE, errno.ENFILE):
                 return LimitError(f"{fact}; raise the limit on open files (ulimit -n)")
             return OutputError(f"{fact}; check the disk and the permissions")
-        case ImportError() | SyntaxError():  # most often too little memory to map a library, or to compile
-            said = str(error).strip().splitlines()[-1:] or ["no reason given"]
-            return LimitError(f"a library cannot be loaded: {said[0]}; free memory, or install it again")
+        case (
+            ImportError() | SyntaxError()
+        ):  # usually there is too little memory to map a library or to compile
+            reason = str(error).strip().splitlines()[-1:] or ["no reason given"]
+            return LimitError(f"a library cannot be loaded: {reason[0]}; free memory, or install it again")
         case RuntimeError() if any(fact in str(error) for fact in _LITTLE_MEMORY_TOO):
             return LimitError(LITTLE_MEMORY)
         case ValueError() if str(error).startswith("field '") and " is required for " in str(error):
-            return LimitError(LITTLE_MEMORY)  # the compiler's tree lacks a part that got no memory
+            return LimitError(LITTLE_MEMORY)  # a node of the compiler's tree could not be allocated
         case SystemError() if _NO_REASON.fullmatch(str(error)):
             return LimitError(f"{error}: most often for want of memory; {_SMALLER}, or report it as a fault")
     return None

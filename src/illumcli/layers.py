@@ -1,4 +1,4 @@
-"""Every output layer once: a new layer is a row of `LAYERS` and a node that computes its buffer."""
+"""All output layers: a new layer is a row of `LAYERS` and a node that computes its buffer."""
 
 from __future__ import annotations
 
@@ -8,47 +8,47 @@ from typing import Literal, TypeAlias
 from illumcli.records import Value
 
 Kind: TypeAlias = Literal["light", "share", "data", "id"]
-"""`light`: linear and unbounded; `share`: 0 to 1; both are means over a pixel. `data` and `id`,
-whole numbers, are never filtered: the sample nearest to the pixel's centre, in 32 bits."""
+"""`light`: linear and unbounded; `share`: 0 to 1; both are means over a pixel. `data` and `id` (integers) are
+not filtered: they are the value of the sample nearest to the pixel's centre, in 32 bits."""
 Preview: TypeAlias = Literal["value", "direction", "position", "depth", "fraction", "number"]
-"""How a layer that is no light is shown in 8 bits; `film.preview` has a row for each."""
+"""How a layer that is not light is shown in 8 bits; `film.preview` has a row for each."""
 
 
 class Layer(Value):
     """A layer of the image."""
 
     name: str
-    buffer: str  # of the render graph, which fills it
+    buffer: str  # of the render graph, with the layer's values
     channels: tuple[str, ...]  # full channel names, in order
     kind: Kind = "light"
     preview: Preview = "value"
     signed: bool = False  # may be negative
-    white: float = 1.0  # the number that the preview `value` shows white
-    per_pixel: bool = False  # made pixel by pixel from whole blocks of pixels
+    white: float = 1.0  # the number that the preview `value` shows as white
+    per_pixel: bool = False  # computed from complete blocks of finished pixels, not from samples
     text: str = ""  # what it holds, for the schema
 
     @property
     def data(self) -> bool:
-        """Is it never filtered?"""
+        """True if it is not filtered."""
         return self.kind in ("data", "id")
 
 
 class PerLight(Value):
-    """A name that stands for one layer per light."""
+    """A name for one layer per light."""
 
     name: str
     layer: Layer  # of the light `{light}`
     text: str  # what these layers hold
 
     def of(self, light: str) -> Layer:
-        """The layer of the light of a name."""
+        """The layer of the light of this name."""
         names = (self.layer.name, self.layer.buffer, *self.layer.channels)
         name, buffer, *channels = (text.replace(LIGHT, light) for text in names)
         return replace(self.layer, name=name, buffer=buffer, channels=tuple(channels))
 
     @property
     def prefix(self) -> str:
-        """What stands before the light's name in those of its layer and channels."""
+        """The part before the light's name in the names of its layer and channels."""
         return self.layer.name.partition(LIGHT)[0]
 
 
@@ -57,7 +57,7 @@ def _channels(group: str, names: str) -> tuple[str, ...]:
 
 
 LIGHT = "{light}"
-"""Stands for the name of a light."""
+"""Placeholder for the name of a light."""
 # fmt: off
 LAYERS: tuple[Layer | PerLight, ...] = (
     Layer("beauty", "beauty", ("R", "G", "B"), text="the picture."),
@@ -95,11 +95,11 @@ NAMES = tuple(row.name for row in LAYERS)
 FIXED = {row.name: row for row in LAYERS if isinstance(row, Layer)}
 """The layers that any scene has."""
 PER_LIGHT = {row.name: row for row in LAYERS if isinstance(row, PerLight)}
-"""Those that each light adds."""
+"""The layers that each light adds."""
 CHANNEL_GROUPS = {
     channel.partition(".")[0]: layer.name for layer in FIXED.values() for channel in layer.channels
 } | {row.prefix.rstrip("."): row.name for row in PER_LIGHT.values() if row.prefix}
-"""What stands before the dot of a channel's name, or a channel without one, and its layer."""
+"""Part of a channel's name before the dot, or the name without a dot -> its layer."""
 
 
 def layer_of_channel(channel: str) -> Layer:
@@ -113,9 +113,9 @@ def layer_of_channel(channel: str) -> Layer:
 
 
 def owner_of(name: str) -> str | None:
-    """The layer that a light of this name would collide with; None where the name is free.
+    """The layer that a light of this name would collide with; None if the name is free.
 
-    A light's name becomes that of a layer, so of files, on some systems without regard to case, and of a
+    A light's name becomes the name of a layer, and so of files, whose case some systems ignore, and of a
     group of channels.
     """
     folded = name.casefold()

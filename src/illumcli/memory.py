@@ -10,18 +10,18 @@ from functools import cache
 from illumcli.errors import LimitError
 
 FREE_SHARE = 0.8
-"""Of the memory that is free: so much may be used."""
+"""Share of the free memory that may be used."""
 MAP_THRESHOLD, TRIM_THRESHOLD = -3, -1  # M_MMAP_THRESHOLD, M_TRIM_THRESHOLD of glibc's malloc.h
 
 
 @cache
 def keep_freed_memory() -> None:
-    """Tell glibc to keep what numpy frees for the next array, once per process; nothing elsewhere.
+    """Make glibc keep memory that numpy frees for the next array, once per process; other systems do nothing.
 
     By default every temporary array above 128 KiB goes back to the system and is faulted in again, page
     by page: that is more than half the time of a pass over 16384 rays (camera rays: 2.1 ms against 0.9 ms).
     """
-    import ctypes  # a start that needs none of this does not wait for it
+    import ctypes  # imported here: commands that do not need it start faster
 
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(MAP_THRESHOLD, 1 << 26)
@@ -29,9 +29,9 @@ def keep_freed_memory() -> None:
 
 
 def refuse_little(size: int) -> None:
-    """Raise MemoryError where the process cannot have `size` more bytes.
+    """Raise MemoryError if the process cannot allocate `size` more bytes.
 
-    Some libraries end the process where they find too little while they load.
+    Some libraries end the process if there is too little memory while they load.
     """
     try:
         mmap.mmap(-1, size).close()
@@ -40,14 +40,14 @@ def refuse_little(size: int) -> None:
 
 
 def free_memory() -> int | None:
-    """Bytes that this process may still take: what the machine has, or what its group of processes or its own
-    limits leave of that; None where the system does not say."""
-    found = [_left_on_the_machine(), _left_in_the_group(), _left_of_addresses()]
-    return min((size for size in found if size is not None), default=None)
+    """Bytes that this process can still allocate, by the machine's memory and the limits of its control group
+    and of itself; None if unknown."""
+    sizes = [_left_on_the_machine(), _left_in_the_group(), _left_of_addresses()]
+    return min((size for size in sizes if size is not None), default=None)
 
 
 def refuse_beyond(need: int, what: str, way: str) -> None:
-    """Raise LimitError where `what` takes more bytes than may be used; `way` is the way out."""
+    """Raise LimitError if `what` needs more bytes than may be used; `way` is the remedy."""
     free = free_memory()
     if free is not None and need > FREE_SHARE * free:
         usable = in_words(FREE_SHARE * free)
@@ -62,7 +62,7 @@ def peak_memory() -> int:
 
 
 def in_words(count: float) -> str:
-    """Bytes as people read them."""
+    """A number of bytes with a unit."""
     for unit in ("bytes", "KiB", "MiB", "GiB"):
         if count < 1024:
             return f"{count:.3g} {unit}"
@@ -75,7 +75,7 @@ def _left_on_the_machine() -> int | None:
 
 
 def _left_in_the_group() -> int | None:
-    """What the limit of a control group leaves, as containers have one; its caches can be dropped."""
+    """The rest of the limit of the control group, as of a container; its file caches count as free."""
     folder = "/sys/fs/cgroup"
     most, taken = _number(f"{folder}/memory.max"), _number(f"{folder}/memory.current")
     if most is None or taken is None:
@@ -84,7 +84,7 @@ def _left_in_the_group() -> int | None:
 
 
 def _left_of_addresses() -> int | None:
-    """What `ulimit -v` leaves."""
+    """The rest of the limit of `ulimit -v`."""
     try:
         import resource
     except ImportError:  # not on every system
@@ -97,7 +97,7 @@ def _left_of_addresses() -> int | None:
 
 
 def _entry(path: str, key: str, unit: int) -> int | None:
-    """The number behind `key` in a file of lines; None where there is none."""
+    """The number after `key` in a file of lines; None if there is none."""
     try:
         with open(path) as file:
             return next((int(line.split()[1]) * unit for line in file if line.startswith(key)), None)
@@ -106,7 +106,7 @@ def _entry(path: str, key: str, unit: int) -> int | None:
 
 
 def _number(path: str) -> int | None:
-    """The first number in a file; None where there is none."""
+    """The first number in a file; None if there is none."""
     try:
         with open(path) as file:
             return int(file.read().split()[0])

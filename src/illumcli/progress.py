@@ -1,4 +1,4 @@
-"""Progress of a long computation, as whoever runs it shows it."""
+"""Progress of a long computation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 Progress: TypeAlias = Callable[[str, int, int], None]
-"""Called with what is going on, how much of it is done, and how much there is."""
+"""Called with the name of a computation, the amount done, and the total."""
 
 
 def no_progress(what: str, done: int, total: int) -> None:

@@ -43,7 +43,7 @@ class Value:
         self.__post_init__()
 
     def __post_init__(self) -> None:
-        """Look at the fields once all are there."""
+        """Called when all fields are set, to check or prepare them."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{type(self).__name__} is frozen: {name} cannot be changed")

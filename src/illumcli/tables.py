@@ -11,16 +11,16 @@ def aligned(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> list[s
     Parameters
     ----------
     rows : sequence of rows of equal length
-        The titles come first.
+        The first row has the titles.
     right
-        Columns that are aligned to the right; all others are to the left.
+        Columns that are aligned to the right; the others are aligned to the left.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(_padded(row, widths, right)).rstrip() for row in rows]
 
 
 def table(rows: Sequence[Sequence[str]], right: Container[int] = ()) -> str:
-    """The same as one text."""
+    """The rows as one text of aligned lines."""
     return "\n".join(aligned(rows, right))
 
 

@@ -1,4 +1,4 @@
-"""Versions of what an image depends on."""
+"""Versions of the software that an image depends on."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import platform
 
 
 def versions() -> dict[str, str]:
-    """Python and the libraries that decide about pixels and files, by name."""
+    """Versions of Python and of the libraries that affect pixels and files, by name."""
     from importlib.metadata import version
 
     names = ("numpy", "embreex", "OpenImageIO", "pydantic")

@@ -35,7 +35,7 @@ def draw_brdfs(
     plot: Plot = PLOT,
     force: bool = False,
 ) -> tuple[list[Path], list[Path]]:
-    """Draw the models `names` side by side; the paths of the files, and those of them that were kept.
+    """Draw the models `names` side by side. Returns the paths of all files, and those that were kept.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ def draw_brdfs(
     Raises
     ------
     InputError
-        Models or parameters that do not exist, values out of range; all at once.
+        Models or parameters do not exist, or values are out of range; all problems at once.
     OutputError
-        A different file is there and `force` is not given.
+        A different file exists and `force` is not given.
     """
     # Refuse outputs that cannot be written before anything is computed.
     if output is not None:
@@ -74,14 +74,14 @@ def draw_brdfs(
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
-    """The models by name, with their parameters; those named twice are numbered by their place."""
-    # Parse the overrides; what is wrong is collected and raised at once.
+    """The models by name, with their parameters; models named twice get the number of their place."""
+    # Parse the overrides; all problems are raised at once.
     problems: list[str] = []
     unreadable: list[Problem] = []
     changes = [(text, change) for text in overrides if (change := parse(text, unreadable))]
     problems += map(str, unreadable)
 
-    # Each model with the overrides that are meant for it.
+    # Apply to each model the overrides that address it.
     models: dict[str, IlluminationModel] = {}
     applied: set[str] = set()
     parameters: list[str] = []
@@ -105,7 +105,7 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
         if model is not None:
             models[title] = model
 
-    # Overrides that are meant for none.
+    # Refuse overrides that address no model.
     known = tuple(dict.fromkeys([*names, *parameters]))
     for text, change in changes:
         if text not in applied:
@@ -119,7 +119,7 @@ def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, 
 def _for(
     change: Override, name: str, place: int, Model: type[Description], names: Sequence[str]
 ) -> tuple[tuple[str, ...], Any] | None:
-    """Steps within the model and the value, if the override is meant for it."""
+    """The override's path within the model and its value; None if it does not address the model."""
     first, *rest = change.steps
     if first in (name, str(place)) and rest:
         return tuple(rest), change.value.plain()
@@ -131,8 +131,8 @@ def _for(
 def _described(
     Model: type[Any], changes: Sequence[tuple[str, tuple[tuple[str, ...], Any]]]
 ) -> tuple[IlluminationModel | None, list[str]]:
-    """The model with its changes, or None and what is wrong, with the override that it comes from."""
-    # Nested keys, as a scene would have them.
+    """The model with its changes; or None and the problems, with the overrides that cause them."""
+    # Nest the keys as in a scene.
     keys: dict[str, Any] = {"model": tag_of(Model)}
     text_of: dict[tuple[str, ...], str] = {}
     for text, (steps, value) in changes:
@@ -144,7 +144,7 @@ def _described(
         here[steps[-1]] = value
         text_of[steps] = text
 
-    # Validate; each fault is named after the last override that set it.
+    # Validate; a problem is attributed to the last override of its key.
     try:
         return Model.model_validate(keys), []
     except ValidationError as error:
@@ -171,10 +171,10 @@ def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:
 
 
 def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
-    """Write the files, except those that hold the same bytes already; these are returned."""
+    """Write the files. Returns those that are kept because they have the same bytes."""
     from illumcli.files.atomic import os_errors_as_output_errors, write_bytes
 
-    # Refuse all before any is written.
+    # Refuse different files before any is written.
     kept = []
     for path, data in files.items():
         with os_errors_as_output_errors(str(path)):

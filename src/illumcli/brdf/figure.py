@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
 DECADES = 4
-"""How far below the largest value a logarithmic picture goes."""
+"""Range of a logarithmic scale below the largest value."""
 STEEPEST = 85.0
-"""Angles of view beyond do not set the scale: there some models grow without bound [degrees]."""
+"""Larger angles of view do not count for the scale: some models grow without bound there [degrees]."""
 HEIGHTS = {"polar": 2.1, "sphere": 2.4, "plane": 1.5, "lobe": 2.3}
-"""Of the rows [inches]."""
+"""Heights of the rows [inches]."""
 PROJECTIONS = {"polar": "polar", "lobe": "3d"}
 
 Models: TypeAlias = Sequence[IlluminationModel]
@@ -67,7 +67,7 @@ def figure_file(models: Mapping[str, IlluminationModel], plot: Plot, kind: str) 
                     axes.set_title(title, fontsize=9)
         figure.supxlabel(_caption(plot), fontsize=7)
         file = io.BytesIO()
-        # no date and no version, so that the same drawing is the same file
+        # Without date and version, so that equal drawings are equal files.
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         figure.savefig(file, format=kind, metadata=metadata)
     return file.getvalue()
@@ -100,7 +100,7 @@ def _polar_row(row_axes: Sequence[Any], models: Models, plot: Plot) -> None:
 
 
 def _draw_slices(axes: PolarAxes, slices: Sequence[Slice], plot: Plot, top: float) -> None:
-    """The slices of one model, a colour for each angle of incidence; `top` lies on the rim."""
+    """The slices of one model, with a colour for each angle of incidence; the value `top` is at the rim."""
     from matplotlib import colormaps
 
     # The upper half circle, the normal upwards.
@@ -197,4 +197,4 @@ ROWS: dict[str, Callable[[Sequence[Any], Models, Plot], None]] = {
     "plane": _plane_row,
     "lobe": _lobe_row,
 }
-"""View -> what draws its row: the axes of the models, the models."""
+"""View -> the function that draws its row."""

@@ -1,4 +1,4 @@
-"""What a drawing of BRDFs shows."""
+"""Settings of a drawing of BRDFs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ VIEWS = ("polar", "sphere", "plane", "lobe")
 
 
 class Plot(Value):
-    """The rows of a drawing, and what their axes show."""
+    """The rows of a drawing, and the quantities on their axes."""
 
     views: Sequence[str] = VIEWS
-    """A row each."""
+    """Names of the rows."""
     angles: Sequence[float] = (15.0, 40.0, 65.0)
     """Angles of incidence of the polar slices [degrees]."""
     log: bool = False
-    """Slices and lobes on a logarithmic scale."""
+    """True for a logarithmic scale of slices and lobes."""
     times_cos: bool = False
-    """The response, cosine included, instead of the BRDF."""
+    """True for the response, cosine included, instead of the BRDF."""
 
     @property
     def lobe_angle(self) -> float:

@@ -3,7 +3,7 @@
 The surface is z = 0 with its normal along z and its grain along x; light comes from the left, in the plane of
 x and z. A value is f_r = response / n.l, or with `times_cos` the response itself: the radiance that leaves
 under a light of unit irradiance across its own direction. For the intensity models of the texts f_r is the
-BRDF that would give the same image; it grows without bound as the light sinks to the horizon.
+BRDF that gives the same image; it grows without bound as the light approaches the horizon.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Doubles = NDArray[np.float64]
 SUN = (-0.55, 0.6, 0.58)
 """Direction from the sphere to its light; the eye looks along -z."""
 LAMP = (0.0, 3.0, 0.8)
-"""Position of the light over the plane, on the far side, so that the eye looks against it."""
+"""Position of the light above the plane, on the far side: the eye looks towards it."""
 EYE = (0.0, -4.0, 1.5)
 
 
@@ -62,7 +62,8 @@ def _seen_from(model: IlluminationModel, incidence: float, v: Vectors, times_cos
 def slice_angles(incidence: float) -> Doubles:
     """Angles of view of a slice, degrees from -90 on the light's side to 90, without the horizon itself.
 
-    They are a quarter apart, less about the mirror direction, where a highlight may be narrower.
+    Their distance is a quarter of a degree, less near the mirror direction, where a highlight may be
+    narrower.
     """
     near = np.geomspace(1e-3, 2, 40)
     angles = np.concatenate([np.linspace(-90, 90, 721), incidence + near, incidence - near, [incidence]])
@@ -99,7 +100,7 @@ def lobe(
     horizon = np.arctan2(np.cos(angle), np.cos(around) * np.sin(angle)) - 1e-6
     away = np.linspace(0, 1, steps + 1)[:, None] ** 2 * horizon
 
-    # Turned from the mirror direction to the normal.
+    # Rotate the axis from the mirror direction to the normal.
     x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
     v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
     values = _seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
@@ -127,7 +128,7 @@ def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
 
     Its grain runs from left to right. The light does not fall off with distance.
     """
-    # Rays through twice the pixels, to where they meet the floor.
+    # Intersect the rays through twice as many pixels with the floor.
     across, down = np.meshgrid(
         (np.arange(2 * size) + 0.5) / size - 1, 0.32 + 0.68 * (np.arange(size) + 0.5) / size
     )

@@ -1,4 +1,4 @@
-"""The ``illum`` command: options and printing; each command imports its job when it is invoked."""
+"""The ``illum`` command: options and printing; each command imports its function when it is invoked."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """Commands found by module name, so that `illum --help` imports none of them."""
+    """The commands by module name; `illum --help` imports none of them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -83,14 +83,14 @@ def illum() -> None:
 
 
 def main() -> None:
-    """Run the command; an IllumError becomes its message and exit code, a signal ends by itself."""
+    """Run the command; an IllumError becomes its message and exit code, a signal ends the process."""
     for number in STOPS:
         signal.signal(number, _unwind)
     # start-up allocates many live objects; the default thresholds rescan them, 5 % of start-up
     gc.set_threshold(100_000, 50, 50)
-    # tiles run on threads of ours; those of numpy's linear algebra would only compete with them
+    # tiles run on our own threads; threads of numpy's linear algebra would only compete with them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # to look for plugins, pydantic would read the metadata of every installed package: 5 % of a start
+    # in search of plugins, pydantic would read the metadata of every installed package: 5 % of start-up
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     status = 1
     try:
@@ -99,19 +99,19 @@ def main() -> None:
         sys.stdout.flush()
         if output.fault is not None and status == 0:
             fact = f"standard output: cannot be written: {output.fault.strerror}"
-            status = _told(OutputError(f"{fact}; send it elsewhere, as in > FILE"))
+            status = _reported(OutputError(f"{fact}; send it elsewhere, as in > FILE"))
         sys.stderr.flush()
     except _Stopped as stop:
         _die_by(stop.number)
     except MemoryError:
-        status = _told(LimitError(LITTLE_MEMORY))
+        status = _reported(LimitError(LITTLE_MEMORY))
     # skip interpreter shutdown: it costs an eighth of a small render, and after an error it may wait for
     # threads of Embree that could not start
     os._exit(status)
 
 
 def _status() -> int:
-    """Run the command and print its error; the exit code: 1 is for faults of the program alone."""
+    """Run the command and print its error. Returns the exit code; 1 means a fault of the program."""
     try:
         code = illum.main(standalone_mode=False)
         return code if isinstance(code, int) else 0
@@ -121,25 +121,25 @@ def _status() -> int:
     except Exception as error:
         if (fault := known(error)) is None:
             raise
-        return _told(fault)
+        return _reported(fault)
 
 
-def _told(error: IllumError) -> int:
+def _reported(error: IllumError) -> int:
     click.echo(f"{error}", err=True)
     return error.exit_code
 
 
 class _Stopped(BaseException):
-    """A signal asked for the end."""
+    """A signal requests the end of the process."""
 
     def __init__(self, number: int) -> None:
         self.number = number
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:
-    """The first signal raises, so that open files are discarded; a second one ends at once.
+    """The first signal raises, so that open files are discarded; a second one ends the process at once.
 
-    So does one during an import: some libraries abort where an exception interrupts their start.
+    So does a signal during an import: some libraries abort if an exception interrupts their initialisation.
     """
     for each in STOPS:
         signal.signal(each, _end)
@@ -155,10 +155,10 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _die_by(number: int) -> None:
-    """End by the signal itself, so that the caller sees it; no temporary file stays behind."""
+    """End by the signal itself, so that the caller sees it; removes temporary files."""
     for each in STOPS:
         signal.signal(each, signal.SIG_IGN)  # discarding is short
-    # not imported yet, or only partly, where the signal interrupts its import: then nothing is open
+    # the module may not be imported yet, or only in part: then no file is open
     if discard := getattr(sys.modules.get("illumcli.files.atomic"), "discard_open", None):
         discard()
     signal.signal(number, signal.SIG_DFL)

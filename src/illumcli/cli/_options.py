@@ -48,7 +48,7 @@ SAMPLER = _Names(_samplers)
 FALLOFF = _Names(_falloffs)
 FILE = click.Path(path_type=Path)
 SCENE = FILE
-"""Existence is checked when it is read: a missing scene does not stop the others."""
+"""Whether a scene exists is checked when it is read: a missing scene does not stop the others."""
 
 scene_argument = click.argument("scene", type=SCENE)
 scenes_argument = click.argument("scenes", metavar="SCENE...", type=SCENE, nargs=-1, required=True)
@@ -170,8 +170,7 @@ verbose_option = click.option(
 
 
 def with_common(command: click.Command) -> click.Command:
-    """The command, and those below it, with `-q` and `-v`; where there is no less or no more to say,
-    they change nothing."""
+    """The command and its subcommands with `-q` and `-v`; commands without these options ignore them."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         with_common(below)
     taken = {option.name for option in command.params}
@@ -220,7 +219,7 @@ def taken(record: type[R], options: dict[str, Any]) -> R:
 
 
 def render_options(options: dict[str, Any]) -> RenderOptions:
-    """How scenes are rendered, of the options of a command."""
+    """The `RenderOptions` among the options of a command."""
     from illumcli.commands.options import RenderOptions
 
     return taken(RenderOptions, options)

@@ -1,4 +1,4 @@
-"""What several commands print, beside their results."""
+"""Lines that several commands print beside their results."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 
 def say(text: str) -> None:
-    """Print a line that is no result."""
+    """Print a line that is not a result, on stderr."""
     click.echo(text, err=True)
 
 
@@ -20,6 +20,6 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def say_kept(paths: Iterable[Path | str | None]) -> None:
-    """Say which files were there already with the same content."""
+    """Print the files that existed already with the same content."""
     for path in paths:
         say(f"{path}: kept, its content is the same")

@@ -9,10 +9,10 @@ from illumcli.progress import Progress, no_progress
 
 
 def reporter(quiet: bool) -> Progress:
-    """A `Progress`: one line that rewrites itself on a terminal, else a plain line every ten seconds."""
+    """A `Progress`: one line that is rewritten on a terminal, otherwise a plain line every ten seconds."""
     start, last = time.monotonic(), time.monotonic()
     terminal = sys.stderr.isatty()
-    rewrite = getattr(sys.stderr, "obeyed", sys.stderr.write)
+    rewrite = getattr(sys.stderr, "write_raw", sys.stderr.write)
 
     def report(what: str, done: int, total: int) -> None:
         nonlocal start, last

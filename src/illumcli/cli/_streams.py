@@ -1,4 +1,4 @@
-"""Standard streams that may be closed, full, or without a reader; none of that stops a run."""
+"""Standard streams that may be closed, full, or without a reader; a run continues all the same."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import sys
 from typing import TextIO
 
 _NOT_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
-"""Characters that control terminals, but tabs and line ends, and those that change the writing direction."""
+"""Characters that control terminals, except tabs and line ends, or change the writing direction."""
 
 
 def cleaned(text: str) -> str:
@@ -22,15 +22,15 @@ def cleaned(text: str) -> str:
 class StandardStream(io.TextIOWrapper):
     """A standard stream whose output is discarded once the system refuses a write.
 
-    `fault` is that refusal; a reader that left (`illum schema | head -1`) is none. `write` escapes control
-    characters, since names in files may hold them; `obeyed` writes them.
+    `fault` is its error; it is no fault if the reader has closed the pipe (`illum schema | head -1`). `write`
+    escapes control characters, which names in files may contain; `write_raw` does not.
     """
 
     def __init__(self, number: int, before: TextIO | None, errors: str) -> None:
         encoding = getattr(before, "encoding", None) or "utf-8"
         super().__init__(
             io.BufferedWriter(io.FileIO(number, "w", closefd=False)),
-            # names of files may hold any character
+            # names of files may contain any character
             encoding="utf-8" if codecs.lookup(encoding).name == "ascii" else encoding,
             errors=errors,
             line_buffering=getattr(before, "line_buffering", False),
@@ -39,11 +39,11 @@ class StandardStream(io.TextIOWrapper):
         self._is_discarded = False
 
     def write(self, text: str) -> int:
-        self.obeyed(cleaned(text))
+        self.write_raw(cleaned(text))
         return len(text)
 
-    def obeyed(self, text: str) -> None:
-        """Write `text` as it is."""
+    def write_raw(self, text: str) -> None:
+        """Write `text` without escaping control characters."""
         if not self._is_discarded:
             try:
                 super().write(text)
@@ -72,8 +72,8 @@ def _as_bytes(error: UnicodeError) -> tuple[bytes, int]:
 
 def open_standard_streams() -> StandardStream:
     """Make stdin, stdout and stderr usable in any state; returns stdout."""
-    # closed ones become the null device: else the next file opened takes their number, and what libraries
-    # print goes into that file
+    # Replace closed streams by the null device: otherwise the next file to be opened would get their number,
+    # and receive what libraries print.
     for number in range(3):
         try:
             os.fstat(number)

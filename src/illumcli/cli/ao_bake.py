@@ -55,7 +55,7 @@ class _Distance(click.ParamType):
 
 
 def _settings(options: dict[str, Any]) -> BakeSettings:
-    """What values depend on, of the options of the command."""
+    """The `BakeSettings` among the options of the command."""
     from illumcli.baking.settings import BakeSettings
 
     _refuse_contradictions(options)
@@ -80,7 +80,7 @@ def _refuse_contradictions(options: dict[str, Any]) -> None:
 
 
 def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
-    """Refuse parameters that the falloff does not have, and its own that are missing."""
+    """Refuse parameters that the falloff does not have, and missing ones that it needs."""
     from illumcli.schema.families import member, members, tag_of
 
     package, falloff = "illumcli.visibility.falloffs", options["falloff"]
@@ -97,7 +97,7 @@ def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
 
 
 def _options(options: dict[str, Any]) -> BakeOptions:
-    """How inputs are baked, of the options of the command."""
+    """The `BakeOptions` among the options of the command."""
     from illumcli.baking.settings import BakeOptions
 
     return taken(BakeOptions, options)

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 @click.group()
 def cache() -> None:
-    """What is kept between runs: parsed meshes, primary hits, shadows, obscurance.
+    """Manage the cache of parsed meshes, primary hits, shadows and obscurance.
 
-    Entries are named by what they depend on and checked whenever they are read; to remove them costs time
-    only. The folder is ILLUM_CACHE, else `illum` in XDG_CACHE_HOME, else ~/.cache/illum; ILLUM_CACHE_SIZE is
-    how much all entries may take, by default 4G: the least recently used go first.
+    Every entry is identified by all that it depends on and verified when it is read; removing entries only
+    costs time. The folder is ILLUM_CACHE, else `illum` in XDG_CACHE_HOME, else ~/.cache/illum.
+    ILLUM_CACHE_SIZE limits the size of all entries, by default 4G: the least recently used are removed first.
     """
 
 

@@ -15,7 +15,7 @@ from illumcli.cli._printing import say
 @overrides_option
 @studio_options
 def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
-    """Validate each SCENE and say every problem at once; nothing is rendered and no mesh is read."""
+    """Validate each SCENE and print every problem at once; nothing is rendered and no mesh is read."""
     from illumcli.commands.check import check_scenes
     from illumcli.errors import InputError
 

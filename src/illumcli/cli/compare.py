@@ -1,4 +1,4 @@
-"""`illum compare`: how far apart two images are, and whether that is too far."""
+"""`illum compare`: the differences of two images, and limits on them."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def render(
 
 
 def _say_report(done: Rendered, quiet: bool, verbose: bool) -> None:
-    """What became of a scene, beside its files."""
+    """Print the report of a scene."""
     from illumcli.render_graph.repairs import repair_lines
 
     report = done.report
@@ -97,7 +97,7 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool) -> None:
     if not verbose:
         return
 
-    # what was clamped, reused and skipped, how rays were traced, and where time went
+    # Clamped values, errors, reused and skipped buffers, rays and times.
     if report.clamped:
         fact = f"{report.clamped} values beyond 65504, the largest of half precision, are written as that"
         say(f"{done.scene}: {fact}; outputs.colour: float keeps them")

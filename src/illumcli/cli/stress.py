@@ -14,8 +14,8 @@ from illumcli.cli._options import json_option, quiet_option
 def stress(quick: bool, as_json: bool, quiet: bool) -> None:
     """Run the numerical stability suite: scenes, rays, models and meshes at the limits.
 
-    Every picture goes the whole way from a scene file to an image file and back. Scenes that make no sense
-    must be refused, all others must render without a NaN, an infinite or a negative value.
+    Every picture is rendered from a scene file to an image file and read back. Scenes that make no sense must
+    be refused; all others must render without NaN, infinite or negative values.
 
     Exit status: 0 all passed, 3 some case failed.
     """

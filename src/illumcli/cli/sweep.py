@@ -39,7 +39,7 @@ def _files(options: dict[str, Any]) -> SweepFiles:
     from illumcli.commands.sweep_files import SweepFiles
 
     if options["reference"] is not None and options["table"] is None:
-        raise click.UsageError("--reference is what the errors of --table are against; give --table")
+        raise click.UsageError("--reference is for the errors in --table; give --table, too")
     return taken(SweepFiles, options)
 
 
@@ -71,9 +71,7 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 @only_option
 @click.option("--sheet", type=FILE, metavar="FILE.png", help="Write a contact sheet, labelled.")
 @click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, error.")
-@click.option(
-    "--reference", metavar="N|FILE", help="What the table's errors are against: variant N or an image."
-)
+@click.option("--reference", metavar="N|FILE", help="Reference of the table's errors: variant N or an image.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")
 @seed_option("By default the scene's.")
 @threads_option
@@ -110,12 +108,12 @@ def sweep(
     from illumcli.commands.sweep import sweep_scene
     from illumcli.render_graph.repairs import repair_lines
 
-    said: set[str] = set()
+    printed: set[str] = set()
 
     def written(outcome: Outcome) -> None:
-        # a fault of the scene itself is that of every variant
-        if outcome.error is not None and str(outcome.error) not in said:
-            said.add(str(outcome.error))
+        # a fault of the scene is the same in all variants: print it once
+        if outcome.error is not None and str(outcome.error) not in printed:
+            printed.add(str(outcome.error))
             say(f"{outcome.label}: {outcome.error}")
         if outcome.report is None:
             return
@@ -124,9 +122,9 @@ def sweep(
             return
         say_kept(outcome.report.kept)
         for line in repair_lines(outcome.report.repairs, verbose):
-            if line not in said:
+            if line not in printed:
                 say(f"{scene}: {line}")
-            said.add(line)
+            printed.add(line)
 
     result = sweep_scene(scene, variants, options, files, reporter(quiet), written)
     for warning in result.warnings:

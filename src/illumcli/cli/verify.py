@@ -1,4 +1,4 @@
-"""`illum verify`: the models against reference vectors, and how far they are off."""
+"""`illum verify`: the deviations of the models from reference vectors."""
 
 from __future__ import annotations
 

@@ -28,10 +28,10 @@ def group_by_layer(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
 
 
 def bits_of(numbers: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Whole numbers as the bands of an EXR hold them: the same bits, viewed as float32."""
+    """Integers as the bands of an EXR hold them: the same bits, viewed as float32."""
     return np.ascontiguousarray(numbers).view(np.float32)
 
 
 def numbers_of(bits: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """The whole numbers that `bits_of` was given."""
+    """The inverse of `bits_of`."""
     return np.ascontiguousarray(bits).view(np.uint32)

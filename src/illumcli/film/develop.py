@@ -28,11 +28,11 @@ class Target(Value):
     view: View
     layers: tuple[Layer, ...]
     content: str
-    """Hash of all that its pixels depend on."""
+    """Hash of everything that its pixels depend on."""
 
     @property
     def is_png(self) -> bool:
-        """Does it hold one layer in 8 bits, or all of them as they are?"""
+        """True if it holds one layer in 8 bits; otherwise it holds the values of all layers."""
         return self.path.suffix.lower() == ".png"
 
 
@@ -42,7 +42,7 @@ class Development(Value):
     background: tuple[float, float, float] | None
     """Colour behind the surfaces; None leaves them with an alpha channel."""
     exposure: float
-    """Of pictures in 8 bits [stops]."""
+    """Exposure of pictures in 8 bits [stops]."""
     colour: Literal["half", "float"]
     """Type of light in EXR files."""
 
@@ -60,7 +60,7 @@ class Development(Value):
     def pixels(
         self, target: Target, tile: Tile, layers: Mapping[str, NDArray[Any]], space: RenderSpace
     ) -> NDArray[Any]:
-        """(rows, columns, channels) of one file's tile, as its writer takes them.
+        """(rows, columns, channels) of one file's tile, for its writer.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class Development(Value):
         """
         composed = {layer.name: self.composed(layer, layers) for layer in target.layers}
 
-        # one layer in 8 bits: light by its exposure, data as a preview shows it
+        # One layer in 8 bits: light with its exposure, data as a preview.
         if target.is_png:
             layer = target.layers[0]
             values = composed[layer.name]
@@ -78,7 +78,7 @@ class Development(Value):
             shown = viewable(layer, values, preview_scale(target, space), space.centre)
             return plain(shown, str(target.path), tile.y, tile.x)
 
-        # all layers as they are, each channel once
+        # The values of all layers, each channel once.
         channels: dict[str, NDArray[np.float32]] = {}
         for layer in _beauty_first(target.layers):
             values = composed[layer.name]
@@ -88,7 +88,7 @@ class Development(Value):
         return np.stack(list(channels.values()), axis=-1)
 
     def composed(self, layer: Layer, layers: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-        """The layer's pixels; the beauty over its background, or with its alpha where there is none."""
+        """The layer's pixels; the beauty over its background, or with its alpha if there is none."""
         values = layers[layer.name]
         if layer.buffer != "beauty":
             return values
@@ -111,8 +111,8 @@ def _beauty_first(layers: Sequence[Layer]) -> list[Layer]:
 
 
 def preview_scale(target: Target, space: RenderSpace) -> float:
-    """What previews count distances in [scene units]: the scene's radius for positions, the distance from the
-    camera to its target for depths."""
+    """The unit of distances in previews [scene units]: the scene's radius for positions, the distance from
+    the camera to its target for depths."""
     if target.layers[0].preview == "position":
         return float(space.radius)
     camera = target.view.camera
@@ -120,7 +120,7 @@ def preview_scale(target: Target, space: RenderSpace) -> float:
 
 
 def how_to_read(target: Target, space: RenderSpace) -> dict[str, Any]:
-    """What a file says about the meaning of its values."""
+    """Metadata about the meaning of a file's values."""
     if not target.is_png:
         return {"illum:depth": "distance from the eye's plane in scene units, 0 where nothing is seen"}
     if target.layers[0].kind != "light":
@@ -144,5 +144,5 @@ class ErrorSums:
         self.square += float(np.square(values).sum())
 
     def as_data(self) -> dict[str, float]:
-        """What the report says."""
+        """The entries of a report."""
         return {"mean": self.total / self.pixels, "rms": math.sqrt(self.square / self.pixels)}

@@ -24,13 +24,13 @@ def picture(
 ) -> NDArray[np.unsignedinteger[Any]]:
     """(h, W, C) uint8, or uint16 for 16 bits: `band` as a PNG stores it.
 
-    Light is exposed, clipped to 0..1, taken through the sRGB curve and rounded to the nearest step. Alpha is
-    rounded alone, and colour divided by it: a PNG keeps colour and coverage apart.
+    Light is exposed, clipped to 0..1, encoded by the sRGB curve and rounded to the nearest step. Alpha is
+    rounded without the curve, and colour is divided by it: a PNG is not premultiplied.
 
     Parameters
     ----------
     band : (h, W, C) float32
-        Linear; C is 1 (Y), 2 (Y A), 3 (R G B) or 4 (R G B A), premultiplied where there is an alpha.
+        Linear; C is 1 (Y), 2 (Y A), 3 (R G B) or 4 (R G B A), premultiplied if there is an alpha.
     exposure : float
         Light is multiplied by 2**exposure [stops].
     place, y0, x0
@@ -57,7 +57,7 @@ def picture(
 
 
 def plain(band: NDArray[np.float32], place: str = "picture", y0: int = 0, x0: int = 0) -> NDArray[np.uint8]:
-    """(h, W, C) uint8: numbers 0..1 as a PNG stores them that is no picture of light, round(255 v).
+    """(h, W, C) uint8: numbers 0..1 in a PNG that is not a picture of light, round(255 v).
 
     Raises
     ------
@@ -75,8 +75,8 @@ def exposed(linear: NDArray[np.float32], stops: float) -> NDArray[np.float32]:
 
 
 def unpremultiplied(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.float32]:
-    """`color` / `alpha`, the colour a covered part shows; as it is where nothing is covered."""
-    if not ((alpha > 0) & (alpha < 1)).any():  # a division takes longer than all else here
+    """`color` / `alpha`, the colour of the covered part; `color` itself where nothing is covered."""
+    if not ((alpha > 0) & (alpha < 1)).any():  # the division takes longer than everything else here
         return color
     with np.errstate(over="ignore"):
         return np.divide(color, alpha, out=color.copy(), where=alpha > 0)
@@ -85,9 +85,9 @@ def unpremultiplied(color: NDArray[np.float32], alpha: NDArray[np.float32]) -> N
 def srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """round(255 sRGB(linear)), exactly, clipped to 0..255; the same on every machine.
 
-    The upper half of a float32 holds its sign, exponent and 7 bits of its fraction: a table of 65536 entries
-    gives the step at the lower end of that interval. No interval holds more than one border between steps,
-    so one comparison with the next border decides.
+    The upper half of a float32 holds its sign, exponent and 7 bits of its fraction. For each of these 65536
+    intervals a table has the step at its lower end. No interval contains more than one border between steps,
+    so one comparison with the next border is enough.
     """
     steps, borders = _tables()
     linear = np.ascontiguousarray(linear, np.float32)
@@ -108,4 +108,4 @@ def _tables() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     borders = np.where(near < exact, np.nextafter(near, np.float32(np.inf)), near)
     ends = (np.arange(65536, dtype=np.uint32) << 16).view(np.float32)
     steps = np.searchsorted(borders, np.fmax(ends, 0), side="right").astype(np.uint8)
-    return steps, np.append(borders, np.float32(np.nan)).take(steps)  # after 255 comes nothing
+    return steps, np.append(borders, np.float32(np.nan)).take(steps)  # there is no step after 255

@@ -1,4 +1,4 @@
-"""Every value of an image is finite, or the first that is not is named."""
+"""Refuses images with values that are NaN or infinite."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from illumcli.errors import IllumError
 def refuse_nonfinite(
     band: NDArray[Any], channels: Sequence[str], place: str, y0: int = 0, x0: int = 0
 ) -> None:
-    """Nothing, where all of `band` is finite.
+    """Check that all values of `band` are finite.
 
     Parameters
     ----------
     band : (h, W, C) float
-        Of an image, `y0` and `x0` the numbers of its first row and column.
+        A part of an image; `y0` and `x0` are the numbers of its first row and column.
     channels : C names
     place : str
-        What the error begins with, such as a file name.
+        Beginning of the error, such as a file name.
 
     Raises
     ------
     IllumError
-        Every channel that holds NaN or Inf, how many pixels, and the first of them.
+        Lists each channel with NaN or infinite values, the number of these pixels, and the first of them.
     """
     if np.isfinite(band).all():
         return

@@ -1,4 +1,4 @@
-"""A picture of how large values are: false colours whose lightness grows with the value."""
+"""Heat images: false colours whose lightness grows with the value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far apart two images are: sums over all pixels and channels, in float64."""
+"""Differences between two images: sums over all pixels and channels, in float64."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from illumcli.records import Value
 
 RELATIVE_FLOOR = 0.01
-"""Added to the reference's square in `relative_mse`, so that black pixels count, and finitely."""
+"""Added to the reference's square in `relative_mse`, so that it is finite at black pixels."""
 
 _BAND = 1 << 20  # values in float64 at once
 
 
 class Difference(Value):
-    """What `difference` found. d = other - reference, r = reference, mean over values finite in both.
+    """The result of `difference`: d = other - reference, r = reference, means over values finite in both.
 
-    Values that are equal differ by 0, infinite ones too. A value that is NaN in either image, or infinite in
-    one, is counted in `not_finite` and in nothing else; where no value is left, the means are NaN.
+    Equal values differ by 0, infinite ones too. A value that is NaN in either image, or infinite in one,
+    counts only in `not_finite`; if no other value is left, the means are NaN.
     """
 
     count: int
-    """Values compared."""
+    """Number of values compared."""
     not_finite: int
     mae: float
     """mean |d|"""
@@ -37,7 +37,7 @@ class Difference(Value):
     place: tuple[int, int, int]
     """Row, column and channel of the largest, the first of equals."""
     peak: float
-    """What `psnr` is relative to."""
+    """The value that `psnr` is relative to."""
 
     @property
     def rmse(self) -> float:
@@ -59,14 +59,15 @@ def difference(reference: NDArray[Any], other: NDArray[Any], peak: float | None 
     ----------
     reference, other : (H, W) or (H, W, C)
     peak : float, optional
-        Of the signal, for `psnr`: 1 for display values. None: the largest finite |r|.
+        Peak of the signal, for `psnr`: 1 for display values. None: the largest finite |r|.
     """
     if reference.shape != other.shape:
         raise ValueError(f"images of different shape: {reference.shape} and {other.shape}")
     shape = (*reference.shape, 1)[:3]
     reference, other = reference.reshape(shape), other.reshape(shape)
     height, width, channels = shape
-    # Bands of rows, so that float64 copies of the whole images are never in memory.
+
+    # By bands of rows: float64 copies of the images might not fit into memory.
     rows = max(1, _BAND // max(1, width * channels))
     count = not_finite = 0
     absolute = square = relative = top = 0.0

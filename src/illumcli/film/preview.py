@@ -1,6 +1,6 @@
-"""Layers of data and shares as pictures: numbers 0..1 for an 8-bit file, and how to read them back.
+"""Layers of data and shares as pictures: numbers 0..1 for an 8-bit file, and the text that describes them.
 
-Every kind of `layers.Preview` is a function to numbers 0..1 and a text that says how to undo it.
+Each kind of `layers.Preview` has a function to numbers 0..1 and a text with its inverse.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from illumcli.layers import Layer, Preview
 Centre: TypeAlias = tuple[float, ...]
 
 DARKEST = 1 / 255
-"""Of what is seen at any depth; 0 stands for nothing."""
+"""Least number for a surface at any depth; 0 means that there is no surface."""
 GOLDEN_RATIO = 0.61803398875
 """Turns of hue from one id to the next: neighbours differ, and no two are equal."""
 
@@ -28,9 +28,9 @@ def viewable(layer: Layer, values: NDArray[Any], scale: float, centre: Centre) -
     Parameters
     ----------
     scale : float
-        [scene units], at the rim of positions, at half brightness of depth.
+        [scene units]: half the range of positions; the depth that has half brightness.
     centre : 3 floats
-        Of the scene, in the middle of the range of positions.
+        Centre of the scene, in the middle of the range of positions.
     """
     show, _ = PREVIEWS[layer.preview]
     if layer.white != 1:
@@ -39,7 +39,7 @@ def viewable(layer: Layer, values: NDArray[Any], scale: float, centre: Centre) -
 
 
 def reading(layer: Layer, scale: float, centre: Centre) -> dict[str, Any]:
-    """How to get a layer's values back from the numbers v = byte / 255 of its picture, as metadata."""
+    """Metadata that describes how a layer's values follow from the numbers v = byte / 255 of its picture."""
     _, text = PREVIEWS[layer.preview]
     if layer.white != 1:
         text = text.replace("= v", f"= {layer.white:g} v")
@@ -68,7 +68,7 @@ def _position(values: NDArray[Any], scale: float, centre: Centre) -> NDArray[Any
 
 
 def _depth(values: NDArray[Any], scale: float, centre: Centre) -> NDArray[Any]:
-    """Near is bright, and nothing that is seen is black."""
+    """Near surfaces are bright; no surface is black."""
     return np.where(values > 0, np.maximum(1 / (1 + values / F(scale)), DARKEST), 0)
 
 
@@ -94,4 +94,4 @@ PREVIEWS: dict[Preview, tuple[Show, str]] = {
     "fraction": (_fraction, "the fractions of u and v in red and green"),
     "number": (_number, "a colour of its own for every number; an EXR holds the numbers"),
 }
-"""How values are shown, and how the numbers are read back."""
+"""Kind of preview -> the function to numbers 0..1, and the text that describes them."""

@@ -45,13 +45,13 @@ class Tile(Value):
         return np.tile(x, self.height), np.repeat(y, self.width)
 
     def grown(self, border: int, width: int, height: int) -> Tile:
-        """The rectangle and a border of so many pixels, within a film of this size."""
+        """The rectangle with a border of so many pixels, clipped to a film of this size."""
         x, y = max(self.x - border, 0), max(self.y - border, 0)
         right, lower = min(self.x + self.width + border, width), min(self.y + self.height + border, height)
         return Tile(x, y, right - x, lower - y)
 
     def within(self, other: Tile) -> tuple[slice, slice]:
-        """Its rows and columns among those of a rectangle that holds it."""
+        """The rows and columns of this rectangle within one that contains it."""
         x, y = self.x - other.x, self.y - other.y
         return slice(y, y + self.height), slice(x, x + self.width)
 
@@ -59,7 +59,8 @@ class Tile(Value):
 def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
     """The tiles of an image, row by row: squares, except at the end of the last row.
 
-    There each tile is half of what remains, down to `MIN_TILE_SAMPLES`, so that all threads end together.
+    There each tile is half of the remaining width, down to `MIN_TILE_SAMPLES`, so that all threads finish at
+    about the same time.
     """
     out = []
     for y in range(0, height, side):

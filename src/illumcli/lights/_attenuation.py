@@ -1,4 +1,4 @@
-"""Distance laws: what is left of a light's intensity at a distance, a small union on ``law:``."""
+"""Attenuation of a light with the distance: one class for each ``law:``."""
 
 from __future__ import annotations
 

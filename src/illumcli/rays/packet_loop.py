@@ -200,6 +200,7 @@ class PacketLoop:
             self._loop.illum_closest(rays, hits)
 
     def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
+        # The rays of the points as the C loop takes them; `arrays` must outlive the calls.
         points, samples = rays.shape
         patterns = rays.patterns
         compact = patterns.compact or CompactTable(patterns.table, np.arange(samples, dtype=np.int32))
@@ -222,8 +223,12 @@ class PacketLoop:
         )
         if rays.normals is not None:
             structure.normals = _vectors(rays.normals)
+
+        # The arrays to fill.
         wanted = {name: _address_of(array) for name, array in vars(out).items() if array is not None}
         results = _PatternResults(**wanted, stride=points * samples)
+
+        # Trace a few points per call.
         per_call = max(1, RAYS_PER_CALL // max(samples, 1))
         for first in range(0, points, per_call):
             structure.first, structure.end = first, min(first + per_call, points)

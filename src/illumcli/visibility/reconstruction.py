@@ -237,6 +237,7 @@ def cell_polynomials(cells: Planes) -> Planes:
     what noise alone would give it, plus the variance of F_k: an unbiased estimate but for the bias of F_1.
     The variance of a pixel is that of the residuals in the smallest window.
     """
+    # Fit the smallest windows, and estimate the variance of pixels from their residuals.
     held = cells[COUNT]
     smallest = fit(cells, RADII[0])
     freedom = np.maximum(smallest.count - (1 + FEATURES), 0.05 * smallest.count)
@@ -246,9 +247,12 @@ def cell_polynomials(cells: Planes) -> Planes:
     variance = COHERENCE * squares / np.maximum(freedoms, 1e-30)
     weight = np.maximum(weight, 1e-30)
 
+    # The risk of the smallest windows is their variance.
     best = smallest.coefficients
     mean_leverage = window_sums((held * smallest.leverage)[None], SMOOTHING)[0] / weight
     least = variance * mean_leverage
+
+    # Take a wider fit where it has less risk.
     for radius in RADII[1:]:
         wider = fit(cells, radius)
         leverage, departure = (

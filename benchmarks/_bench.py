@@ -1,4 +1,4 @@
-"""What the scripts share: scenes, clocks, interleaved repeats, rows with medians and spread."""
+"""Functions that the scripts share: scenes, clocks, interleaved repeats, rows with medians and spread."""
 
 from __future__ import annotations
 

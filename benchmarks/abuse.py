@@ -1,4 +1,4 @@
-"""Does anything that happens to the cache change a byte of a picture?
+"""Does damage to the cache change a byte of a picture?
 
 `python benchmarks/abuse.py [FLIPS] [TRUNCATIONS] [PROCESSES] [RUNS]`: random entries are damaged one at a
 time and the scene rendered again; then processes render it on one cache at once. Prints how many pictures

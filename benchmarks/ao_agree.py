@@ -1,7 +1,7 @@
 """Does a picture with baked values agree with one without?
 
 Question   At vertices: do both differ by no more than their stated errors? Elsewhere: how far are values that
-           are interpolated from the corners of polygons from those that are asked on the spot?
+           are interpolated from the corners of polygons from estimates at the point itself?
 Reference  The renderer's own w without baked values, RAYS rays at each point. At a corner the mean over
            AROUND points just inside the triangles around it, drawn evenly by angle among all corners of the
            vertex that share its shading normal; its error is from their spread. Elsewhere points are drawn
@@ -40,7 +40,7 @@ MADE = ("geometry", "tracer", "corner_normals")
 
 
 class Pictures:
-    """A mesh's surface, asked at points as a picture asks its samples."""
+    """Obscurance at points of a mesh's surface, computed as for the samples of a picture."""
 
     def __init__(self, loaded: SceneFile) -> None:
         graph = build(loaded.scene, loaded)

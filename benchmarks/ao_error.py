@@ -1,4 +1,4 @@
-"""How far off is a baked value, and does it know? Error against rays on real meshes, coverage, target error.
+"""How large is the error of a baked value, and is the stated error true? Errors, coverage, target error.
 
 Question   How does the error of baked obscurance fall with the rays, how much less is it than that of
            independent rays, how often does a vertex's own interval hold the truth, and does

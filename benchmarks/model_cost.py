@@ -1,7 +1,7 @@
-"""What does a model cost per lane, beside one shadow ray?
+"""What does a model cost per shading point, relative to one shadow ray?
 
 Reference: one Embree occlusion ray on an icosphere of 81,920 triangles, single precision, same run.
-Seed 0, best of 7 repeats, 8192 lanes, default parameters unless a choice is named. Prints ns per lane.
+Seed 0, best of 7 repeats, 8192 points, default parameters unless a choice is named. Prints ns per point.
 
     PYTHONPATH=src python benchmarks/model_cost.py [MODEL ...]
 """

@@ -1,4 +1,4 @@
-"""What does each skip save? Rays and evaluations of a scene made for it, with the skip and without.
+"""What does each skip save? Rays and evaluations in a scene that suits it, with the skip and without.
 
 A skip is turned off by putting a function in the place of the one that decides. Both pictures must agree in
 every value. `python benchmarks/skips.py [WIDTH]`; figures are counts and do not depend on the machine.

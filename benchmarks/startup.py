@@ -1,8 +1,8 @@
-"""How long does `illum` take to start, beside what it cannot start without?
+"""How long does `illum` take to start, relative to the imports that it needs?
 
 References: `python -c "import click"` for `--help`. For a tiny render, 64x64 with its meshes kept: to import
 the six libraries that it needs. A bare import of pydantic leaves BaseModel out, and the first model that is
-defined imports the rest, so there are three of these. Whole processes, compiled modules at hand, interleaved.
+defined imports the rest, so there are three of these. Whole processes, with compiled modules, interleaved.
 
     PYTHONPATH=src python benchmarks/startup.py [--small]
 """

@@ -1,4 +1,4 @@
-"""What does a variant cost when only a material changes, and is it the picture a cold render makes?
+"""What does a variant cost if only a material changes, and does its picture equal that of a cold render?
 
 `python benchmarks/sweep.py [MESH.obj] [--variants N] [--width W] [--runs N] [--cold N]`: ratios within one
 run; cold renders and shell runs alternate with what they are compared to. The cache is this run's own.

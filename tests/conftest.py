@@ -1,4 +1,4 @@
-"""What tests share: the folder of real meshes, where it is there."""
+"""Fixtures that tests share, with the folder of real meshes if it exists."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def root() -> Path:
 
 @pytest.fixture
 def real_mesh():
-    """Path of a real mesh by file name; the test is skipped where the meshes are not at hand."""
+    """Path of a real mesh by file name; the test is skipped if the meshes do not exist."""
 
     def find(name: str) -> Path:
         path = MESHES / name

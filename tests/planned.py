@@ -1,4 +1,4 @@
-"""Plans of a scene's view, as tests ask for them."""
+"""Plans of a scene's view, for tests."""
 
 from __future__ import annotations
 

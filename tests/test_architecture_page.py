@@ -1,4 +1,4 @@
-"""The page about the architecture names files that exist, and its picture is what the imports say."""
+"""The page about the architecture names files that exist, and its picture agrees with the imports."""
 
 from __future__ import annotations
 

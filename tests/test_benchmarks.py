@@ -1,4 +1,4 @@
-"""Benchmarks run, on something tiny, and print their question and rows; their figures mean nothing here."""
+"""Benchmarks run on tiny inputs and print their question and rows; the figures themselves are not tested."""
 
 from __future__ import annotations
 

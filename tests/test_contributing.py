@@ -1,4 +1,4 @@
-"""CONTRIBUTING's examples are complete: put where they say, they are rendered, and pass the shared tests."""
+"""CONTRIBUTING's examples are complete: in their places they render and pass the shared tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The planner's order, on generated graphs."""
+"""The topological order of generated graphs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from illumcli.graph import Node, required, topological_order
 
 @st.composite
 def books(draw):
-    """Recipes b0..bn, each needing only earlier ones, told in any order."""
+    """Nodes b0..bn in any order, each of which needs only earlier ones."""
     count = draw(st.integers(1, 25))
     needs = [draw(st.sets(st.integers(0, i - 1), max_size=4)) if i else set() for i in range(count)]
     recipes = [Node(f"b{i}", int, {f"b{j}": f"b{j}" for j in need}) for i, need in enumerate(needs)]

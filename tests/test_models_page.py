@@ -1,4 +1,4 @@
-"""The page of models is what the code says, and its picture is at hand."""
+"""The page of models agrees with the code, and its picture exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wheels with and without a C compiler: each says in its tag what it is."""
+"""Wheels with and without a C compiler: each has the right tag."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bakes that are killed, meet each other, strangers' files or a full disk: right values, or none."""
+"""Bakes that are killed, run twice at once, or meet foreign files or a full disk: right values or none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A cache folder that fills up while pictures are rendered: the same bytes, one warning, no half entry."""
+"""A cache folder that fills up during renders: the same bytes, one warning, no incomplete entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outputs that were damaged or changed since they were written are never kept for the same."""
+"""Outputs that were damaged or changed after they were written are never kept as equal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A disk full at any byte, system calls that fail one after the other: an error, and no half file."""
+"""A disk full at any byte, system calls that fail one after the other: an error and no incomplete file."""
 
 from __future__ import annotations
 

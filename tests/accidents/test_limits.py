@@ -1,4 +1,4 @@
-"""What is too large is refused before anything is allocated; paths lead to regular files inside."""
+"""Inputs that are too large are refused before anything is allocated; paths lead to regular files inside."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_what_the_machine_does_not_say_is_no_limit(monkeypatch):
 
 
 def bombs(folder):
-    """Small files that stand for more memory than machines have; the words of the commands that read them."""
+    """Small files that need more memory than machines have, and the arguments of commands that read them."""
     import zlib
 
     from illumcli.memory import free_memory

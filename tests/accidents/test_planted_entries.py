@@ -1,4 +1,4 @@
-"""A cache folder that strangers wrote to: nothing of theirs is believed, followed or fatal."""
+"""A cache folder that other users have written to: their entries and links are not used, and not fatal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a mesh and can be lived with: counted, said with its first place, refused when asked."""
+"""Faults of meshes that rendering tolerates: counted, reported with their first place, refused on request."""
 
 from __future__ import annotations
 

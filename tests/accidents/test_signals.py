@@ -1,4 +1,4 @@
-"""Kill -9, SIGINT and SIGTERM at random moments: no half file, and the next run gives the same bytes."""
+"""Kill -9, SIGINT and SIGTERM at random moments: no incomplete file, the next run gives the same bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Locales, time zones, odd names, little memory, a thousand runs: the same bytes, and no debris."""
+"""Locales, time zones, odd names, little memory, a thousand runs: the same bytes, no files left behind."""
 
 from __future__ import annotations
 

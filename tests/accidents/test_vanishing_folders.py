@@ -1,4 +1,4 @@
-"""An output folder that vanishes while its files are made is exit 5, and nothing else."""
+"""An output folder that vanishes while its files are written: exit code 5, and no other failure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`illum converge`: errors that are errors, references that are independent and know their own."""
+"""`illum converge`: true errors, against independent references that estimate their own error."""
 
 from __future__ import annotations
 

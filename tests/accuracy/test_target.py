@@ -1,4 +1,4 @@
-"""`--target-error`: the picture errs as much as asked for, and the error said is the error made."""
+"""`--target-error`: the picture has the target error, and the stated error is the true one."""
 
 from __future__ import annotations
 

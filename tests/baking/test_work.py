@@ -1,4 +1,4 @@
-"""Units of work of a bake: what tells them apart, who computes them, and how they end."""
+"""Units of work of a bake: their keys, the threads that compute them, and how they end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files known by what is in them: equal contents are equal, whatever their names and dates."""
+"""Fingerprints of files: equal for equal contents, whatever their names and dates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The store: what is read is what was kept, or nothing; no accident is fatal and no folder is needed."""
+"""The store returns what was written, or nothing; no accident is fatal, and no folder is required."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standard streams that are closed, full or read by nobody: the work is done, the exit code is its own."""
+"""Standard streams that are closed, full or without a reader: the work is done, with its own exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`illum check` says every problem of every file, and nothing else."""
+"""`illum check` prints every problem of every file, and nothing else."""
 
 from __future__ import annotations
 

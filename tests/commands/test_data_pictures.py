@@ -1,4 +1,4 @@
-"""PNGs of layers that are no light: plain numbers, no curve named, the values to be got back from them."""
+"""PNGs of layers other than light: plain numbers, no transfer curve, values that can be recovered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene takes before anything is rendered grows in proportion to its parts, not with their square."""
+"""Work before rendering grows in proportion to the parts of a scene, not with their square."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The unit of work: a description that can be sent to another process, and one function that does it."""
+"""The unit of work: a description that can be sent to another process, and the function that does it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every file that a command writes: kept where it is the same, never replaced unasked, faults told first."""
+"""Files that commands write: kept if equal, never replaced without `--force`, faults reported first."""
 
 from __future__ import annotations
 

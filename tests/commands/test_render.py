@@ -1,4 +1,4 @@
-"""`illum render` as a user meets it: files, names, what is kept, what is refused, exit codes, no debris."""
+"""`illum render` for its users: files, names, kept and refused outputs, exit codes, nothing left behind."""
 
 from __future__ import annotations
 

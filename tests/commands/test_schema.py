@@ -1,4 +1,4 @@
-"""The scene's JSON schema: it accepts what is a scene, refuses what is none, and explains every key."""
+"""The scene's JSON schema: it accepts scenes, refuses anything else, and explains every key."""
 
 from __future__ import annotations
 

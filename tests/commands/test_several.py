@@ -1,4 +1,4 @@
-"""Several scenes, inputs, variants: one that fails is told, the others are done."""
+"""Several scenes, inputs, variants: if one fails, its error is reported and the others are done."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`illum sweep` as a user meets it: which variants, their names, the bytes of single renders, going on."""
+"""`illum sweep` for its users: variants, their names, the bytes of single renders, resumption."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are there already: the same, another, incomplete; and what stands against writing new ones."""
+"""Files that exist already: equal, different, incomplete; and obstacles to writing new ones."""
 
 from __future__ import annotations
 

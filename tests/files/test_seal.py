@@ -1,4 +1,4 @@
-"""A file's hash in the file tells every change of a bit, and every cut."""
+"""The hash in a file reveals every changed bit and every truncation."""
 
 from __future__ import annotations
 

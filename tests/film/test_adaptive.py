@@ -1,4 +1,4 @@
-"""Which pixels one sample is not enough for, on planes made by hand."""
+"""Pixels that need more than one sample, on small planes of values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NONE = np.zeros(SHAPE[0] * SHAPE[1], bool)
 
 
 def wanted(plane, difference=0.02, reach=1, spread=1.0, seen=None):
-    """(5, 12) pixels of a layer of these values that are refined, where nothing else asks for it."""
+    """(5, 12) pixels of a layer with these values that are refined because of the values alone."""
     view = View("main", None, SHAPE[1], SHAPE[0], 1, Adaptive(2, reach, spread), 16)
     sample = np.arange(plane.size, dtype=np.int32) if seen is None else np.flatnonzero(seen).astype(np.int32)
     hits = Hits(sample, sample, sample.astype(np.float32), sample.astype(np.float32))

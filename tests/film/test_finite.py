@@ -1,4 +1,4 @@
-"""What is not finite is refused with its channels, counts and places."""
+"""Values that are not finite are refused, with their channels, counts and places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Layers shown in 8 bits: each is read back as its metadata say, and nothing seen is taken for nothing."""
+"""Layers in 8 bits: values are recovered as the metadata say, and no surface looks like the background."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PNG files as the standard has them: chunks, filter, text; the same bytes whatever the bands."""
+"""PNG files as the standard has them: chunks, filter, text; the same bytes for any bands."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 
 def counted(mesh: Mesh) -> dict[str, int]:
-    """What the mesh's repairs count, without what is harmless."""
+    """The counts of the mesh's repairs, without harmless ones."""
     return {what: each.count for what, each in mesh.repairs.items() if what not in HARMLESS}
 
 

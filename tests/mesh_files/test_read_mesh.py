@@ -17,7 +17,7 @@ SUFFIXES = [".obj", ".ply", ".stl", ".gltf", ".glb"]
 
 
 def counted(mesh: Mesh) -> dict[str, int]:
-    """What the mesh's repairs count, without what is harmless."""
+    """The counts of the mesh's repairs, without harmless ones."""
     return {what: each.count for what, each in mesh.repairs.items() if what not in HARMLESS}
 
 

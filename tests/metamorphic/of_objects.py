@@ -1,4 +1,4 @@
-"""Relations of objects: none knows of another that it neither sees nor is hidden by."""
+"""Relations of objects: none is affected by another that cannot occlude it."""
 
 from __future__ import annotations
 

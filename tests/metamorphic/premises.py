@@ -1,4 +1,4 @@
-"""What relations narrow a scene to, so that both ways must agree."""
+"""Restrictions of a scene under which both ways of a relation must agree."""
 
 from __future__ import annotations
 

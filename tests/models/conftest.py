@@ -1,4 +1,4 @@
-"""Published values, and what evaluating a model on them takes."""
+"""Published values, and functions that evaluate models on them."""
 
 from __future__ import annotations
 

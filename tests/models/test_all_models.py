@@ -110,7 +110,7 @@ def _number(name, field, gentle):
 
 
 def directions(seed, count, dtype=np.float64, least=0.0):
-    """Vectors of `count` lanes with n.l > 0: general ones, grazing, mirrored, retro-reflected, below.
+    """`count` vectors with n.l > 0: general ones, grazing, mirrored, retro-reflected, below.
 
     With `least` > 0, light and eye are at least that cosine above the surface.
     """
@@ -215,7 +215,7 @@ def test_parameters_say_whether_there_is_a_grain(keys, grain):
     ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
 )
 def test_an_exponent_of_zero_gives_one_at_any_angle(keys, expected, dtype):
-    """0^0 = 1: max(0, cos)^0 is 1 behind the horizon of the lobe too, for all lanes or for single ones."""
+    """0^0 = 1: max(0, cos)^0 is 1 behind the horizon of the lobe too, for all elements or for single ones."""
     given = directions(5, 600, dtype)
     flat = member("illumcli.models", keys["model"]).model_validate(
         {"specular": [1.0, 1.0, 1.0], **keys, "exponent": 0.0}
@@ -291,7 +291,7 @@ def numbers(model, other):
 
 
 def varied(part, count, prefix=""):
-    """Path -> the parameter once per lane, of every parameter that may vary over the surface."""
+    """Path -> one value per element, for every parameter that may vary over the surface."""
     found = {}
     for name, value in part:
         if isinstance(value, float | tuple) and may_vary(type(part), name):

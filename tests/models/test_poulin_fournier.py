@@ -22,7 +22,7 @@ def test_published_values(cases, brdf, agree):
 
 
 def test_quadrature_of_a_constant_highlight_is_the_closed_form(cases, respond):
-    """<n.h>^0 is 1, so ks / pi stands for kd / pi."""
+    """<n.h>^0 is 1, so ks / pi takes the place of kd / pi."""
     for case in cases("aniso_cylinder"):
         closed = model_of(case["inputs"], diffuse=(1, 1, 1), specular=(0, 0, 0))
         summed = model_of(case["inputs"], diffuse=(0, 0, 0), specular=(1, 1, 1), exponent=0.0)

@@ -1,4 +1,4 @@
-"""Bodies that rays are tried on."""
+"""Bodies for tests of rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Weights of polygon corners: what generalised barycentric coordinates promise, whatever the cut."""
+"""Weights of polygon corners: properties of generalised barycentric coordinates, for any triangulation."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def positions(geometry, triangle, u, v):
 
 
 def dense(weights, geometry):
-    """(M, C) weights of all the World's corners."""
+    """(M, C) weights of all the scene's corners."""
     corners = CornerVectors(
         np.eye(geometry.corners.max() + 1, dtype=F), np.arange(geometry.corners.max() + 1)
     )
@@ -289,9 +289,9 @@ def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
     values = np.random.default_rng(1).random((len(geometry.vertices), 3)).astype(F)
     all_of_them = whole.interpolate_vertices(geometry, values)
     half = [np.flatnonzero(hits[0] % 2 == rest) for rest in (0, 1)]
-    parts = [whole.take(lanes) for lanes in half]
-    for lanes, part in zip(half, parts, strict=True):
-        np.testing.assert_array_equal(part.interpolate_vertices(geometry, values), all_of_them[lanes])
+    parts = [whole.take(hits) for hits in half]
+    for hits, part in zip(half, parts, strict=True):
+        np.testing.assert_array_equal(part.interpolate_vertices(geometry, values), all_of_them[hits])
     joined = concatenated(parts).interpolate_vertices(geometry, values)
     np.testing.assert_array_equal(joined, all_of_them[np.concatenate(half)])
     nothing = whole.take(half[0][:0])

@@ -1,4 +1,4 @@
-"""Two questions with hand-made answers, and everything embreex would let through."""
+"""Closest hits and occlusion queries with known results, and wrong arguments that embreex would accept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tangent frames: where u grows, rings about an axis, and what is done where neither is known."""
+"""Tangent frames: along u, along rings about an axis, and the default if neither is known."""
 
 from __future__ import annotations
 

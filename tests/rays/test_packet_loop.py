@@ -1,4 +1,4 @@
-"""Packets answer with the bits of embreex's own loop, whatever the width, the rays and their company."""
+"""Packets give the bits of embreex's own loop, for any width, rays and neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Patterns of rays: turned and mirrored in C as in numpy, bit for bit, and answered like any other rays."""
+"""Patterns of rays: rotated and mirrored in C as in numpy, bit for bit, and traced like any other rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Point sets: nets stay nets, numbers depend on what they are for and on nothing else."""
+"""Point sets: nets remain nets, and numbers depend on their purpose alone."""
 
 from __future__ import annotations
 

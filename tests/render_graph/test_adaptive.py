@@ -104,7 +104,7 @@ def test_data_alone_takes_one_ray_a_pixel(scene):
 
 
 def test_all_rays_of_obscurance_are_cast(scene):
-    """Whether a pixel has one sample or all: of each sample that sees something, as many as it stands for."""
+    """Whether a pixel has one sample or all: rays for as many samples as each hit represents."""
     _, stats = rendered(scene, ["ambient"], side=64)
     _, many = rendered(scene, ["ambient"], overrides=["film.adaptive=false"])
     assert stats.refined > 0

@@ -1,4 +1,4 @@
-"""Pixels asked for one by one are those of the picture."""
+"""Single pixels have the values that they have in the picture."""
 
 from __future__ import annotations
 

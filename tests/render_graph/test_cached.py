@@ -1,4 +1,4 @@
-"""Artifacts: the same bits with and without them, and nothing made that is at hand."""
+"""Cached buffers: the same bits with and without them, and no cached buffer is computed again."""
 
 from __future__ import annotations
 
@@ -340,7 +340,7 @@ def test_a_look_reads_nothing_and_finds_what_is_there(scene, store):
 
 
 def test_buffers_of_another_rate_are_not_kept(scene, store):
-    """Their lanes are vertices or polygons, not samples."""
+    """Their elements are vertices or polygons, not samples."""
     picture(scene, "shading=gouraud", store=store, only=["beauty"])
     _, made, _, reused = picture(scene, "shading=gouraud", store=store, only=["beauty"])
     assert "hits" in reused

@@ -1,4 +1,4 @@
-"""Objects that no view can tell are left out, and no value of any picture changes."""
+"""Objects that cannot affect any view are culled, and no value of any picture changes."""
 
 from __future__ import annotations
 

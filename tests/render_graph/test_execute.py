@@ -1,4 +1,4 @@
-"""Pictures: the same for any threads, tiles and layers; the texts' worked numbers; no debris of lanes."""
+"""Pictures: the same for any threads, tiles and layers; the texts' worked examples; no mixed-up samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras whose picture an object is to fill."""
+"""Cameras that are placed so that an object fills the picture."""
 
 from __future__ import annotations
 

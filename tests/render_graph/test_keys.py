@@ -1,4 +1,4 @@
-"""Keys of buffers: known by names, not by places, and every source that decides about them is hashed."""
+"""Keys of buffers: they have names instead of modules, and every source that affects buffers is hashed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way from a scene to a plan: each part of it a function from value to value."""
+"""The steps from a scene to a plan, each a function from value to value."""
 
 from __future__ import annotations
 

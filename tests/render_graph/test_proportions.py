@@ -1,4 +1,4 @@
-"""Scenes so large beside an object that rays start visibly far off say so, once."""
+"""A warning, once, if a scene is so large beside an object that ray offsets are visible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene holds without being said, and that its schema describes what is accepted."""
+"""Defaults of a scene, and agreement between its schema and what is accepted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene says without effect is told with its place, and it truly has none."""
+"""Values without effect are reported with their places, and truly have none."""
 
 from __future__ import annotations
 

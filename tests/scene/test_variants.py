@@ -1,4 +1,4 @@
-"""Which variants `-D`, `--rows` and `--frames` describe."""
+"""The variants that `-D`, `--rows` and `--frames` describe."""
 
 from __future__ import annotations
 

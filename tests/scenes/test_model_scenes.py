@@ -29,10 +29,10 @@ def test_the_full_moon_is_a_ball_or_a_disc(picture):
     layers = picture("moon", overrides=["film.width=500", "film.height=100"])
     fall = []
     for moon in range(1, 6):
-        lane = layers["object_id"][..., 0] == moon
-        light = layers["beauty"][..., 0][lane]
-        y, x = np.nonzero(lane)
-        away = np.hypot(x - x.mean(), y - y.mean()) / np.sqrt(lane.sum() / np.pi)
+        on_moon = layers["object_id"][..., 0] == moon
+        light = layers["beauty"][..., 0][on_moon]
+        y, x = np.nonzero(on_moon)
+        away = np.hypot(x - x.mean(), y - y.mean()) / np.sqrt(on_moon.sum() / np.pi)
         fall.append(light[(away > 0.93) & (away < 0.97)].mean() / light[away < 0.3].mean())
     lambert, rough, rugged, limb, dust = fall
     assert lambert == pytest.approx(np.sqrt(1 - 0.95**2), abs=0.03)

@@ -1,4 +1,4 @@
-"""What annotations say: the part of a description that an error's location leads to, choices, ranges."""
+"""Annotations: the part of a description at an error's location, choices, ranges."""
 
 from __future__ import annotations
 

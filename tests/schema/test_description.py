@@ -1,4 +1,4 @@
-"""Descriptions: what they take, what they refuse, and what can be done with them."""
+"""Descriptions: accepted and refused values, and their methods."""
 
 from __future__ import annotations
 

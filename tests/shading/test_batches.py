@@ -1,4 +1,4 @@
-"""Which materials are evaluated together."""
+"""Materials that are evaluated together."""
 
 from __future__ import annotations
 

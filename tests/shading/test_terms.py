@@ -1,4 +1,4 @@
-"""The words of models: which are formed, and that they keep their digits where plain forms lose them."""
+"""Terms of models: only needed ones are formed, and they keep digits that plain formulas lose."""
 
 from __future__ import annotations
 

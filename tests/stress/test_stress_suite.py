@@ -1,4 +1,4 @@
-"""The stability suite: every case passes, and each kind of check notices what it is there for."""
+"""The stability suite: every case passes, and each kind of check finds the fault it is for."""
 
 from __future__ import annotations
 

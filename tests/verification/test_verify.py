@@ -1,4 +1,4 @@
-"""`illum verify`: what passes, what is caught, and what a wrong file is told."""
+"""`illum verify`: passing cases, failing cases, and messages about wrong files."""
 
 from __future__ import annotations
 

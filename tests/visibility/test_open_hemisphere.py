@@ -1,4 +1,4 @@
-"""Points with nothing above them, against a look at every vertex."""
+"""Points with no geometry above them, compared with a test of every vertex."""
 
 from __future__ import annotations
 

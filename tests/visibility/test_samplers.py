@@ -1,4 +1,4 @@
-"""What every row of `SAMPLERS` promises: unit directions, cosine-weighted, the same for the same draws."""
+"""Properties of every row of `SAMPLERS`: unit directions, cosine-weighted, the same for the same draws."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "f4")
 
 
 def counted(mesh: Mesh) -> dict[str, int]:
-    """What the mesh's repairs count, without what is harmless."""
+    """The counts of the mesh's repairs, without harmless ones."""
     return {what: each.count for what, each in mesh.repairs.items() if what not in HARMLESS}
 
 

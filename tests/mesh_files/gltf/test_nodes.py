@@ -1,4 +1,4 @@
-"""Where nodes and their instances stand."""
+"""Transforms of nodes and their instances."""
 
 from __future__ import annotations
 

@@ -130,8 +130,8 @@ def test_the_command_prints_writes_and_draws(illum, scene, tmp_path):
     assert "slope spiral: -0." in done.stdout
     assert "random needs" in done.stdout
     rows = list(csv.DictReader((tmp_path / "c.csv").read_text().splitlines()))
-    assert len(rows) == 3 * 3 * 2
-    assert {row["sampler"] for row in rows} == {"spiral", "owen", "random"}
+    assert len(rows) == 4 * 3 * 2
+    assert {row["sampler"] for row in rows} == {"spiral", "owen", "random", "spiral reconstructed"}
     assert all(float(row["rmse"]) > 0 and float(row["seconds"]) > 0 and int(row["rays"]) > 0 for row in rows)
     assert (tmp_path / "c.svg").read_text().count("<svg") == 1
     data = json.loads(
@@ -142,6 +142,20 @@ def test_the_command_prints_writes_and_draws(illum, scene, tmp_path):
     refused = illum("converge", "ring.yaml", "-o", "c.pdf")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "c.pdf" in refused.stderr
+
+
+def test_reconstruction_has_a_curve_of_its_own(scene):
+    found = run(scene, first=4, last=8, samplers=("spiral", "owen"), repeats=1)
+    raw, _, fitted = found.curves
+    assert [raw.sampler, fitted.sampler] == ["spiral", "spiral reconstructed"]
+    assert [p.rays for p in raw.points] == [p.rays for p in fitted.points]
+    assert fitted.points[0].rmse < raw.points[0].rmse
+    assert "*" in text_plot(found.curves)
+    for settings in ({"reconstruct": False}, {"overrides": ("obscurance.reconstruct=false",)}):
+        alone = run(scene, first=4, last=8, samplers=("spiral", "owen"), repeats=1, **settings)
+        assert [curve.sampler for curve in alone.curves] == ["spiral", "owen"]
+    light = run(scene, vary="pixels", first=2, last=4, layer="alpha", samplers=("spiral",), repeats=1)
+    assert len(light.curves) == 1
 
 
 def test_the_drawing_has_a_mark_per_point(scene):

@@ -46,6 +46,8 @@ class ConvergenceSettings(Value):
     layer: str | None = None
     """By default `obscurance` if only that is varied, otherwise `beauty`."""
     samplers: tuple[str, ...] = tuple(SAMPLERS)
+    reconstruct: bool = True
+    """Also the scene's sampler with reconstruction, unless the scene rules it out."""
     repeats: int = 3
     width: int | None = 320
     """The film is scaled down to at most this width, on which the error per pixel hardly depends."""
@@ -105,6 +107,11 @@ def measure_convergence(
     first = settings.first or few
     last = settings.last or max(many, 2 * first)
     levels = samplings(scene, vary, first, last, settings.samplers)
+    if settings.reconstruct and _can_reconstruct(layer):
+        own = [level for level in levels if scene.obscurance and level.sampler == scene.obscurance.sampler]
+        levels += [replace(level, reconstruct=True) for level in own]
+        levels.sort(key=lambda level: _count(level, vary))
+    names = list(dict.fromkeys(level.name for level in levels))
     _refuse_unvaried(layer, vary)
     held = IMAGES * len(layer.layer.channels)
     refuse_memory(layer.view.height, layer.view.width, held, expected_memory(loaded, scene), str(path))
@@ -113,13 +120,11 @@ def measure_convergence(
     finest = max(levels, key=lambda level: level.rays)
     seeds = [stream(scene.seed, f"converge:{repeat}") for repeat in range(settings.repeats)]
     contents: dict[RunKey, str] = {
-        (level.sampler, _count(level, vary), repeat): run_content(
-            layer, replace(level, seed=seed), finest, vary
-        )
+        (level.name, _count(level, vary), repeat): run_content(layer, replace(level, seed=seed), finest, vary)
         for repeat, seed in enumerate(seeds)
         for level in levels
     }
-    in_order = sorted(contents, key=lambda key: (settings.samplers.index(key[0]), *key[1:]))
+    in_order = sorted(contents, key=lambda key: (names.index(key[0]), *key[1:]))
     planned([contents[key] for key in in_order])
 
     # Render the images and compute their errors.
@@ -128,7 +133,7 @@ def measure_convergence(
     total, done = settings.repeats * sum(map(_cost, levels)), 0
     for repeat, seed in enumerate(seeds):
         for level in levels:  # samplers in turn, so that other load on the machine affects all alike
-            key = level.sampler, _count(level, vary), repeat
+            key = level.name, _count(level, vary), repeat
             values, rays, seconds = layer.render(replace(level, seed=seed))
             error = rmse_of(values, truth, reference.rmse)
             runs[key] = Run(repeat, seed, rays, seconds, error, contents[key])
@@ -136,24 +141,34 @@ def measure_convergence(
             progress(loaded.name, done, total)
     return Convergence(
         str(path), layer.layer.name, layer.view.name, layer.view.width, layer.view.height,
-        vary, settings.repeats, scene.seed, layer.threads, reference, _curves(settings, levels, vary, runs),
+        vary, settings.repeats, scene.seed, layer.threads, reference,
+        _curves(settings.repeats, levels, vary, runs),
     )  # fmt: skip
 
 
 def _curves(
-    settings: ConvergenceSettings, levels: Sequence[Sampling], vary: Vary, runs: Mapping[RunKey, Run]
+    repeats: int, levels: Sequence[Sampling], vary: Vary, runs: Mapping[RunKey, Run]
 ) -> tuple[Curve, ...]:
-    """A curve for each sampler."""
+    """A curve for each sampler, and for reconstruction."""
     curves = []
-    for sampler in settings.samplers:
+    for name in dict.fromkeys(level.name for level in levels):
         points = []
         for level in levels:
             count = _count(level, vary)
-            if level.sampler == sampler:
-                repeats = [runs[sampler, count, repeat] for repeat in range(settings.repeats)]
-                points.append(point_of(level, count, repeats))
-        curves.append(curve_through(sampler, points))
+            if level.name == name:
+                points.append(
+                    point_of(level, count, [runs[name, count, repeat] for repeat in range(repeats)])
+                )
+        curves.append(curve_through(name, points))
     return tuple(curves)
+
+
+def _can_reconstruct(layer: SampledLayer) -> bool:
+    """Does the layer depend on obscurance that can be reconstructed?"""
+    settings = layer.scene.obscurance
+    if settings is None or settings.reconstruct is False:
+        return False
+    return bool(layer.planned(Sampling(1, 1, settings.sampler, 0, reconstruct=True)).before)
 
 
 def samplings(scene: Scene, vary: Vary, first: int, last: int, samplers: Sequence[str]) -> list[Sampling]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from illumcli.accuracy.convergence import Convergence
 from illumcli.accuracy.curves import Curve
+from illumcli.accuracy.sampled import RECONSTRUCTED
 from illumcli.files.reports import sealed_csv
 from illumcli.tables import aligned
 from illumcli.visibility.samplers import SAMPLERS
@@ -82,11 +83,16 @@ def convergence_csv(result: Convergence) -> str:
     return sealed_csv(COLUMNS, rows)
 
 
+def _mark(curve: Curve) -> str:
+    """The character that stands for a curve."""
+    return "*" if curve.sampler.endswith(RECONSTRUCTED) else SAMPLERS[curve.sampler].mark
+
+
 def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str:
     """Error over samples, drawn with characters on logarithmic axes."""
     # The markers, and the range of each axis.
     dots = [
-        (math.log2(p.count), math.log2(p.rmse), SAMPLERS[curve.sampler].mark)
+        (math.log2(p.count), math.log2(p.rmse), _mark(curve))
         for curve in curves
         for p in curve.points
         if p.rmse > 0
@@ -108,5 +114,5 @@ def text_plot(curves: Sequence[Curve], width: int = 64, height: int = 16) -> str
     edges = {0: f"{2**high:.2g}", height - 1: f"{2**low:.2g}"}
     lines = [f"{edges.get(k, ''):>8} |{''.join(line).rstrip()}" for k, line in enumerate(field)]
     ends = f"{2**left:.0f}".ljust(width - 8) + f"{2**right:.0f}".rjust(8)
-    legend = "   ".join(f"{SAMPLERS[curve.sampler].mark} {curve.sampler}" for curve in curves)
+    legend = "   ".join(f"{_mark(curve)} {curve.sampler}" for curve in curves)
     return "\n".join([*lines, f"{'RMSE':>8} +{'-' * width}", f"{'':8}  {ends}", f"{'':8}  {legend}"])

@@ -26,6 +26,9 @@ from illumcli.render_graph.schedule import Plan, outputs_of, schedule
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 
+RECONSTRUCTED = " reconstructed"
+"""Behind the sampler's name."""
+
 
 class Sampling(Value):
     """The sampling of an image: counts, sampler and seed."""
@@ -36,6 +39,11 @@ class Sampling(Value):
     seed: int
     reconstruct: bool = False
     """Is obscurance fitted to the surface?"""
+
+    @property
+    def name(self) -> str:
+        """What curves are called: the sampler, and whether its values are reconstructed."""
+        return f"{self.sampler}{RECONSTRUCTED}" if self.reconstruct else self.sampler
 
     @property
     def rays(self) -> int:

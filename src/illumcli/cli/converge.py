@@ -62,6 +62,11 @@ def _settings(options: dict[str, Any]) -> ConvergenceSettings:
     help="Only this sampler of obscurance rays; may be repeated.",
 )
 @click.option(
+    "--reconstruct/--no-reconstruct",
+    default=True,
+    help="Also with obscurance fitted to the surface, unless the scene says no.",
+)
+@click.option(
     "--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Number of seeds."
 )
 @click.option(

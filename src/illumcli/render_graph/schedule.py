@@ -25,6 +25,9 @@ REPAIRS = ("repairs", "undirected", "unnamed")
 """Buffers with the repairs of meshes: computed for every scene that has them."""
 COVERAGE = {"hits", "samples", "alpha"}
 """Buffers of a tile that the film reads in addition to those of its layers."""
+ROW_SAMPLES, LEAST_FITTED = 1 << 20, 96
+"""Samples of a row of tiles at most, where obscurance is reconstructed, unless tiles get less than so many
+pixels high: all of their margins are fitted, too."""
 NOTHING_CACHED = Lookup()
 
 
@@ -85,7 +88,11 @@ class Plan(Value):
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
         min_samples = min_tile_samples(len(self.tile))
-        side = side or tile_side(self.samples_per_pixel, view.width * view.height, min_samples)
+        if side is None:
+            side = tile_side(self.samples_per_pixel, view.width * view.height, min_samples)
+            if self.before:  # some rows of tiles are held at once
+                row = view.width * view.samples
+                side = max(min(side, ROW_SAMPLES // row // 8 * 8), min(side, LEAST_FITTED))
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side
 
     def needed_for(self, name: str) -> frozenset[str]:

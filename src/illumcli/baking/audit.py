@@ -30,7 +30,7 @@ PRECISION = 0.05
 MAX_ROUNDS = 24
 LIMIT_SHARE, LEAST_LIMIT = 0.25, 1 << 18
 """No further round once an audit took so many of the rays of the values, but at least so many rays."""
-MAX_RAYS = 4096
+MIN_RAYS, MAX_RAYS = 16, 4096
 """Rays of an estimate."""
 FIRST_REPLICATE = 1 << 21
 """Number of the first scramble of audits."""
@@ -91,7 +91,7 @@ def audit(sampler: BakeSampler, values: Audited, number: int, target: float = 0.
     # estimates as exact as the values, so that neither errs in vain
     expected = max(float(values.risk.mean()), 1e-12)
     ratio = (values.raw_variance / expected) ** (2 / 3)
-    rays = int(np.clip(2 ** math.ceil(math.log2(max(values.samples * ratio, 1))), 16, MAX_RAYS))
+    rays = int(np.clip(values.samples * ratio, MIN_RAYS, MAX_RAYS))
     chance = _chances(values.risk + expected, POINTS)
     limit = max(LIMIT_SHARE * values.samples * count, LEAST_LIMIT)
 

@@ -138,7 +138,8 @@ def test_reconstructed_values_err_less_and_state_it(tmp_path):
         error.append(np.sqrt(np.mean(off**2)))
         covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
         assert report.rmse < raw.rmse / 2
-        assert report.reconstruction is not None
+        audit = report.reconstruction["audit"]
+        assert audit["low"] < report.rmse < audit["high"]
     assert 0.9 < np.mean(np.array(stated) / error) < 1.1
     assert 0.92 < np.mean(covered) < 0.98
     assert np.mean(np.array(error)) < 0.02

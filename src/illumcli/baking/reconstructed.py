@@ -137,11 +137,13 @@ class ReconstructedBake(Record):
         """What is written of the last trial, and what all of them took."""
         last = trials[-1]
         found = last.audit
+        low, high = found.interval(self.share)
         about: dict[str, Any] = {
             "windows": {str(points): round(share, 4) for points, share in last.windows.items()},
             "audit": {
-                "interval": list(found.interval(self.share)),
-                "estimates": found.points,
+                "low": low,
+                "high": high,
+                "points": found.points,
                 "samples": found.samples,
             },
         }

@@ -50,8 +50,8 @@ class BakeReport(Record):
         rays = sum(self.rays.values())
         how = "root mean square"
         if self.reconstruction is not None:
-            low, high = self.reconstruction["audit"]["interval"]
-            how += f", audited: {low:.2g} to {high:.2g}"
+            audit = self.reconstruction["audit"]
+            how += f", audited: {audit['low']:.2g} to {audit['high']:.2g}"
         return (
             f"{self.vertices} vertices: error {self.rmse:.2g} ({how}), {rays} rays, "
             f"{self.open} points open without a ray"

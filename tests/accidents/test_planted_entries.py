@@ -92,7 +92,7 @@ def test_a_sound_entry_whose_description_is_none_is_a_miss(store, path, said):
         read_entry(path, KEY)
     assert list(store.faults()) == [path]
     assert store.read(KEY) is None
-    assert "it is made again" in store.warning
+    assert "it is computed again" in store.warning
     assert not path.exists()
 
 
@@ -220,7 +220,7 @@ writer.write(np.ones(1 << 18))
 (part,) = (name for name in os.listdir("kept") if name.endswith(".part"))
 os.truncate("kept/" + part, 4096)
 assert not writer.commit()
-assert "became shorter" in store.warning or "it is made again" in store.warning, store.warning
+assert "became shorter" in store.warning or "it is computed again" in store.warning, store.warning
 assert os.listdir("kept") == [], os.listdir("kept")
 """
 

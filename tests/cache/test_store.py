@@ -85,7 +85,7 @@ def test_no_flipped_bit_and_no_missing_byte_goes_unseen(store, size):
         assert store.read(KEY) is None
     path_of(store).write_bytes(good + b"\0")
     assert store.read(KEY) is None
-    assert "it is made again" in store.warning
+    assert "it is computed again" in store.warning
     path_of(store).write_bytes(good)
     assert store.read(KEY) is not None
 
@@ -288,7 +288,7 @@ def test_a_foreign_file_is_not_described(store, data):
 def test_an_entry_that_cannot_be_read_costs_time_alone(store):
     path_of(store).mkdir(parents=True)
     assert store.read(KEY) is None
-    assert "not a file; it is made again" in store.warning
+    assert "not a file; it is computed again" in store.warning
 
 
 def test_what_was_read_outlives_its_file(store):

@@ -143,7 +143,7 @@ class Store:
     def reject(self, key: str, fact: str) -> None:
         """Remove an entry that cannot be used; `fact` is the reason."""
         path = self._path(key)
-        self._warn(f"{path}: {fact}; it is made again")
+        self._warn(f"{path}: {fact}; it is computed again")
         removed(path)
 
     def save(self, key: str, about: Mapping[str, Any], arrays: Sequence[NDArray[Any]]) -> bool:

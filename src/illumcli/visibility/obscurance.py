@@ -173,16 +173,16 @@ def openness(tracer: Tracer, rays: PatternRays, method: Method, each_ray: bool, 
     reach = method.falloff.reach(method.radius)
     wanted = ["directions"] if directions else []
     if method.any_hit:
-        found = PatternResults.room(rays.shape, *wanted, *(["is_open"] if each_ray else []))
-        tracer.trace_patterns(rays, np.inf if reach == np.inf else reach / method.radius, found)
-        w = found.open.astype(F) / F(method.samples)  # exact: counts are below 2^24
-        return Openness(w, found.is_open, found.directions)
+        results = PatternResults.room(rays.shape, *wanted, *(["is_open"] if each_ray else []))
+        tracer.trace_patterns(rays, np.inf if reach == np.inf else reach / method.radius, results)
+        w = results.open.astype(F) / F(method.samples)  # exact: counts are below 2^24
+        return Openness(w, results.is_open, results.directions)
 
     # The weight of what each ray meets first.
     if method.faces == "count":
-        found = PatternResults.room(rays.shape, *wanted, "distance")
-        tracer.trace_patterns(rays, np.inf, found)
-        distance, d = found.distance, found.directions
+        results = PatternResults.room(rays.shape, *wanted, "distance")
+        tracer.trace_patterns(rays, np.inf, results)
+        distance, d = results.distance, results.directions
     else:
         d = rays.directions()
         distance, d = front_face_distance(tracer, rays.starts(), d, method), d.T.reshape(3, *rays.shape)

@@ -44,15 +44,16 @@ class Pictures:
 
     def __init__(self, loaded: SceneFile) -> None:
         graph = build(loaded.scene, loaded)
-        given = ("hits", "interaction", "obscurance_draws", "view", "tile")
-        self.steps = topological_order(graph.nodes, [*MADE, "obscurance"], given)
-        self.known: dict[str, Any] = {}
+        given = ("hits", "interaction", "obscurance_draws", "view_method", "read_hits", "view", "tile")
+        self.steps = topological_order(graph.nodes, [*MADE, "obscurance_method", "obscurance"], given)
+        self.known: dict[str, Any] = {"read_hits": None}
         self.at: set[str] = {"hits", "interaction", "obscurance_draws"}
         for step in self.steps:
             if self.at & set(step.inputs.values()):
                 self.at.add(step.output)
             else:
                 self.known[step.output] = step.run(self.known)
+        self.known["view_method"] = self.known["obscurance_method"]
 
     def w(self, triangle: np.ndarray, weights: np.ndarray, seed: int = 0) -> np.ndarray:
         """(M,) obscurance at points on triangles with (M, 3) barycentric weights."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors, cross, dot, length, take_rows
+from illumcli.geometry import polygon_normals as polygon_blocks
 from illumcli.geometry.components import components
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import (
@@ -121,7 +123,7 @@ def _computed(
 
     # A crease of 0 averages nothing.
     if crease == 0:
-        normals, owner = polygons.normals(), polygon_of_corners(mesh)
+        normals, owner = polygons.normals, polygon_of_corners(mesh)
         is_valid = dot(normals, normals) > 0
         return CornerNormals(normals, np.where(is_valid[owner], owner, -1).astype(np.int32), {})
 
@@ -147,7 +149,7 @@ def _computed(
     cancelled = np.flatnonzero(is_cancelled[index])
     if cancelled.size:
         part, chosen = polygons.around(cancelled)
-        normals, row = part.normals(), polygon_of_corners(part.mesh)[chosen]
+        normals, row = part.normals, polygon_of_corners(part.mesh)[chosen]
         is_valid = dot(normals, normals)[row] > 0
         index = index.copy()
         index[cancelled] = np.where(is_valid, len(means) + row, -1)
@@ -168,7 +170,13 @@ class _Polygons(Record):
     """True if the mesh has polygons of more than three corners, in these or other blocks."""
 
     def blocks(self) -> Iterator[tuple[slice, _Polygons]]:
-        """Blocks of consecutive polygons, with the range of their corners."""
+        """Blocks of consecutive polygons, with the range of their corners.
+
+        A small mesh is one block, whose normals are computed once.
+        """
+        if self.mesh.polygon_count <= polygon_blocks.BLOCK:
+            yield slice(0, len(self.mesh.corners)), self
+            return
         for polygons, corners, part in blocks(self.mesh):
             turned = None if self.turned is None else self.turned[polygons]
             yield corners, replace(self, mesh=part, turned=turned)
@@ -185,6 +193,7 @@ class _Polygons(Record):
         turned = None if self.turned is None else self.turned[which]
         return replace(self, mesh=part, turned=turned), corners - shift[row]
 
+    @cached_property
     def normals(self) -> Vectors:
         """(P, 3) unit normals, on the side that counts."""
         normals = polygon_normals(self.mesh, self.method)
@@ -235,11 +244,11 @@ def _pool_means(pool: NDArray[Any], polygons: _Polygons) -> tuple[Vectors, NDArr
     for corners, part in polygons.blocks():
         row, owner = pool[corners].astype(np.intp), polygon_of_corners(part.mesh)
         weight = np.broadcast_to(part.corner_weights(), row.shape)
-        if row.min() < 0:
+        if row.min(initial=0) < 0:
             counts = np.flatnonzero(row >= 0)
             row, owner, weight = row[counts], owner[counts], weight[counts]
         np.add.at(total, row, weight)
-        for column, normal in zip(sums.T, part.normals().T, strict=True):
+        for column, normal in zip(sums.T, part.normals.T, strict=True):
             np.add.at(column, row, normal[owner] * weight)
     size = length(sums)
     sums *= np.divide(1, size, out=np.zeros(count), where=size > 0)[:, None]
@@ -260,7 +269,7 @@ def _creased(
     """
     has_crease = np.zeros(len(means), np.bool_)
     for corners, part in polygons.blocks():
-        normal = take_rows(part.normals(), polygon_of_corners(part.mesh))
+        normal = take_rows(part.normals, polygon_of_corners(part.mesh))
         difference = take_rows(means, pool[corners]) - normal
         is_far = (dot(difference, difference) > (2 * np.sin(limit / 4)) ** 2) & (dot(normal, normal) > 0)
         if by_angle is not None:
@@ -274,7 +283,7 @@ def _fans_between_edges(polygons: _Polygons, corners: NDArray[Any], limit: float
 
     A fan is a run of polygons around a vertex that follow each other over edges of at most `limit` [rad].
     """
-    mesh, normals, owner = polygons.mesh, polygons.normals(), polygon_of_corners(polygons.mesh)
+    mesh, normals, owner = polygons.mesh, polygons.normals, polygon_of_corners(polygons.mesh)
 
     # Next and previous corner within each polygon, and each corner's place among `corners`.
     following = np.arange(1, len(mesh.corners) + 1)

@@ -234,19 +234,19 @@ def checked(kind: str) -> Callable[[Path, int], list[object]]:
 
 Series = tuple[Callable[[Path, int], list[object]], list[int], list[int]]
 SERIES: dict[str, Series] = {  # the command for a count; counts; counts of the small form
-    "frames": (frames, [1, 20, 200, 1000], [1, 2, 4]),
-    "variants": (variants, [2, 20, 200, 1000], [2, 3, 5]),
-    "triangles": (triangles, [10**4, 10**5, 10**6, 10**7], [100, 200, 400]),
-    "meshes": (meshes, [1, 100, 1000, 10**4], [1, 2, 4]),
-    "copies": (copies, [1, 100, 1000, 10**4], [1, 2, 4]),
-    "lights, 1 thread": (lights_on(1), [1, 8, 64, 512], [1, 2, 4]),
-    "lights, 2 threads": (lights_on(2), [1, 8, 64, 512], [1, 2, 4]),
-    "texels": (texels, [2**16, 2**20, 2**24, 2**26], [2**8, 2**10, 2**12]),
-    "scattered": (scattered, [1, 10, 100, 1000], [1, 2, 4]),
-    "check objects": (checked("objects"), [1, 80, 800, 8000], [1, 2, 4]),
-    "check lights": (checked("lights"), [1, 80, 800, 8000], [1, 2, 4]),
-    "check materials": (checked("materials"), [1, 80, 800, 8000], [1, 2, 4]),
-    "check cameras": (checked("cameras"), [1, 80, 800, 8000], [1, 2, 4]),
+    "frames": (frames, [1, 20, 200, 1000], [1, 2]),
+    "variants": (variants, [2, 20, 200, 1000], [2, 3]),
+    "triangles": (triangles, [10**4, 10**5, 10**6, 10**7], [100, 200]),
+    "meshes": (meshes, [1, 100, 1000, 10**4], [1, 2]),
+    "copies": (copies, [1, 100, 1000, 10**4], [1, 2]),
+    "lights, 1 thread": (lights_on(1), [1, 8, 64, 512], [1, 2]),
+    "lights, 2 threads": (lights_on(2), [1, 8, 64, 512], [1, 2]),
+    "texels": (texels, [2**16, 2**20, 2**24, 2**26], [2**8, 2**10]),
+    "scattered": (scattered, [1, 10, 100, 1000], [1, 2]),
+    "check objects": (checked("objects"), [1, 80, 800, 8000], [1, 2]),
+    "check lights": (checked("lights"), [1, 80, 800, 8000], [1, 2]),
+    "check materials": (checked("materials"), [1, 80, 800, 8000], [1, 2]),
+    "check cameras": (checked("cameras"), [1, 80, 800, 8000], [1, 2]),
 }
 
 

@@ -37,8 +37,8 @@ from illumcli.render_graph.replicates import replicated_draws
 from illumcli.render_graph.schedule import Plan, schedule
 from illumcli.visibility.obscurance import obscurance_method
 
-BLOCKS = 3600
-"""A picture is divided into about so many blocks."""
+FEWEST_BLOCKS, MOST_BLOCKS = 900, 3600
+"""A picture is divided into blocks of about 16 x 16 pixels, but so many at least and at most."""
 CANDIDATES = 16
 """Pixels of each block that may be audited."""
 PILOT = 2
@@ -48,8 +48,9 @@ PRECISION = 0.04
 RAYS = 128
 """Obscurance rays of each estimate of a pixel, at least."""
 MOST_RAYS = 1024
-BUDGET = 1 << 23
-"""Obscurance rays of an audit, about; where they do not reach `PRECISION`, the stated interval is wider."""
+LEAST_BUDGET, BUDGET_PER_PIXEL, MOST_BUDGET = 1 << 20, 8, 1 << 23
+"""Obscurance rays of an audit, about, by the size of the picture; where they do not reach `PRECISION`, the
+stated interval is wider."""
 CAMERA_SAMPLES = 16
 """Camera samples of each estimate, where the picture has several per pixel."""
 
@@ -141,7 +142,7 @@ class Audit(Record):
             self.candidates.smoothed(np.square(products).reshape(PILOT, -1).mean(axis=0)),
             share,
             2 * self.precision * square,
-            max(BUDGET // (2 * rays), len(share)),
+            max(self._budget() // (2 * rays), len(share)),
         )
         block = np.repeat(np.arange(len(share)), counts)
         turn = np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -149,6 +150,11 @@ class Audit(Record):
         products, _ = self._products(which, rays, "main", picture, buffers, run)
         stated = AuditedError.of_products(self.layer.name, products, (share / counts)[block])
         return replace(stated, rays=sum(run.stats.rays.values()))
+
+    def _budget(self) -> int:
+        """Obscurance rays that the audit may take, about."""
+        pixels = self.plan.view.width * self.plan.view.height
+        return min(max(BUDGET_PER_PIXEL * pixels, LEAST_BUDGET), MOST_BUDGET)
 
     def _products(
         self,
@@ -214,7 +220,8 @@ class Candidates(Record):
     @classmethod
     def of(cls, view: View, seed: int) -> Candidates:
         """Candidates of a view, drawn by hash: within a block every pixel is as likely."""
-        side = max(1, math.isqrt(view.width * view.height // BLOCKS))
+        pixels = view.width * view.height
+        side = max(1, math.isqrt(pixels // min(max(pixels // 256, FEWEST_BLOCKS), MOST_BLOCKS)))
         across, down = -(-view.width // side), -(-view.height // side)
         row, column = np.divmod(np.arange(across * down), across)
         wide, high = np.minimum(side, view.width - column * side), np.minimum(side, view.height - row * side)

@@ -7,15 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from illumcli.accuracy.audit import (
-    CANDIDATES,
-    Audit,
-    AuditedError,
-    Candidates,
-    audited_layer,
-    counts_by_block,
-)
-from illumcli.film.view import View
+from illumcli.accuracy.audit import Audit, AuditedError, audited_layer, drawn, pixel_chances
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
 from planned import planned
@@ -59,26 +51,33 @@ def audited(path, *overrides, only="beauty", threads=1, side=None):
     return picture, audit.error(shared, Run(threads=threads))
 
 
-def test_every_pixel_of_a_block_is_as_likely():
-    view = View("main", None, 250, 130, 1)
-    counts = np.zeros((130, 250))
-    for seed in range(60):
-        made = Candidates.of(view, seed)
-        np.add.at(counts, (made.y, made.x), 1)
-    assert made.share.sum() == pytest.approx(1)
-    expected = 60 * CANDIDATES * len(made.share) / counts.size  # of blocks that are whole: 3 x 3 pixels
-    for part in (counts[:129:3, :249], counts[2:129:3, :249], counts[:129, 1:249:3], counts[:40, :40]):
-        assert abs(part.mean() / expected - 1) < 0.02 + 5 / np.sqrt(expected * part.size)
+def test_pixels_are_drawn_by_the_contrast_around_them():
+    picture = np.zeros((40, 50, 1), np.float32)
+    picture[20, 30] = 1
+    chances = pixel_chances(picture)
+    assert chances.sum() == pytest.approx(1)
+    near = chances.reshape(40, 50)[19:22, 29:32]
+    assert (near == near[0, 0]).all()
+    assert near.sum() == pytest.approx(2 / 3, rel=0.01)
+    assert (pixel_chances(picture * 0) == 1 / 2000).all()
 
 
-def test_more_pixels_where_products_vary():
-    square = np.concatenate([np.full(900, 1e-12), np.full(100, 1e-8)])
-    share = np.full(1000, 1e-3)
-    few, many = (counts_by_block(square, share, error, 10**6) for error in (1e-6, 3e-7))
-    assert few[:900].max() == 1
-    assert few[900:].min() > 2
-    assert many.sum() > few.sum()
-    assert counts_by_block(square, share, 0.0, 3000).sum() <= 3000
+def test_weights_make_the_mean_unbiased():
+    """Also of what is nearly all at one pixel."""
+    random = np.random.default_rng(3)
+    values = random.random(2000)
+    values[1030] = 4000
+    picture = values.reshape(40, 50, 1).astype(np.float32)
+    chances = pixel_chances(picture)
+    means, errors = [], []
+    for _ in range(400):
+        pixel = drawn(chances, 300, random.random())
+        stated = AuditedError.of_products("beauty", values[pixel], 1 / (chances[pixel] * 2000 * 300))
+        means.append(stated.rmse**2)
+        errors.append(2 * stated.standard_error * stated.rmse)
+    error = np.std(means) / np.sqrt(len(means))
+    assert abs(np.mean(means) - values.mean()) < 4 * error
+    assert np.std(means) < 1.1 * np.mean(errors)
 
 
 def test_what_is_lost_in_its_own_error_is_not_stated_as_0():

@@ -13,7 +13,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from illumcli.accuracy.audit import CAMERA_SAMPLES, PRECISION, Audit, AuditedError, audited_layer
+from illumcli.accuracy.audit import CAMERA_SAMPLES, LARGEST, PRECISION, Audit, AuditedError, audited_layer
 from illumcli.accuracy.target import ATTEMPTS, MARGIN, SAMPLE_COST, count_overrides
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
@@ -196,7 +196,8 @@ def can_reconstruct(graph: Graph, only: Sequence[str]) -> bool:
     except InputError:  # other layers cannot be reconstructed
         return False
     means = [layer for layer in outputs if not layer.data]
-    if not means or "raw_obscurance" not in graph.nodes:
+    too_large = any(view.width * view.height > LARGEST for view in graph.views)
+    if not means or too_large or "raw_obscurance" not in graph.nodes:
         return False
     first = min(means, key=lambda layer: layer.buffer != "beauty")
     return "obscurance" in {node.output for node in graph.topological_order([first.buffer])}

@@ -86,6 +86,8 @@ def test_what_is_lost_in_its_own_error_is_not_stated_as_0():
     assert lost.low == 0
     assert 0 < lost.rmse <= lost.high
     assert AuditedError.of_products("beauty", np.zeros(5), share).rmse == 0
+    uneven = AuditedError.of_products("beauty", np.tile([0, 2e-6], 50), np.full(100, 0.01))
+    assert uneven.standard_error == pytest.approx(1e-6 / np.sqrt(99) / (2 * uneven.rmse))
     assert AuditedError.of_products("beauty", np.full(5, 4e-6), share).rmse == pytest.approx(0.002)
 
 

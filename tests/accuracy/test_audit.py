@@ -118,6 +118,15 @@ def test_tiles_and_threads_do_not_change_the_stated_error(path):
     assert stated == other
 
 
+@pytest.mark.parametrize("samples", [1, 3])
+def test_pixels_that_are_drawn_again_get_other_rays(path, samples):
+    """A picture of one pixel is audited by many estimates of it, whose mean has an error."""
+    overrides = ["film.width=1", "film.height=1", "camera.target=[0.5, 0, 0.1]", f"film.samples={samples}"]
+    for seed in range(4):
+        _, stated = audited(path, *overrides, f"seed={seed}")
+        assert 0 < stated.low < stated.rmse < stated.high
+
+
 def test_the_report_and_the_terminal_state_it(path, illum, tmp_path):
     done = illum("render", path, "-o", "out.exr", "--report", "report.json", "-v", cwd=tmp_path)
     report = json.loads((tmp_path / "report.json").read_text())

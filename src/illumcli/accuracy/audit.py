@@ -1,9 +1,10 @@
 """The error of a reconstructed picture, noise and bias together, from rays that are used nowhere else.
 
 At some pixels the layer is estimated twice more, C and D, without reconstruction: with other camera samples
-over the pixel filter, and with rays drawn by hash for each pixel. For a picture F the mean of (F - C)(F - D)
-is an unbiased estimate of its mean square error, since C and D err independently of F and of each other. The
-rays of a picture are one lattice over all pixels; other rays of the same lattice would err together with F.
+over the pixel filter, and with rays drawn by hash for each draw of a pixel. For a picture F the mean of
+(F - C)(F - D) is an unbiased estimate of its mean square error, since C and D err independently of F and of
+each other. The rays of a picture are one lattice over all pixels; other rays of the same lattice would err
+together with F.
 
 References
 ----------
@@ -23,15 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats
-from illumcli.film.tiles import Tile
-from illumcli.film.view import samples
+from illumcli.film.tiles import Samples, Scattered, Tile
+from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import Layer
-from illumcli.rays.sampling import hashed, stream, unit_interval
+from illumcli.rays.interaction import Hits
+from illumcli.rays.sampling import hashed, pixel_points, stream, unit_interval
 from illumcli.records import Record, Value
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.execute import Run, at_pixels
-from illumcli.render_graph.replicates import replicated_draws
+from illumcli.render_graph.replicates import numbered_draws
 from illumcli.render_graph.schedule import Plan, schedule
 from illumcli.visibility.obscurance import obscurance_method
 
@@ -122,7 +124,7 @@ class Audit(Record):
         number = min(max(chances.size // 128, FEWEST_PILOTS), MOST_PILOTS)
         products, weights, noise = self._products(chances, number, RAYS, "pilot", buffers, run)
         pilot = AuditedError.of_products(self.layer.name, products, weights)
-        if not products.any():
+        if not pilot.rmse:
             return replace(pilot, rays=sum(run.stats.rays.values()))
         more = max(noise / (2 * pilot.rmse**2), 1.0) ** (2 / 3)  # noise falls as rays^-1.5
         rays = min(int(RAYS * more), MOST_RAYS)
@@ -236,12 +238,23 @@ def fresh_plan(plan: Plan, layer: Layer, rays: int, seed: int, camera_samples: i
     each = max(1, rays // (camera_samples or view.samples))
     settings = scene.obscurance.model_copy(update={"samples": each, "reconstruct": None})
     changed = [
-        Node.of(partial(replicated_draws, seed), "obscurance_draws"),
+        Node.of(partial(fresh_draws, seed), "obscurance_draws"),
         replace(nodes["obscurance_method"], function=partial(obscurance_method, settings)),
         replace(nodes["raw_obscurance"], output="obscurance"),
     ]
     if camera_samples is not None:
-        changed.append(Node.of(partial(samples, seed), "samples"))
+        changed.append(Node.of(partial(fresh_samples, seed), "samples"))
         view = replace(view, samples=camera_samples)
     graph: Graph = replace(plan.graph, nodes={**nodes, **{node.output: node for node in changed}}, loaders={})
     return schedule(graph, [layer], view)
+
+
+def fresh_samples(seed: int, view: View, tile: Scattered) -> Samples:
+    """Sample positions of pixels, keyed by draw: a pixel that is drawn twice has other samples."""
+    x, y = tile.pixels()
+    return Samples(x, y, pixel_points(stream(seed, "pixel"), tile.numbers(), view.samples), view.samples)
+
+
+def fresh_draws(seed: int, tile: Scattered, samples: Samples, hits: Hits) -> NDArray[np.float64]:
+    """(2, M) in [0, 1): rotation and phase of the obscurance rays, keyed by draw."""
+    return numbered_draws(seed, tile.numbers(), samples, hits)

@@ -80,11 +80,17 @@ class Scattered(Tile):
 
     columns: NDArray[np.int64]
     rows: NDArray[np.int64]
+    first: int = 0
+    """Number of the first of them, among all that are rendered together."""
 
     @classmethod
-    def at(cls, x: NDArray[np.int64], y: NDArray[np.int64]) -> Scattered:
+    def at(cls, x: NDArray[np.int64], y: NDArray[np.int64], first: int = 0) -> Scattered:
         """The pixels of these columns and rows."""
-        return cls(0, 0, len(x), 1, x, y)
+        return cls(0, 0, len(x), 1, x, y, first)
+
+    def numbers(self) -> NDArray[np.uint32]:
+        """(P,) number of each; a pixel that is there several times has several."""
+        return np.arange(self.first, self.first + self.width, dtype=np.uint32)
 
     def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return self.columns, self.rows

@@ -333,7 +333,7 @@ def at_pixels(plan: Plan, shared: Buffers, run: Run, x: NDArray[np.int64], y: ND
     if plan.before:
         raise ValueError("pixels that read those around them are not rendered alone")
     count = max(1, min(MAX_TILE_SAMPLES // plan.view.samples, -(-len(x) // run.threads)))
-    pieces = [Scattered.at(x[a : a + count], y[a : a + count]) for a in range(0, len(x), count)]
+    pieces = [Scattered.at(x[a : a + count], y[a : a + count], a) for a in range(0, len(x), count)]
     stop, recorder = threading.Event(), BufferRecorder(NO_CACHE, {}, plan.view)
     common = _Common(plan, shared, run.stats, stop, recorder, _unchanged)
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:

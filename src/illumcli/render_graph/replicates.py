@@ -117,11 +117,17 @@ def replicated_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.floa
     The draws of one pixel's samples have the same differences as in the image, but each pixel has its own
     offset: over the film, the image's draws are one pattern that the seed only shifts.
     """
+    return numbered_draws(seed, (samples.y * (1 << 16) + samples.x).astype(np.uint32), samples, hits)
+
+
+def numbered_draws(
+    seed: int, number: NDArray[np.uint32], samples: Samples, hits: Hits
+) -> NDArray[np.float64]:
+    """(2, M) the same by a number of each of P pixels, (P,)."""
     key = sampling.stream(seed, "obscurance again")
     pixel, sample = np.divmod(hits.sample, samples.per_pixel)
     zero = np.zeros_like(sample)
     within = sampling.dither(key, zero, zero, sample)
-    number = (samples.y * (1 << 16) + samples.x).astype(np.uint32)
     start = [sampling.unit_interval(sampling.hashed(key + k & 0xFFFFFFFF, number)) for k in (2, 3)]
     return (within + np.stack(start).take(pixel, axis=1)) % 1.0
 

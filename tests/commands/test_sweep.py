@@ -171,6 +171,19 @@ def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
     ]
 
 
+@pytest.mark.parametrize("reconstruct", ["false", "true"])
+def test_what_is_stored_needs_the_hits_although_its_nodes_do_not_read_them(
+    illum, scene, tmp_path, reconstruct
+):
+    """All that the second variant's obscurance reads is in memory."""
+    about, layers = "obscurance.about", ["--only", "obscurance", "--only", "normal"]
+    same = ["-D", f"obscurance.reconstruct={reconstruct}", *layers]
+    done = illum("sweep", scene, "-D", f"{about}=shading,geometric", *same, "-o", "{obscurance.about}.exr")
+    assert done.returncode == 0, done.stderr
+    illum("render", scene, "--no-cache", "-D", f"{about}=geometric", *same, "-o", "single.exr")
+    assert digest(tmp_path / "single.exr") == digest(tmp_path / "geometric.exr")
+
+
 def test_a_sweep_goes_on_where_it_stopped(illum, scene, tmp_path):
     axis = "materials.clay.specular=0.1,0.2,0.3"
     assert illum("sweep", scene, "-D", axis).returncode == 0

@@ -129,8 +129,12 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
 
 
 def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]) -> list[str]:
-    """The buffers that the film reads to reconstruct layers of some views."""
-    buffers: dict[str, None] = {}
+    """The buffers that the film reads to reconstruct layers of some views.
+
+    The hits come first: buffers of tiles that are stored hold values at hits, whether their nodes read them
+    or not.
+    """
+    buffers: dict[str, None] = {"hits": None}
     if any(view.adaptive for view in shown):
         outputs = sampled_outputs(outputs)
         buffers |= dict.fromkeys(decisions(outputs))
@@ -140,7 +144,7 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
     if any(layer.data for layer in outputs):
         buffers["samples"] = None
     repairs = (name for name in REPAIRS if name in graph.nodes)
-    return [*(buffers | dict.fromkeys(["hits", "render_space", *repairs]))]
+    return [*(buffers | dict.fromkeys(["render_space", *repairs]))]
 
 
 def sampled_outputs(outputs: Sequence[Layer]) -> tuple[Layer, ...]:
@@ -183,7 +187,7 @@ def schedule(
     if view.adaptive is None:
         before = 0
         if any(SURROUNDINGS in node.inputs.values() for node in tile):
-            needed = {node.output for node in graph.topological_order(["object_pixels"])}
+            needed = {node.output for node in graph.topological_order(["hits", "object_pixels"])}
             tile.sort(key=lambda node: node.output not in needed)
             before = sum(node.output in needed for node in tile)
         return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)

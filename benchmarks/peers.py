@@ -44,6 +44,8 @@ from _bench import (
 from illumcli.images.reader import read_image
 
 ERROR = 0.01
+RECONSTRUCTED = "illum reconstructed"
+RECONSTRUCT = ("-D", "obscurance.reconstruct=true")
 SIZE = (64, 36) if SMALL else (1280, 720)
 LARGE = (64, 36) if SMALL else (1920, 1080)
 EYE, TARGET, FOV = (2.2, 1.6, 3.4), (0.0, 0.55, 0.0), 30.0
@@ -152,13 +154,14 @@ def ambient(folder: Path, python: str) -> None:
         finer = ("-D", f"film.samples={samples}", "-D", f"obscurance.samples={rays}")
         illum("render", scene, *finer, "--seed", seed, "-o", out, "--force", "-q", *words, cwd=folder)
 
-    fine = 4 if SMALL else 8
-    own(fine, 64, 1001, "truth-illum.exr")
-    mitsuba(folder, python, "llvm_ad_rgb", fine**2 * 8, 1001, "truth-mitsuba.exr")
+    fine = 4 if SMALL else 32
+    own(fine, 16, 1001, "truth-illum.exr", "-D", "film.adaptive=false")
+    mitsuba(folder, python, "llvm_ad_rgb", fine * 16, 1001, "truth-mitsuba.exr")
     truths = {"illum": picture(folder / "truth-illum.exr"), "mitsuba": picture(folder / "truth-mitsuba.exr")}
     print(f"# difference of the references: RMSE {rmse(*truths.values()):.4f}")
 
     counts = [(2, 4), (4, 8)] if SMALL else [(4, 8), (8, 8), (16, 8)]
+    few = [(1, 2), (2, 2)] if SMALL else [(2, 2), (4, 2), (8, 2)]
     spps = {
         "llvm_ad_rgb": [4, 16] if SMALL else [16, 64, 256],
         "llvm_ad_rgb + OIDN": [2, 4] if SMALL else [2, 4, 16],
@@ -168,7 +171,14 @@ def ambient(folder: Path, python: str) -> None:
         "illum": (
             "illum",
             [(f"{p} x {m}", lambda s, p=p, m=m: own(p, m, s, "i.exr", "--no-cache")) for p, m in counts],
-        )
+        ),
+        RECONSTRUCTED: (
+            "illum",
+            [
+                (f"{p} x {m}", lambda s, p=p, m=m: own(p, m, s, "i.exr", "--no-cache", *RECONSTRUCT))
+                for p, m in few
+            ],
+        ),
     }
     for variant, counts_of_variant in spps.items():
         runs = [
@@ -197,8 +207,9 @@ def ambient(folder: Path, python: str) -> None:
     }
     print(f"# at RMSE {ERROR}, interpolated or extended on log-log")
     table(at, "illum")
-    for name in list(at)[1:]:
-        ratio(f"{name} / illum", at, name, "illum")
+    for own_name in ("illum", RECONSTRUCTED):
+        for name in list(at)[2:]:
+            ratio(f"{name} / {own_name}", at, name, own_name)
 
 
 def at_error(curve: Sequence[tuple[float, ...]], which: int) -> float:

@@ -84,7 +84,7 @@ def convergence_csv(result: Convergence) -> str:
 
 
 def _mark(curve: Curve) -> str:
-    """The character that stands for a curve."""
+    """The character that marks a curve."""
     return "*" if curve.sampler.endswith(RECONSTRUCTED) else SAMPLERS[curve.sampler].mark
 
 

@@ -26,7 +26,7 @@ from illumcli.visibility.obscurance_error import NO_HIT_QUANTILE, line
 POINTS = 512
 """Points of a round."""
 PRECISION = 0.05
-"""Standard error of the root mean square error, as a share of it, at which no further round is made."""
+"""Standard error of the root mean square error, as a share of it, at which the audit ends."""
 MAX_ROUNDS = 24
 LIMIT_SHARE, LEAST_LIMIT = 0.25, 1 << 18
 """No further round once an audit took so many of the rays of the values, but at least so many rays."""

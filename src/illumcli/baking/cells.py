@@ -108,16 +108,17 @@ def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int
         square[own[:, :, None] == np.where(is_cell, other, -1)[:, None]] = -1
         square = square.reshape(-1, square.shape[2])
         place, distance = _least(square, count)
-        found = np.take_along_axis(np.repeat(other, GROUP, axis=0), place, axis=1)
-        rows = slice(begin * GROUP, begin * GROUP + len(found))
-        out[rows, : found.shape[1]] = np.where(np.isfinite(distance), found, cells)
+        chosen = np.take_along_axis(np.repeat(other, GROUP, axis=0), place, axis=1)
+        rows = slice(begin * GROUP, begin * GROUP + len(chosen))
+        out[rows, : chosen.shape[1]] = np.where(np.isfinite(distance), chosen, cells)
     return out[:cells]
 
 
 def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: int) -> NDArray[np.int64]:
     """(B, count) the nearest boxes of each, itself among them; -1 where there are fewer.
 
-    Many boxes are searched in the groups of consecutive ones whose boxes are nearest, found the same way.
+    Many boxes are searched in the groups of consecutive ones whose boxes are nearest; those are chosen in the
+    same way.
     """
     boxes = len(low)
     if boxes <= BRUTE:
@@ -141,8 +142,8 @@ def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: in
             square += TOUCHING * np.square((at + end) - (least + most)[rows, None])
         square[np.broadcast_to(other < 0, square.shape)] = np.inf
         place, distance = _least(square, count)
-        found = np.take_along_axis(np.broadcast_to(other, square.shape), place, axis=1)
-        out[rows, : found.shape[1]] = np.where(np.isfinite(distance), found, -1)
+        chosen = np.take_along_axis(np.broadcast_to(other, square.shape), place, axis=1)
+        out[rows, : chosen.shape[1]] = np.where(np.isfinite(distance), chosen, -1)
     return out
 
 

@@ -111,19 +111,19 @@ class ReconstructedBake(Record):
             bent = points.n.copy()
             bent[closed] = raw.values.bent
 
-        # reconstructed values and theirs
-        made = reconstruct(points, self.cells, RawValues(hidden, variance, bent), context.threads)
-        w, risk = (1 - made.hidden[closed]).astype(F), made.risk[closed]
+        # reconstructed values and their risk
+        fit = reconstruct(points, self.cells, RawValues(hidden, variance, bent), context.threads)
+        w, risk = (1 - fit.hidden[closed]).astype(F), fit.risk[closed]
         clock.lap("reconstruct")
         mean_samples, mean_variance = (
             float(each.sum() / max(len(closed), 1)) for each in (samples, variance)
         )
         values = Audited(closed, w.astype(np.float64), risk, mean_samples, mean_variance)
         target = (context.settings.target_error or 0.0) / max(self.share, 1e-9) ** 0.5
-        found = audit(sampler, values, number, target)
+        measured = audit(sampler, values, number, target)
         clock.lap("audit")
-        directions = None if made.bent is None else made.bent[closed]
-        return Trial(samples, raw, w, risk, directions, made.windows, found, errors.rays)
+        directions = None if fit.bent is None else fit.bent[closed]
+        return Trial(samples, raw, w, risk, directions, fit.windows, measured, errors.rays)
 
     def ray_weights(self, trial: Trial) -> NDArray[np.float64]:
         """(K,) rays of each point for the least error, over their mean: more where neighbour rays disagree,
@@ -136,15 +136,15 @@ class ReconstructedBake(Record):
     def values(self, trials: Sequence[Trial]) -> SampledValues:
         """What is written of the last trial, and what all of them took."""
         last = trials[-1]
-        found = last.audit
-        low, high = found.interval(self.share)
+        measured = last.audit
+        low, high = measured.interval(self.share)
         about: dict[str, Any] = {
             "windows": {str(points): round(share, 4) for points, share in last.windows.items()},
             "audit": {
                 "low": low,
                 "high": high,
-                "points": found.points,
-                "samples": found.samples,
+                "points": measured.points,
+                "samples": measured.samples,
             },
         }
         rays = {
@@ -155,9 +155,9 @@ class ReconstructedBake(Record):
         }
         return SampledValues(
             last.w,
-            found.law.at(last.risk),
+            measured.law.at(last.risk),
             last.bent,
-            found.rmse(self.share),
+            measured.rmse(self.share),
             last.samples,
             rays,
             sum(trial.raw.resumed for trial in trials),

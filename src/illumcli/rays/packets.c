@@ -294,34 +294,28 @@ INLINE void patterns(const Patterns *of, int64_t width, const PatternResults *ou
   }
 }
 
+/* A constant width, so that each width has a loop of its own. */
+#define FOR_WIDTH(function, of, out)       \
+  switch ((of)->query.width) {             \
+    case 16: function(of, 16, out); break; \
+    case 8: function(of, 8, out); break;   \
+    case 4: function(of, 4, out); break;   \
+    default: function(of, 1, out);         \
+  }
+
 EXPORT int32_t illum_interface(void) { return INTERFACE; }
 
 /* 1 for each ray with a triangle between its origin and its limit. */
 EXPORT void illum_occluded(const Rays *of, uint8_t *out) {
-  switch (of->query.width) {
-    case 16: occluded(of, 16, out); break;
-    case 8: occluded(of, 8, out); break;
-    case 4: occluded(of, 4, out); break;
-    default: occluded(of, 1, out);
-  }
+  FOR_WIDTH(occluded, of, out)
 }
 
 /* The closest hit of each ray. */
 EXPORT void illum_closest(const Rays *of, const Hits *out) {
-  switch (of->query.width) {
-    case 16: closest(of, 16, out); break;
-    case 8: closest(of, 8, out); break;
-    case 4: closest(of, 4, out); break;
-    default: closest(of, 1, out);
-  }
+  FOR_WIDTH(closest, of, out)
 }
 
 /* Traces patterns of rays about points, and counts those that are open. */
 EXPORT void illum_patterns(const Patterns *of, const PatternResults *out) {
-  switch (of->query.width) {
-    case 16: patterns(of, 16, out); break;
-    case 8: patterns(of, 8, out); break;
-    case 4: patterns(of, 4, out); break;
-    default: patterns(of, 1, out);
-  }
+  FOR_WIDTH(patterns, of, out)
 }

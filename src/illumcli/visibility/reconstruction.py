@@ -6,7 +6,7 @@ around it. Objects are fitted apart: no value crosses from one object to another
 
 Pixels are grouped into cells of 2 x 2, whose moments are summed over square windows of a few radii. Each cell
 takes the radius of the least estimated risk, and pixels the bilinear mean of the polynomials of the cells
-around. Every sum is made in one order that does not depend on where a tile begins: the values are the same
+around. Every sum is taken in one order that does not depend on where a tile begins: the values are the same
 for any tiling.
 
 References
@@ -173,7 +173,7 @@ def _sum_cells(pixels: NDArray[np.float64], out: NDArray[np.float64]) -> None:
 def window_sums(planes: Planes, radius: int) -> Planes:
     """Sums over windows of (2 radius + 1)^2 cells, zero outside.
 
-    By halves of the window, so that each sum is made in the same order wherever the array begins.
+    By halves of the window, so that each sum is taken in the same order wherever the array begins.
     """
     out = np.empty_like(planes)
     rows, columns = planes.shape[1:]

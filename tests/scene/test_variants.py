@@ -67,6 +67,36 @@ def test_an_axis_that_says_nothing_is_refused(text):
         axis_of(text)
 
 
+@pytest.mark.parametrize(
+    ("text", "values", "names"),
+    [
+        ("a=rough:0.5,0.1", ["0.5", "0.1"], ["rough", "0.1"]),
+        ("a=red:[1,0,0],blue:[0,0,1]", ["[1,0,0]", "[0,0,1]"], ["red", "blue"]),
+        ("a=law: none,C:/a.obj,http://a", ["law: none", "C:/a.obj", "http://a"], None),
+        ("a=0:1:2", ["0", "1"], None),
+    ],
+)
+def test_a_value_may_have_a_name(text, values, names):
+    axis = axis_of(text)
+    assert list(axis.values) == values
+    assert list(axis.names) == (names or values)
+
+
+def test_labels_hold_what_differs(tmp_path):
+    rows = tmp_path / "rows.csv"
+    rows.write_text("label,m.a,m.b\nmatte,1,2\nshiny,3,2\n")
+    variants = variants_of(["s.c=small:4,8", "s.d=9"], rows=rows)
+    assert [variant.label for variant in variants] == [
+        "matte, small", "matte, c 8", "shiny, small", "shiny, c 8"
+    ]  # fmt: skip
+    assert variants[0].values == {"m.a": "1", "m.b": "2", "s.c": "4", "s.d": "9"}
+    assert variants[0].fields == {"frame": 0, "label": "matte", "s.c": "small"}
+    moving = variants_of(["s.c=2*frame", "s.d=5,6"], frames="3:4")
+    assert [variant.label for variant in moving] == [
+        "frame 3, d 5", "frame 4, d 5", "frame 3, d 6", "frame 4, d 6"
+    ]  # fmt: skip
+
+
 def test_grid_zip_rows_and_frames(tmp_path):
     def values(*args, **more):
         return [dict(variant.values) for variant in variants_of(*args, **more)]
@@ -85,6 +115,9 @@ def test_grid_zip_rows_and_frames(tmp_path):
         {"a": "1", "b": "[1,2,3]", "c": "7"},
         {"a": "2", "b": "x", "c": "7"},
     ]
+    rows.write_text("label,a\nmatte,1\n,2\nmatte,3\n")
+    with pytest.raises(InputError, match="2 rows have the label 'matte'"):
+        variants_of([], rows=rows)
     rows.write_text("a,b\n1\n")
     with pytest.raises(InputError, match="row 2 has 1 cells"):
         variants_of([], rows=rows)

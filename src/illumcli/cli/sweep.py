@@ -57,7 +57,7 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
     "overrides",
     multiple=True,
     metavar="PATH=VALUES",
-    help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog.",
+    help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog; NAME:VALUE names a value.",
 )
 @studio_options
 @click.option("--zip", "together", is_flag=True, help="First values together, then second ones, ...")

@@ -86,6 +86,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         outcome.number: digest(
             (
                 dict(outcome.variant.values),
+                dict(outcome.variant.names),
                 outcome.variant.frame,
                 [str(path) for path in outcome.paths],
                 outcome.planned.content,

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from illumcli.errors import InputError
 from illumcli.files.names import fields
-from illumcli.scene.variants import Variant
+from illumcli.scene.variants import LABEL, Variant
 
 
 def default_pattern(variants: Sequence[Variant]) -> str:
-    """A pattern that names every variant: by frame if frames differ, otherwise by the values that differ."""
+    """A pattern that names every variant: by frame if frames differ, otherwise by the names that differ."""
     if len({variant.frame for variant in variants}) > 1:
         return "{scene}.{frame:04d}.png"
     differ = [
-        name for name in variants[0].values if len({variant.values.get(name) for variant in variants}) > 1
+        path for path in variants[0].names if len({variant.names.get(path) for variant in variants}) > 1
     ]
     return "{scene}" + "".join(f"-{{{name}}}" for name in differ) + ".png"
 
@@ -33,10 +33,11 @@ def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:
 
     # Group the variants by those of their values that are in the name.
     same: dict[tuple[str | int | None, ...], list[int]] = {}
-    used = [path for path in variants[0].values if path in named]
+    used = [path for path in (*variants[0].values, LABEL) if path in named]
     for number, variant in enumerate(variants, 1):
-        values = [variant.values.get(path) for path in used]
-        same.setdefault((*values, variant.frame if "frame" in named else None), []).append(number)
+        names = {**variant.values, **variant.names}
+        shown = [names.get(path) for path in used]
+        same.setdefault((*shown, variant.frame if "frame" in named else None), []).append(number)
 
     # Refuse groups of several variants.
     for numbers in same.values():

@@ -32,7 +32,7 @@ def write_sheet(path: Path, outcomes: Sequence[Outcome], content: str) -> None:
     from illumcli.images.contact_sheet import write_contact_sheet
 
     rendered = [outcome for outcome in outcomes if outcome.report is not None]
-    labels = [outcome.variant.label or f"frame {outcome.variant.frame}" for outcome in rendered]
+    labels = [outcome.label for outcome in rendered]
     write_contact_sheet(path, map(_display_values, rendered), labels, content)
 
 

@@ -12,6 +12,7 @@ from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_reference import Reference, written_colors
 from illumcli.files.reports import sealed_csv
 from illumcli.film.metrics import difference
+from illumcli.scene.variants import LABEL
 
 Cell: TypeAlias = object
 
@@ -22,9 +23,11 @@ def sweep_table(outcomes: Sequence[Outcome], contents: Sequence[str], reference:
     paths = list(dict.fromkeys(name for outcome in outcomes for name in outcome.variant.values))
     against = None if reference is None else _pixels(reference, outcomes)
     measures = ["mean"] + (["rmse", "largest"] if reference is not None else [])
-    columns = ["variant", "frame", *paths, "file", "content", "state", "seconds", "rays", "reused", *measures]
+    named = any(outcome.variant.names != outcome.variant.values for outcome in outcomes)
+    ahead = ["variant", "frame", *([LABEL] if named else []), *paths]
+    columns = [*ahead, "file", "content", "state", "seconds", "rays", "reused", *measures]
     rows = [
-        [*_row(outcome, content, paths), *_measures(outcome, against)]
+        [*_row(outcome, content, paths, named), *_measures(outcome, against)]
         for outcome, content in zip(outcomes, contents, strict=True)
     ]
     return sealed_csv(columns, rows)
@@ -35,12 +38,13 @@ def _pixels(reference: Reference, outcomes: Sequence[Outcome]) -> NDArray[np.flo
     return written_colors(files[0])[0] if files else reference.pixels
 
 
-def _row(outcome: Outcome, content: str, paths: Sequence[str]) -> list[Cell]:
+def _row(outcome: Outcome, content: str, paths: Sequence[str], named: bool) -> list[Cell]:
     """Values of a variant, its file and state, and the time and rays it took."""
     report = outcome.report
     file = outcome.paths[0] if outcome.paths else ""
     values = [outcome.variant.values.get(path, "") for path in paths]
-    row = [outcome.number, outcome.variant.frame, *values, file, content]
+    label = [outcome.label] if named else []
+    row = [outcome.number, outcome.variant.frame, *label, *values, file, content]
     if report is None:
         return [*row, "failed", "", "", 0]
     reused = sum(len(names) for names in report.reused.values())

@@ -39,7 +39,7 @@ class SweepWorks:
         if outcome.number not in self._held:
             overrides = tuple(outcome.variant.overrides)
             of_variant = replace(self.options, overrides=overrides, audit=False)
-            job = RenderJob(self._path, of_variant, {"frame": outcome.variant.frame})
+            job = RenderJob(self._path, of_variant, outcome.variant.fields)
             loaded = load(self._path, overrides, self._text)
             self._held[outcome.number] = work_of(job, loaded, self._files)
         return self._held[outcome.number]

@@ -7,7 +7,9 @@ import io
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,10 @@ LAST_FRAME = 2**53
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)(log)?")
+_NAMED = re.compile(r"([A-Za-z_][\w.+-]*):(?![\s/\\])(.+)", re.DOTALL)
+"""NAME:VALUE. A colon before a space belongs to YAML, one before a slash to a file or an address."""
+LABEL = "label"
+"""The column of `--rows` that names the rows."""
 
 
 class Axis(Value):
@@ -32,6 +38,8 @@ class Axis(Value):
 
     path: str
     values: tuple[str, ...]
+    names: tuple[str, ...]
+    """Name of each value: its own text where it was given none."""
 
 
 class Variant(Value):
@@ -39,6 +47,10 @@ class Variant(Value):
 
     values: Mapping[str, str]
     frame: int = 0
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Path -> name of its value, by default the value. The name of a row, as `label`, replaces its paths."""
+    label: str = ""
+    """What differs from other variants: the frame, names, other values after the last part of their paths."""
 
     @property
     def overrides(self) -> list[str]:
@@ -46,9 +58,10 @@ class Variant(Value):
         return [f"{path}={value}" for path, value in self.values.items()]
 
     @property
-    def label(self) -> str:
-        """The last part of each path, and its value."""
-        return ", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in self.values.items())
+    def fields(self) -> dict[str, str | int]:
+        """Fields for names of files: the frame and all names that are not the values themselves."""
+        named = {path: name for path, name in self.names.items() if name != self.values.get(path)}
+        return {"frame": self.frame, **named}
 
 
 def variants_of(
@@ -59,12 +72,14 @@ def variants_of(
     Parameters
     ----------
     texts : sequence of str
-        `PATH=a,b,c`, `PATH=START:STOP:COUNT` or `PATH=START:STOP:COUNTlog`, the arguments of `-D`.
+        `PATH=a,b,c`, `PATH=START:STOP:COUNT` or `PATH=START:STOP:COUNTlog`, the arguments of `-D`. A value
+        may be `NAME:VALUE`.
     together : bool
         Combine the first values, the second values, and so on; otherwise every value with every other, the
         last path fastest.
     rows : Path, optional
-        CSV: paths in its first line, the values of a variant in each other line.
+        CSV: paths in its first line, the values of a variant in each other line. A column `label` has the
+        names of the rows.
     frames : str, optional
         `FIRST:LAST` or `FIRST:LAST:STEP`, both ends included; values may be formulas of `frame`.
 
@@ -75,7 +90,7 @@ def variants_of(
     # Values of each path, rows of the table, frames; refuse too many.
     numbers = _frames(frames) if frames else None
     axes = [axis_of(text) for text in texts]
-    table = _rows(rows) if rows else [{}]
+    table = _rows(rows) if rows else [_Point({}, {})]
     lengths = [len(axis.values) for axis in axes]
     count = max(lengths, default=1) if together else math.prod(lengths)
     count *= len(table) * (1 if numbers is None else len(numbers))
@@ -84,16 +99,24 @@ def variants_of(
 
     # All combinations of them.
     grid = list(_together(axes) if together else _grid(axes))
+    points = [
+        _Point({**row.values, **point.values}, {**row.names, **point.names})
+        for row, point in itertools.product(table, grid)
+    ]
+    differ = [path for path in points[0].names if len({point.names[path] for point in points}) > 1]
     variants = []
-    for row, point in itertools.product(table, grid):
-        values = {**row, **point}
+    for values, names in ((point.values, point.names) for point in points):
+        label = [
+            f"{path.rpartition('.')[2]} {names[path]}" if names[path] == values.get(path) else names[path]
+            for path in differ
+        ]
         if numbers is None:
-            variants.append(Variant(values))
-        else:
-            variants += [
-                Variant({path: at_frame(path, value, n) for path, value in values.items()}, n)
-                for n in numbers
-            ]
+            variants.append(Variant(values, 0, names, ", ".join(label)))
+        for n in numbers or ():
+            values_then, names_then = (
+                {path: at_frame(path, text, n) for path, text in texts.items()} for texts in (values, names)
+            )
+            variants.append(Variant(values_then, n, names_then, ", ".join([f"frame {n}", *label])))
     return variants
 
 
@@ -103,11 +126,18 @@ def axis_of(text: str) -> Axis:
     if not equals or not path.strip():
         raise InputError(f"-D {text}: write PATH=a,b,c or PATH=START:STOP:COUNT")
     if span := _RANGE.fullmatch(value.strip()):
-        return Axis(path.strip(), _range(text, span))
-    values = tuple(part.strip() for part in split_at_commas(value))
-    if not all(values):
+        numbers = _range(text, span)
+        return Axis(path.strip(), numbers, numbers)
+    parts = [part.strip() for part in split_at_commas(value)]
+    if not all(parts):
         raise InputError(f"-D {text}: a value is empty; write null to take a part away")
-    return Axis(path.strip(), values)
+    named = [_NAMED.fullmatch(part) for part in parts]
+    values = tuple(match[2] if match else part for match, part in zip(named, parts, strict=True))
+    return Axis(
+        path.strip(),
+        values,
+        tuple(match[1] if match else part for match, part in zip(named, parts, strict=True)),
+    )
 
 
 def _range(text: str, span: re.Match[str]) -> tuple[str, ...]:
@@ -177,12 +207,26 @@ def _frames(text: str) -> range:
     return range(first, last + 1, step)
 
 
-def _grid(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
-    for values in itertools.product(*(axis.values for axis in axes)):
-        yield dict(zip((axis.path for axis in axes), values, strict=True))
+class _Point(Value):
+    """The values that some axes or a row take together, and what they are called."""
+
+    values: Mapping[str, str]
+    names: Mapping[str, str]
 
 
-def _together(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
+def _point(axes: Sequence[Axis], at: Sequence[int]) -> _Point:
+    pairs = list(zip(axes, at, strict=True))
+    return _Point(
+        {axis.path: axis.values[k] for axis, k in pairs}, {axis.path: axis.names[k] for axis, k in pairs}
+    )
+
+
+def _grid(axes: Sequence[Axis]) -> Iterator[_Point]:
+    for at in itertools.product(*(range(len(axis.values)) for axis in axes)):
+        yield _point(axes, at)
+
+
+def _together(axes: Sequence[Axis]) -> Iterator[_Point]:
     count = max((len(axis.values) for axis in axes), default=1)
     odd = [axis for axis in axes if len(axis.values) not in (1, count)]
     if odd:
@@ -191,11 +235,11 @@ def _together(axes: Sequence[Axis]) -> Iterator[dict[str, str]]:
              for axis in odd]
         )  # fmt: skip
     for k in range(count):
-        yield {axis.path: axis.values[k % len(axis.values)] for axis in axes}
+        yield _point(axes, [k % len(axis.values) for axis in axes])
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a CSV of overrides, path -> value."""
+def _rows(path: Path) -> list[_Point]:
+    """The rows of a CSV of overrides; those of a table with a column `label` are called by it."""
     # Read the lines that are not blank.
     try:
         with path.open("rb") as file:
@@ -220,4 +264,16 @@ def _rows(path: Path) -> list[dict[str, str]]:
         problems.append(f"{path}: the first line must name a different path for every column")
     if problems:
         raise InputError(problems)
-    return [dict(zip(head, (cell.strip() for cell in line), strict=True)) for line in lines[1:]]
+    rows = [dict(zip(head, (cell.strip() for cell in line), strict=True)) for line in lines[1:]]
+    if LABEL not in head:
+        return [_Point(row, row) for row in rows]
+    labels = [row.pop(LABEL) for row in rows]
+    twice = [label for label, count in Counter(labels).items() if count > 1]
+    if twice:
+        raise InputError(
+            [
+                f"{path}: {labels.count(label)} rows have the label '{label}'; give each its own"
+                for label in twice
+            ]
+        )
+    return [_Point(row, {LABEL: label}) for row, label in zip(rows, labels, strict=True)]

@@ -24,10 +24,11 @@ from illumcli.film.view import View
 from illumcli.rays.sampling import stream
 from illumcli.records import Record
 from illumcli.render_graph.build import Graph, build
-from illumcli.render_graph.execute import Planes, Run, bands, run_once
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.schedule import needed_buffers, outputs_of
+from illumcli.render_graph.tile_nodes import Planes
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 

@@ -20,13 +20,14 @@ from illumcli.geometry.repairs import Repairs
 from illumcli.progress import Progress, no_progress
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import without_objects
-from illumcli.render_graph.execute import RenderStats, Run, run_once
+from illumcli.render_graph.execute import Run, run_once
 from illumcli.render_graph.explain import why_not
 from illumcli.render_graph.framing import place_cameras
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.proportions import disproportion_lines
 from illumcli.render_graph.repairs import refuse_repairs, repairs
 from illumcli.render_graph.schedule import shared_keys
+from illumcli.render_graph.tile_nodes import RenderStats
 
 
 def render_scene(job: RenderJob, progress: Progress = no_progress) -> tuple[list[Path], Report]:

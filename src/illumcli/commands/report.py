@@ -12,8 +12,8 @@ from illumcli.geometry.repairs import Repairs
 from illumcli.memory import peak_memory
 from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.records import Value
-from illumcli.render_graph.execute import RenderStats
 from illumcli.render_graph.repairs import repairs_data
+from illumcli.render_graph.tile_nodes import RenderStats
 from illumcli.versions import versions
 
 

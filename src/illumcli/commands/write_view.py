@@ -16,9 +16,10 @@ from illumcli.film.tiles import Tile
 from illumcli.graph import Buffers
 from illumcli.progress import Progress
 from illumcli.records import Value
-from illumcli.render_graph.execute import Planes, Run, bands
+from illumcli.render_graph.execute import Run, bands
 from illumcli.render_graph.needs import reconstructs
 from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.tile_nodes import Planes
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Scene
 

@@ -16,7 +16,7 @@ import pytest
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.inputs import prepare_bake
 from illumcli.baking.sampling import BakeSampler
-from illumcli.baking.settings import BakeOptions, BakeSettings
+from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.files.journal import place
 
 RAYS = 1 << 10
@@ -182,7 +182,7 @@ def test_no_planted_file_is_written_through_or_waited_for(mesh, tmp_path, kind):
         pytest.skip("only root can plant a file of another user")
     out, victim = tmp_path / "out.npz", tmp_path / "victim"
     victim.write_text("precious")
-    where = place(out, prepare_bake(mesh, [out], BakeSettings(samples=64)).content)
+    where = place(out, prepare_bake(BakeJob(mesh, (out,), BakeSettings(samples=64))).content)
     match kind:
         case "symbolic link":
             where.symlink_to(victim)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -23,7 +22,7 @@ from illumcli.baking.outputs import write_outputs
 from illumcli.baking.report import BakeReport
 from illumcli.baking.resume import open_journal, write_beside
 from illumcli.baking.sampling import MAX_SAMPLES
-from illumcli.baking.settings import AS_USUAL, BakeOptions, BakeSettings
+from illumcli.baking.settings import AS_USUAL, BakeJob, BakeOptions, BakeSettings
 from illumcli.baking.values import baked_values
 from illumcli.files.journal import Journal, tidy
 from illumcli.files.outputs import refresh
@@ -54,17 +53,14 @@ def bake_mesh(
     InputError, LimitError, OutputError
         Before anything is baked, if the fault can be found by then.
     """
-    return bake_prepared(prepare_bake(path, outputs, settings, options), options.threads, progress)
+    return bake_prepared(prepare_bake(BakeJob(path, tuple(outputs), settings, options)), progress)
 
 
-def bake_prepared(
-    work: BakeWork, threads: int | None = None, progress: Progress = no_progress
-) -> tuple[list[Path], BakeReport]:
+def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[list[Path], BakeReport]:
     """Bake a prepared input."""
-    threads = threads or len(os.sched_getaffinity(0))
-
     # Refresh the files that are kept.
-    kept = [path for path in work.outputs if path not in work.due]
+    due = work.due()
+    kept = [path for path in work.outputs if path not in due]
     for path in kept:
         refresh(path)
     work.clock.lap("read")
@@ -73,20 +69,20 @@ def bake_prepared(
     values: PointValues | None = None
     left_out: Sequence[str] = ()
     warnings: list[str] = []
-    if work.due:
+    if due:
         with closing(open_journal(work.outputs[0], work.content)) as journal:
-            values = point_values(work, threads, progress, journal)
+            values = point_values(work, progress, journal)
             baked = replace(baked_values(values), about=description(work, values.statistics))
-            write = partial(write_outputs, work, baked)
+            write = partial(write_outputs, work, due, baked)
             left_out = write_beside(journal, write)
             warnings = [*warnings_of(work.settings, values), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])
-    return list(work.outputs), bake_report(work, threads, values, left_out, warnings)
+    return list(work.outputs), bake_report(work, due, values, left_out, warnings)
 
 
-def point_values(work: BakeWork, threads: int, progress: Progress, journal: Journal) -> PointValues:
+def point_values(work: BakeWork, progress: Progress, journal: Journal) -> PointValues:
     """Obscurance of every point at a vertex, by the method of the settings."""
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
@@ -95,7 +91,8 @@ def point_values(work: BakeWork, threads: int, progress: Progress, journal: Jour
         settings.samples, wanted.falloff, geometry.render_space.radius, wanted.sampler, wanted.faces
     )
     work.clock.lap("build")
-    context = BakeContext(work.surfaces, occluders, method, settings, threads, progress, work.clock, journal)
+    threads, clock = work.job.threads, work.clock
+    context = BakeContext(work.surfaces, occluders, method, settings, threads, progress, clock, journal)
     return METHODS[settings.method](context)
 
 
@@ -148,9 +145,13 @@ def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
 
 
 def bake_report(
-    work: BakeWork, threads: int, values: PointValues | None, left_out: Sequence[str], warnings: list[str]
+    work: BakeWork,
+    due: Sequence[Path],
+    values: PointValues | None,
+    left_out: Sequence[str],
+    warnings: list[str],
 ) -> BakeReport:
-    """The report of a bake; `values` are None if every output is kept."""
+    """The report of a bake that wrote the files `due`; `values` are None if every output is kept."""
     # If nothing was computed, the counts are 0.
     statistics = SampleStatistics() if values is None else values.statistics
     vertices = None if values is None else values.vertices
@@ -159,7 +160,7 @@ def bake_report(
         input=str(work.path),
         content=work.content,
         seed=work.settings.seed,
-        threads=threads,
+        threads=work.job.threads,
         vertices=len(work.surfaces.geometry.vertices),
         triangles=len(work.surfaces.geometry.triangles),
         unreferenced=vertices.unreferenced if vertices else 0,
@@ -180,6 +181,6 @@ def bake_report(
         left_out=list(left_out),
         warnings=warnings,
         seconds=dict(work.clock.seconds),
-        written=[str(path) for path in work.due],
-        kept=[str(path) for path in work.outputs if path not in work.due],
+        written=[str(path) for path in due],
+        kept=[str(path) for path in work.outputs if path not in due],
     )

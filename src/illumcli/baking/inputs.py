@@ -16,7 +16,7 @@ from illumcli import __version__
 from illumcli.baking.context import StageClock
 from illumcli.baking.files import SUFFIXES, baked_contents
 from illumcli.baking.points import Surfaces
-from illumcli.baking.settings import AS_USUAL, BakeOptions, BakeSettings
+from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.errors import InputError
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.repairs import Repairs
@@ -35,11 +35,7 @@ from illumcli.visibility.baked import mesh_hash
 class BakeWork(Record):
     """A bake whose meshes have been read: its surfaces, and the files to write."""
 
-    path: Path
-    outputs: tuple[Path, ...]
-    due: tuple[Path, ...]
-    """Outputs to write: those that do not exist with the same content."""
-    settings: BakeSettings
+    job: BakeJob
     scene: Scene
     surfaces: Surfaces
     hashes: tuple[str, ...]
@@ -49,10 +45,36 @@ class BakeWork(Record):
     repairs: Repairs
     clock: StageClock
 
+    @property
+    def path(self) -> Path:
+        """The input."""
+        return self.job.path
 
-def prepare_bake(
-    path: Path, outputs: Sequence[Path], settings: BakeSettings, options: BakeOptions = AS_USUAL
-) -> BakeWork:
+    @property
+    def outputs(self) -> tuple[Path, ...]:
+        """The files of the bake."""
+        return self.job.outputs
+
+    @property
+    def settings(self) -> BakeSettings:
+        """The settings of the bake."""
+        return self.job.settings
+
+    def due(self) -> tuple[Path, ...]:
+        """The outputs to write: those that do not exist with the same content.
+
+        Raises
+        ------
+        OutputError
+            A different file exists and the job has not `force`; a file cannot be written.
+        """
+        force = self.job.options.force
+        return tuple(
+            each for each in self.outputs if not is_kept(each, [self.content], baked_contents, force)
+        )
+
+
+def prepare_bake(job: BakeJob) -> BakeWork:
     """Read the meshes of a bake, and refuse what is certain to fail; no ray is cast.
 
     Raises
@@ -65,6 +87,7 @@ def prepare_bake(
         The meshes do not fit into memory.
     """
     # Check the names of the outputs.
+    path, outputs, settings, options = job.path, job.outputs, job.settings, job.options
     refuse_outputs(outputs)
     if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
@@ -84,10 +107,9 @@ def prepare_bake(
     content = content_hash(loaded.scene, hashes, surfaces.normals, settings)
     if options.strict:
         refuse_repairs(str(path), repairs)
-    due = tuple(each for each in outputs if not is_kept(each, [content], baked_contents, options.force))
-    return BakeWork(
-        path, tuple(outputs), due, settings, loaded.scene, surfaces, hashes, content, repairs, clock
-    )
+    work = BakeWork(job, loaded.scene, surfaces, hashes, content, repairs, clock)
+    work.due()
+    return work
 
 
 def refuse_outputs(outputs: Sequence[Path]) -> None:

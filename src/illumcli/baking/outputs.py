@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,8 +16,8 @@ GlbParts: TypeAlias = tuple[tuple[dict[str, Any], bytes], list[tuple[int, int, i
 """JSON and binary chunk of a GLB, and (mesh, primitive, vertices) in the order of its reader."""
 
 
-def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
-    """Write the files that are due. Returns a line for each part of the meshes that they lack."""
+def write_outputs(work: BakeWork, due: Sequence[Path], baked: Baked) -> tuple[str, ...]:
+    """Write the files `due`. Returns a line for each part of the meshes that they lack."""
     left_out: list[str] = []
 
     @cache
@@ -26,7 +26,7 @@ def write_outputs(work: BakeWork, baked: Baked) -> tuple[str, ...]:
         left_out.extend(written.left_out)
         return written
 
-    for path in work.due:
+    for path in due:
         _write(path, work, baked, meshes)
     return tuple(left_out)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import field
+from pathlib import Path
 from typing import Any
 
 from illumcli.records import Value
@@ -57,3 +59,17 @@ class BakeOptions(Value):
 
 
 AS_USUAL = BakeOptions()
+
+
+class BakeJob(Value):
+    """One input of a bake with its settings, a unit of work: see `commands/unit.py`."""
+
+    path: Path
+    outputs: tuple[Path, ...]
+    settings: BakeSettings
+    options: BakeOptions = AS_USUAL
+
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+        return self.options.threads or len(os.sched_getaffinity(0))

@@ -71,10 +71,10 @@ def render(
     from illumcli.commands import render_all as job
 
     def written(done: Rendered) -> None:
-        if done.counts and not quiet:
+        if done.report.chosen and not quiet:
             error = done.report.error
             reached = f"for an error of {error['target']:g}; reached {error['reached']:.3g}"
-            say(f"{done.scene}: {' '.join(done.counts)}, {reached}")
+            say(f"{done.scene}: {' '.join(done.report.chosen)}, {reached}")
         print_paths(done.paths)
         _say_report(done, quiet, verbose)
 

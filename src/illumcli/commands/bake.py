@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from illumcli.baking.bake import bake_prepared
-from illumcli.baking.inputs import BakeWork, prepare_bake
+from illumcli.baking.inputs import BakeWork
 from illumcli.baking.report import BakeReport
-from illumcli.baking.settings import BakeOptions, BakeSettings
+from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
+from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
 from illumcli.progress import Progress
 from illumcli.records import Value
@@ -29,9 +29,9 @@ class BakeRequest(Value):
         """The files of one input."""
         return [Path(expand(pattern, {"scene": path.stem})) for pattern in self.patterns]
 
-    def prepare(self, path: Path) -> BakeWork:
-        """The work of one input; reads its meshes."""
-        return prepare_bake(path, self.outputs(path), self.settings, self.options)
+    def job(self, path: Path) -> BakeJob:
+        """The unit of work of one input."""
+        return BakeJob(path, tuple(self.outputs(path)), self.settings, self.options)
 
 
 def bake_inputs(
@@ -51,7 +51,7 @@ def bake_inputs(
     IllumError
         At the end if any input failed; at once if files have equal names or the report cannot be written.
     """
-    batch = Batch("inputs", len(inputs), request.keep_going, tell)
+    worker, batch = Worker(), Batch("inputs", len(inputs), request.keep_going, tell)
     entries = BatchReport(report, [{"input": str(path)} for path in inputs])
     check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
 
@@ -59,7 +59,7 @@ def bake_inputs(
     single: BakeWork | None = None
     for index in batch.due():
         with batch.piece(index):
-            work = request.prepare(inputs[index])
+            work = worker.prepare(request.job(inputs[index]))
             entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
             single = work if len(inputs) == 1 else None
             del work
@@ -68,8 +68,8 @@ def bake_inputs(
     # Bake.
     for index in batch.due():
         with batch.piece(index):
-            work = single or request.prepare(inputs[index])
-            paths, done = bake_prepared(work, request.options.threads, progress)
+            work = single or worker.prepare(request.job(inputs[index]))
+            paths, done = worker.run(work, progress)
             entries.add(index, done.as_data())
             written(inputs[index], paths, done)
     return entries.finish(batch)

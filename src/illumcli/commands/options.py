@@ -37,9 +37,11 @@ class RenderOptions(Value):
 
 
 class RenderJob(Value):
-    """One scene with its options: the unit of work. It can be pickled and sent to another process."""
+    """One scene with its options, a unit of work: see `commands/unit.py`."""
 
     scene: Path
     options: RenderOptions = RenderOptions()
+    cameras: tuple[str, ...] = ()
+    """Names of the cameras whose images are rendered; by default all."""
     fields: Mapping[str, Any] = field(default_factory=dict)
     """Further fields for the names of its files, such as `frame`."""

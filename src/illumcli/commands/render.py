@@ -8,12 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import NO_CACHE, Cache
-from illumcli.cache.store import open_store
 from illumcli.commands.options import RenderJob
 from illumcli.commands.report import Report
-from illumcli.commands.work import Work, prepared, unused_keys
+from illumcli.commands.unit import Worker
+from illumcli.commands.work import Work, unused_keys
 from illumcli.commands.write_view import write_view
 from illumcli.files.outputs import refresh
 from illumcli.geometry.repairs import Repairs
@@ -38,25 +37,11 @@ def render_scene(job: RenderJob, progress: Progress = no_progress) -> tuple[list
     InputError, LimitError, OutputError
         Before anything is rendered, if the fault can be found by then.
     """
-    start = time.perf_counter()
-    paths, report = render_prepared(prepared(job), progress)
-    return paths, replace(report, total_seconds=time.perf_counter() - start)
-
-
-def render_prepared(
-    work: Work, progress: Progress = no_progress, memory: MemoryCache | None = None
-) -> tuple[list[Path], Report]:
-    """The same for a scene that was loaded and planned already; `memory` may hold some of its buffers."""
-    start = time.perf_counter()
-    store = open_store() if work.job.options.cache else None
-    report = rendered(work, Cache(store, memory or MemoryCache()), progress)
-    warnings = [*report.warnings, *unused_keys(work)]
-    if store is not None:
-        store.finish()
-        warnings += [store.warning] if store.warning else []
-    seconds = time.perf_counter() - start
-    report = replace(report, warnings=tuple(warnings), total_seconds=seconds)
-    return [target.path for target in work.targets], report
+    start, worker = time.perf_counter(), Worker()
+    work = worker.prepare(job)
+    paths, report = worker.run(work, progress)
+    warnings = (*report.warnings, *unused_keys(work), *worker.finish())
+    return paths, replace(report, warnings=warnings, total_seconds=time.perf_counter() - start)
 
 
 def rendered(

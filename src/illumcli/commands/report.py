@@ -43,6 +43,8 @@ class Report(Value):
     clamped: int = 0
     error: Mapping[str, float] = field(default_factory=dict)
     """The target error, the error reached, and the sample counts; empty without a target."""
+    chosen: tuple[str, ...] = ()
+    """The overrides with these counts."""
     standard_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Camera -> mean and root mean square of its layer `error`, if that was rendered."""
     audited_error: Mapping[str, Mapping[str, str | float]] = field(default_factory=dict)

@@ -9,12 +9,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from illumcli.cache.memory import MemoryCache
-from illumcli.cache.recorder import Cache
-from illumcli.cache.store import open_store
 from illumcli.commands.batch import Batch
 from illumcli.commands.options import RenderOptions
-from illumcli.commands.render import rendered
 from illumcli.commands.report import Report
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
@@ -105,14 +101,12 @@ def _rendered(
     written: Callable[[Outcome], None],
 ) -> tuple[list[Outcome], list[str]]:
     """The outcomes with their reports, and warnings."""
-    store, memory = open_store() if works.options.cache else None, MemoryCache()
-    cache = Cache(store, memory)
     done = list(outcomes)
     following = following_due(done)
     last: Report | None = None
 
     def images(upcoming: Work | None, outcome: Outcome) -> Outcome:
-        report = rendered(works.of(outcome), cache, progress, upcoming)
+        _, report = works.worker.run(works.of(outcome), progress, upcoming)
         outcome = replace(outcome, report=report.sharing(last))
         written(outcome)
         return outcome
@@ -126,15 +120,10 @@ def _rendered(
         done[index] = _attempt(done[index], partial(images, upcoming), batch, written)
         last = done[index].report or last
         works.drop(done[index])
-        memory.retire()
 
     # Collect the warnings.
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
-    warnings = list(dict.fromkeys(of_images))
-    if store is not None:
-        store.finish()
-        warnings += [store.warning] if store.warning else []
-    return done, warnings
+    return done, [*dict.fromkeys(of_images), *works.worker.finish()]
 
 
 def _attempt(

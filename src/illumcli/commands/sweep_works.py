@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 
-from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
 from illumcli.commands.sweep_reference import channel_count
-from illumcli.commands.work import Work, work_of
-from illumcli.scene.load import SceneText, load, read_text
+from illumcli.commands.unit import Worker
+from illumcli.commands.work import Work
 
 HELD = 256
 """The work of so many variants is held from planning until rendering, some 80 kB each; later variants are
@@ -19,29 +17,23 @@ prepared twice."""
 
 
 class SweepWorks:
-    """Prepares the work of variants, and holds it until it is dropped.
-
-    The scene and the files that it names are read once for all variants; later changes to them are ignored.
-    """
+    """The units of a sweep, one per variant; holds the work of each until it is dropped."""
 
     def __init__(self, path: Path, options: RenderOptions) -> None:
         self._path = path
         self.options = options
-        self._files = FileFingerprints()
+        self.worker = Worker()
         self._held: dict[int, Work] = {}
 
-    @cached_property
-    def _text(self) -> SceneText:
-        return read_text(self._path)
+    def unit(self, outcome: Outcome) -> RenderJob:
+        """The unit of work of a variant."""
+        options = replace(self.options, overrides=tuple(outcome.variant.overrides), audit=False)
+        return RenderJob(self._path, options, fields={"frame": outcome.variant.frame})
 
     def of(self, outcome: Outcome) -> Work:
         """The work of a variant."""
         if outcome.number not in self._held:
-            overrides = tuple(outcome.variant.overrides)
-            of_variant = replace(self.options, overrides=overrides, audit=False)
-            job = RenderJob(self._path, of_variant, outcome.variant.fields)
-            loaded = load(self._path, overrides, self._text)
-            self._held[outcome.number] = work_of(job, loaded, self._files)
+            self._held[outcome.number] = self.worker.prepare(self.unit(outcome))
         return self._held[outcome.number]
 
     def drop(self, outcome: Outcome) -> None:

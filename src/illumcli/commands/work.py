@@ -102,6 +102,8 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
     patterns = (given,) if given else graph.scene.outputs.files
     targets = []
     for view in graph.views:
+        if job.cameras and view.name not in job.cameras:
+            continue
         for number, pattern in enumerate(patterns):
             suffix = Path(pattern).suffix.lower()
             if suffix not in (".exr", ".png"):

@@ -45,7 +45,7 @@ HOMES = {
     "pydantic_core": ("nowhere: it is no dependency of ours",),
     "embreex": ("rays/",),
     "OpenImageIO": ("images/openimageio.py",),
-    "matplotlib": ("brdf/", "accuracy/"),
+    "matplotlib": ("brdf/", "accuracy/", "images/sheet_drawing.py"),
 }
 
 

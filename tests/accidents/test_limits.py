@@ -128,8 +128,7 @@ def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(py
         assert int(kilobytes) < 500 * 1024, each
 
 
-def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path):
-    """One column of 60,000 pixels makes cells of 15 million; 90,000 variants make as many cells."""
+def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path, monkeypatch):
     from illumcli.commands.options import RenderOptions
     from illumcli.commands.sweep import sweep_scene
     from illumcli.commands.sweep_files import SweepFiles
@@ -139,7 +138,8 @@ def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_pa
     (tmp_path / "s.yaml").write_text(f"{start}film: {{width: 1, height: 60000, samples: 1}}\n")
     settings = RenderOptions(pattern=str(tmp_path / "{seed}.png"), cache=False)
     files = SweepFiles(sheet=tmp_path / "sheet.png")
-    with pytest.raises(LimitError, match="a sheet of 8 pictures, 256 x 15360000 pixels each: takes about"):
+    monkeypatch.setattr("illumcli.memory.free_memory", lambda: 2 << 20)
+    with pytest.raises(LimitError, match="a sheet of 8 pictures, up to 1 x 60000 pixels: takes about"):
         sweep_scene(tmp_path / "s.yaml", variants_of(["seed=1:8:8"]), settings, files)
     assert not list(tmp_path.glob("*.png"))
 

@@ -93,7 +93,7 @@ def test_labels_hold_what_differs(tmp_path):
     assert variants[0].fields == {"frame": 0, "label": "matte", "s.c": "small"}
     moving = variants_of(["s.c=2*frame", "s.d=5,6"], frames="3:4")
     assert [variant.label for variant in moving] == [
-        "frame 3, d 5", "frame 4, d 5", "frame 3, d 6", "frame 4, d 6"
+        "d 5, frame 3", "d 5, frame 4", "d 6, frame 3", "d 6, frame 4"
     ]  # fmt: skip
 
 

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 def _files(options: dict[str, Any]) -> SweepFiles:
     from illumcli.commands.sweep_files import SweepFiles
 
+    if options["columns"] is not None and options["sheet"] is None:
+        raise click.UsageError("--columns is for --sheet; give --sheet, too")
     if options["reference"] is not None and options["table"] is None:
         raise click.UsageError("--reference is for the errors in --table; give --table, too")
     return taken(SweepFiles, options)
@@ -69,7 +71,12 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 )
 @pattern_option
 @only_option
-@click.option("--sheet", type=FILE, metavar="FILE.png", help="Write a contact sheet, labelled.")
+@click.option("--sheet", type=FILE, metavar="FILE", help="Write a contact sheet, labelled: .png, .svg, .pdf.")
+@click.option(
+    "--columns",
+    type=click.IntRange(1, 1000),
+    help="Pictures along a row of the sheet; by default the last -D.",
+)
 @click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, error.")
 @click.option("--reference", metavar="N|FILE", help="Reference of the table's errors: variant N or an image.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")

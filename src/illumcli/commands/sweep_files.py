@@ -9,11 +9,10 @@ from typing import Any
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_reference import Reference, reference_of
-from illumcli.commands.sweep_sheet import refuse_large_sheet, write_sheet
+from illumcli.commands.sweep_sheet import refuse_sheet, sheet_contents, write_sheet
 from illumcli.commands.sweep_table import sweep_table
 from illumcli.files.outputs import INCOMPLETE, is_complete, is_kept, refresh, refuse_suffix
 from illumcli.files.reports import report_contents, sealed_json
-from illumcli.images.contents import image_contents
 from illumcli.records import Value
 
 
@@ -21,6 +20,8 @@ class SweepFiles(Value):
     """The files to write about all variants."""
 
     sheet: Path | None = None
+    columns: int | None = None
+    """Of the sheet; by default the values of the path that varies fastest, if they make a grid."""
     table: Path | None = None
     report: Path | None = None
     reference: str | None = None
@@ -45,11 +46,11 @@ class PlannedFiles(Value):
         if files.table is not None and files.table not in self.kept:
             write_text(files.table, sweep_table(outcomes, contents, self.reference))
         if files.sheet is not None and files.sheet not in self.kept:
-            content = content_of_all(contents)
-            if content == INCOMPLETE and is_complete(files.sheet, image_contents):
+            content = content_of_all([*contents, str(files.columns)])
+            if content == INCOMPLETE and is_complete(files.sheet, sheet_contents):
                 unchanged.append(f"{files.sheet}: stays as it is; a new one would lack pictures")
             else:
-                write_sheet(files.sheet, outcomes, content)
+                write_sheet(files.sheet, outcomes, files.columns, content)
         if files.report is not None and files.report not in self.kept:
             write_text(files.report, sealed_json(report_data(outcomes, contents), in_a_list=True))
         for path in self.kept:
@@ -73,12 +74,11 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         The contact sheet does not fit into memory.
     """
     # Refuse wrong suffixes, and a sheet that is too large.
-    kinds = ((files.sheet, "a contact sheet", ".png"), (files.table, "a table", ".csv"))
-    for path, what, suffix in (*kinds, (files.report, "a report", ".json")):
+    for path, what, suffix in ((files.table, "a table", ".csv"), (files.report, "a report", ".json")):
         if path is not None:
             refuse_suffix(path, what, suffix)
     if files.sheet is not None:
-        refuse_large_sheet(files.sheet, outcomes)
+        refuse_sheet(files.sheet, outcomes, files.columns)
 
     # Hash the contents of each file, and find the files that exist already.
     reference = None if files.reference is None else reference_of(files.reference, outcomes)
@@ -99,7 +99,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
     each = [contents.get(outcome.number, INCOMPLETE) for outcome in outcomes]
     held = (
         (files.table, each, report_contents),
-        (files.sheet, [content_of_all(each)], image_contents),
+        (files.sheet, [content_of_all([*each, str(files.columns)])], sheet_contents),
         (files.report, each, report_contents),
     )
     kept = tuple(path for path, named, read in held if path is not None and is_kept(path, named, read, force))

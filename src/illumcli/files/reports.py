@@ -1,4 +1,4 @@
-"""Tables as CSV, reports as JSON, drawings as SVG: sealed with a hash; reading their content hashes."""
+"""Tables as CSV, reports as JSON, drawings as SVG or PDF: sealed with a hash, and their content hashes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from illumcli.files.seal import BLANK, sealed_text
 
 _SVG = re.compile(r"<dc:identifier>([^<]*)</dc:identifier>")
+_PDF = re.compile(rb"/Subject \(([^()\\]*)\)")
 
 
 def sealed_csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -50,5 +51,7 @@ def report_contents(path: Path) -> list[str]:
         case ".json":
             document = json.loads(path.read_text(encoding="utf-8"))
             return [entry["content"] for entry in (document if isinstance(document, list) else [document])]
+        case ".pdf":
+            return [match.decode("ascii") for match in _PDF.findall(path.read_bytes())]
         case _:
             return _SVG.findall(path.read_text(encoding="utf-8"))

@@ -3,7 +3,8 @@
 The metadata of every image and baked mesh contain `illum-body:` and 32 hexadecimal digits, the BLAKE2b-128 of
 the file with these digits set to 0. A PNG, whose chunks have checksums, has them in its last chunk before the
 end, as the hash of everything before. A table has them in the column `body` of its first row, a report in the
-key `body` of its first entry, an SVG among its keywords. The hash detects accidents and edits, not forgery.
+key `body` of its first entry, an SVG or PDF among its keywords. The hash detects accidents and edits, not
+forgery.
 """
 
 from __future__ import annotations
@@ -60,8 +61,13 @@ def is_sealed(path: Path) -> bool:
 
 def sealed_text(text: str) -> str:
     """`text`, to be written as UTF-8, with its hash in place of `BLANK`."""
-    digest = hashlib.blake2b(text.encode(), digest_size=_DIGITS // 2)
-    return text.replace(BLANK, _MARK.decode() + digest.hexdigest(), 1)
+    return sealed(text.encode()).decode()
+
+
+def sealed(data: bytes) -> bytes:
+    """The bytes of a file, with their hash in place of `BLANK`."""
+    digest = hashlib.blake2b(data, digest_size=_DIGITS // 2)
+    return data.replace(BLANK.encode(), _MARK + digest.hexdigest().encode(), 1)
 
 
 def sealed_png(data: bytes) -> bytes:

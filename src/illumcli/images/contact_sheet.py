@@ -1,63 +1,91 @@
-"""Contact sheets: many pictures on one PNG, each with its label."""
+"""Contact sheets: many pictures on one PNG, SVG or PDF, with labels."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.files.atomic import write_bytes
 from illumcli.images.openimageio import oiio
+from illumcli.images.sheet_layout import TEXT, Layout, Placed, Row, Sheet, laid_out
 from illumcli.images.writer import ImageWriter
 
-CELL_WIDTH = 256  # of a picture [pixels]
-_GAP = 8  # between pictures [pixels]
-_TEXT = 14  # height of a label [pixels]
+SUFFIXES = (".png", ".svg", ".pdf")
+Pictures: TypeAlias = Sequence[Callable[[], NDArray[np.uint8]]]
+"""Functions that read a picture: (H, W, 1 or 3) display values."""
 
 
 def write_contact_sheet(
-    path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], labels: Sequence[str], content: str
+    path: str | os.PathLike[str],
+    sheet: Sheet,
+    pictures: Pictures,
+    sizes: Sequence[tuple[int, int]],
+    content: str,
 ) -> None:
-    """Write a contact sheet as PNG: pictures row by row, each scaled to a cell, its label below.
+    """Write a contact sheet.
 
     Parameters
     ----------
-    pictures : iterable of (H, W, 1 or 3) uint8
-        Display values; read one at a time.
-    labels : sequence of str
-        One for each picture.
+    pictures : sequence of callables
+        Each is called once, row by row.
+    sizes : sequence of (int, int)
+        Height and width of each picture [pixels].
     content : str
         Hash of everything on the sheet, written into its metadata.
+
+    Raises
+    ------
+    InputError
+        matplotlib, which writes SVG and PDF, is not installed.
+    OutputError
+        The file cannot be written.
     """
-    columns = max(1, min(len(labels), round((len(labels) * 1.6) ** 0.5)))
-    cells = [_cell(picture, label) for picture, label in zip(pictures, labels, strict=True)]
+    layout = laid_out(sheet, sizes)
+    if Path(path).suffix.lower() == ".png":
+        _write_png(path, layout, pictures, content)
+    else:
+        from illumcli.images.sheet_drawing import drawing
 
-    # Fill white below shorter cells, and the rest of the last row.
-    tallest = max(len(cell) for cell in cells)
-    blank = np.full((tallest, CELL_WIDTH + _GAP, 3), 255, np.uint8)
-    cells = [np.concatenate([cell, blank[len(cell) :]]) for cell in cells]
-    cells += [blank] * (-len(cells) % columns)
-    rows = [np.concatenate(cells[k : k + columns], axis=1) for k in range(0, len(cells), columns)]
-    sheet = np.concatenate(rows)
+        scaled = [partial(_read_scaled, picture) for picture in pictures]
+        write_bytes(Path(path), drawing(layout, scaled, content, Path(path).suffix.lower()[1:]))
 
+
+def _write_png(path: str | os.PathLike[str], layout: Layout, pictures: Pictures, content: str) -> None:
+    """Write the sheet band by band."""
     metadata = {"illum:content": content}
-    height, width = sheet.shape[:2]
-    with ImageWriter(path, width, height, dict.fromkeys("RGB", "uint8"), metadata) as writer:
-        writer.write_band(0, sheet)
+    with ImageWriter(path, layout.width, layout.height, dict.fromkeys("RGB", "uint8"), metadata) as writer:
+        y = 0
+        for row in layout.rows:
+            writer.write_band(y, _band(row, layout.width, pictures))
+            y += row.height
 
 
-def _cell(picture: NDArray[np.uint8], label: str) -> NDArray[np.uint8]:
-    """(h, CELL_WIDTH + gap, 3) a picture, scaled, over its label, on white."""
-    height = max(1, round(CELL_WIDTH * picture.shape[0] / picture.shape[1]))
-    source = _display_buffer(np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture)
-    scaled = oiio.ImageBufAlgo.resize(source, roi=oiio.ROI(0, CELL_WIDTH, 0, height, 0, 1, 0, 3))
-    cell = _display_buffer(np.full((height + 2 * _GAP + _TEXT, CELL_WIDTH + _GAP, 3), 255, np.uint8))
-    oiio.ImageBufAlgo.paste(cell, _GAP // 2, _GAP // 2, 0, 0, scaled)
-    letters = CELL_WIDTH // 8
-    text = label if len(label) <= letters else f"{label[: letters - 1]}…"
-    oiio.ImageBufAlgo.render_text(cell, _GAP // 2, height + _GAP + _TEXT, text, _TEXT, "", (0.0, 0.0, 0.0))
-    return np.asarray(cell.get_pixels(oiio.UINT8))
+def _band(row: Row, width: int, pictures: Pictures) -> NDArray[np.uint8]:
+    """(h, width, 3) a row of the sheet, on white."""
+    band = np.full((row.height, width, 3), 255, np.uint8)
+    for each in row.pictures:
+        picture = _read_scaled(pictures[each.picture], each)
+        band[each.y : each.y + each.height, each.x : each.x + each.width] = picture
+    buffer = _display_buffer(band)
+    for text in row.texts:
+        oiio.ImageBufAlgo.render_text(buffer, text.x, text.y, text.text, TEXT, "", (0.0, 0.0, 0.0))
+    return np.asarray(buffer.get_pixels(oiio.UINT8))
+
+
+def _read_scaled(read: Callable[[], NDArray[np.uint8]], place: Placed) -> NDArray[np.uint8]:
+    """(height, width, 3) a picture, reduced where it is larger than its place."""
+    picture = read()
+    if picture.shape[:2] == (place.height, place.width):
+        return np.broadcast_to(picture, (place.height, place.width, 3))
+    source = _display_buffer(np.broadcast_to(picture, (*picture.shape[:2], 3)))
+    scaled = oiio.ImageBufAlgo.resize(source, roi=oiio.ROI(0, place.width, 0, place.height, 0, 1, 0, 3))
+    return np.asarray(scaled.get_pixels(oiio.UINT8))
 
 
 def _display_buffer(pixels: NDArray[np.uint8]) -> oiio.ImageBuf:

@@ -49,13 +49,19 @@ class Variant(Value):
     frame: int = 0
     names: Mapping[str, str] = field(default_factory=dict)
     """Path -> name of its value, by default the value. The name of a row, as `label`, replaces its paths."""
-    label: str = ""
-    """What differs from other variants: the frame, names, other values after the last part of their paths."""
+    parts: tuple[str, ...] = ()
+    """What differs from other variants, what varies fastest last: names, other values after the last part of
+    their paths, the frame."""
 
     @property
     def overrides(self) -> list[str]:
         """The values in the form of `-D`."""
         return [f"{path}={value}" for path, value in self.values.items()]
+
+    @property
+    def label(self) -> str:
+        """The parts in one text."""
+        return ", ".join(self.parts)
 
     @property
     def fields(self) -> dict[str, str | int]:
@@ -106,17 +112,17 @@ def variants_of(
     differ = [path for path in points[0].names if len({point.names[path] for point in points}) > 1]
     variants = []
     for values, names in ((point.values, point.names) for point in points):
-        label = [
+        parts = [
             f"{path.rpartition('.')[2]} {names[path]}" if names[path] == values.get(path) else names[path]
             for path in differ
         ]
         if numbers is None:
-            variants.append(Variant(values, 0, names, ", ".join(label)))
+            variants.append(Variant(values, 0, names, tuple(parts)))
         for n in numbers or ():
             values_then, names_then = (
                 {path: at_frame(path, text, n) for path, text in texts.items()} for texts in (values, names)
             )
-            variants.append(Variant(values_then, n, names_then, ", ".join([f"frame {n}", *label])))
+            variants.append(Variant(values_then, n, names_then, (*parts, f"frame {n}")))
     return variants
 
 

@@ -292,3 +292,18 @@ def test_a_variant_that_fails_is_told_and_the_others_go_on(illum, scene, tmp_pat
     assert done.returncode == 2
     assert len(list(tmp_path.glob("*.png"))) == 2
     assert "1 of 3 variants failed" in done.stderr
+
+
+def test_names_of_values_and_rows_name_files_and_tables(illum, scene, tmp_path):
+    (tmp_path / "rows.csv").write_text("label,ambient\ndim,0.1\nbright,0.9\n")
+    done = illum("sweep", scene, "--rows", "rows.csv", "-D", "film.exposure=low:0,1", "--table", "t.csv")
+    assert done.returncode == 0, done.stderr
+    names = ["dim-low", "dim-1", "bright-low", "bright-1"]
+    assert done.stdout.split() == [f"ball-{name}.png" for name in names]
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert [row["label"] for row in rows] == [
+        "dim, low",
+        "dim, exposure 1",
+        "bright, low",
+        "bright, exposure 1",
+    ]

@@ -418,6 +418,6 @@ def test_damaged_entries_of_some_pixels_are_made_again(scene, whole, tmp_path, k
         (["film.samples=8", "obscurance.reconstruct=true"], False),
     ],
 )
-def test_eight_samples_are_adaptive_by_default(scene, overrides, is_adaptive):
+def test_eight_samples_or_two_reconstructed_are_adaptive_by_default(scene, overrides, is_adaptive):
     plan = planned(load(scene, ["film.adaptive=null", *overrides]), ["beauty"])
     assert (plan.all_samples is not None) is is_adaptive

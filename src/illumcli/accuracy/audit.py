@@ -98,7 +98,8 @@ class Audit(Record):
     def of(cls, plan: Plan, layer: Layer, seed: int) -> Audit:
         """The audit of a layer of a plan, antialiased as the plan does it, at pixels that the seed draws."""
         view = plan.view
-        camera_samples = max(view.samples, CAMERA_SAMPLES) if view.samples > 1 else None
+        samples = view.samples * view.stands_for
+        camera_samples = max(samples, CAMERA_SAMPLES) if samples > 1 else None
         picture = np.empty((view.height, view.width, len(layer.channels)), F)
         return cls(plan, layer, seed, picture, camera_samples)
 
@@ -231,9 +232,10 @@ def fresh_plan(plan: Plan, layer: Layer, rays: int, seed: int, camera_samples: i
     Parameters
     ----------
     camera_samples : int, optional
-        Over the pixel filter; by default those of `plan`, at their places.
+        Over the pixel filter; by default all of those of `plan`, at their places.
     """
-    view, scene, nodes = plan.view, plan.graph.scene, plan.graph.nodes
+    scene, nodes = plan.graph.scene, plan.graph.nodes
+    view = plan.all_samples.view if plan.all_samples else plan.view
     assert scene.obscurance is not None
     each = max(1, rays // (camera_samples or view.samples))
     settings = scene.obscurance.model_copy(update={"samples": each, "reconstruct": None})

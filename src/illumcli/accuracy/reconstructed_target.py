@@ -24,6 +24,7 @@ from illumcli.film.view import View
 from illumcli.rays.sampling import stream
 from illumcli.records import Record
 from illumcli.render_graph.build import Graph, build
+from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
@@ -150,11 +151,11 @@ class Attempts(Record):
         """One view of an attempt; its tiles are kept in memory alone."""
         outputs = outputs_of(graph.scene, self.only)
         plan = plan_view(graph, outputs, view, run.cache)
-        kept = {"hits", "obscurance", *needed_buffers(graph, outputs, [view])}
+        kept = {"hits", FITTED, *needed_buffers(graph, outputs, [view])}
         self.memory.wanted |= {plan.lookup.keeps[name] for name in kept if name in plan.lookup.keeps}
         layer = audited_layer(plan)
         assert layer is not None
-        several = max(view.samples, CAMERA_SAMPLES)
+        several = max(view.samples, CAMERA_SAMPLES)  # of one sample per pixel, too: its edges err
         audits = {
             purpose: replace(
                 Audit.of(plan, layer, stream(graph.scene.seed, purpose)),

@@ -23,6 +23,7 @@ from illumcli.records import Record, Value
 from illumcli.render_space import RenderSpace
 from illumcli.shading.materials import Numbering
 from illumcli.shading.rates import Identity, ShadingPoints
+from illumcli.visibility.object_pixels import FittedPixels
 
 CLASSES = {
     cls.__name__: cls
@@ -38,6 +39,7 @@ CLASSES = {
         Repair,
         Numbering,
         Substitute,
+        FittedPixels,
     )
 }
 """Classes of the records in buffers of the scene."""

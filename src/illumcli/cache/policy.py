@@ -13,6 +13,7 @@ from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import MeshRepairs
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.shading.materials import Numbering
+from illumcli.visibility.object_pixels import FittedPixels
 
 LOAD_SECONDS = 0.001
 LOAD_RATE = 1e9
@@ -32,8 +33,9 @@ SCENE_BUFFERS: Mapping[str, type | tuple[type, ...]] = {
     "unnamed": MeshRepairs,
     "corner_normals": CornerVectors,
     "numbering": Numbering,
+    "fitted_obscurance": FittedPixels,
 }
-"""Types of the buffers of the scene that are kept, by name or by its part before the colon.
+"""Types of the buffers of the scene, or of a whole view, that are kept, by name or its part before the colon.
 
 Not kept: Embree's tree, which Embree cannot export, and buffers that are computed from these faster than they
 are loaded.

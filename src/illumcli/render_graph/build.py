@@ -31,7 +31,7 @@ from illumcli.rays.interaction import (
 )
 from illumcli.records import Value
 from illumcli.render_graph import needs, stages
-from illumcli.render_graph.build_adaptive import adaptive_nodes
+from illumcli.render_graph.build_adaptive import FITTED, adaptive_nodes
 from illumcli.render_graph.build_geometry import baked_files, geometry_nodes
 from illumcli.render_graph.build_lights import light_nodes, sum_nodes
 from illumcli.render_graph.build_materials import material_nodes
@@ -43,14 +43,14 @@ from illumcli.shading.materials import material, material_id
 from illumcli.shading.rates import RATES, normal, normals_of_points, obscurance_normals, point_weights, points
 from illumcli.visibility.baked_corners import baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
-from illumcli.visibility.object_pixels import object_pixels, pixel_pairs
+from illumcli.visibility.object_pixels import object_pixels, obscurance_of_samples, pixel_pairs
 from illumcli.visibility.obscurance import baked_or_open, obscurance_method
 from illumcli.visibility.open_hemisphere import known_open, open_triangles
-from illumcli.visibility.reconstruction import reconstructed_obscurance
+from illumcli.visibility.reconstruction import fitted_obscurance
 from illumcli.visibility.shadows import ray_origins
 
 SURROUNDINGS = "surrounding_pixels"
-"""The buffer `object_pixels` of a tile and its surroundings, so far as a reconstruction reads them."""
+"""The buffer `object_pixels` of the tiles around one, so far as a reconstruction reads them."""
 READ = "read_pixels"
 """The buffer of the pixels of a tile whose obscurance is read, (P,), None if it is all of them."""
 GIVEN = ("view", "tile", SURROUNDINGS, READ)
@@ -193,7 +193,8 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) 
             replace(w, output="raw_obscurance"),
             Node.of(pixel_pairs, **partly_baked),
             Node.of(object_pixels),
-            Node.of(reconstructed_obscurance, "obscurance"),
+            Node.of(fitted_obscurance),
+            Node.of(obscurance_of_samples, "obscurance", **partly_baked),
         ]
     return [
         Node.of(partial(stages.obscurance_draws, scene.seed), "obscurance_draws"),
@@ -251,7 +252,7 @@ def _reasons(scene: Scene, names: dict[str, Node]) -> dict[str, str]:
         "known_open",
     ]
     if needs.reconstructs(scene):
-        traced += ["raw_obscurance", "pixel_pairs", "object_pixels"]
+        traced += ["raw_obscurance", "pixel_pairs", "object_pixels", FITTED]
     if not needs.is_emissive(scene):
         reasons |= dict.fromkeys(("emission", "emission_materials"), "no material emits")
     if not needs.is_ambient(scene):

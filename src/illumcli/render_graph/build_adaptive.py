@@ -21,6 +21,8 @@ OPEN = "open."
 """Prefix of the names of buffers that are computed with w = 1 in place of traced obscurance."""
 REFINED = "refined:"
 """Prefix of the names of buffers that say which pixels of a layer are refined."""
+FITTED = "fitted_obscurance"
+"""The buffer of reconstructed w, by pixel and object."""
 MIXED = ("obscurance", "ambient", "beauty")
 """Buffers of layers that may depend on obscurance."""
 
@@ -70,7 +72,7 @@ def _opened(nodes: Mapping[str, Node], given: Iterable[str]) -> dict[str, Node]:
     copies: dict[str, Node] = {}
     for node in topological_order(nodes, [name for name in MIXED if name in nodes], given):
         name = f"{OPEN}{node.output}"
-        if node.output == "obscurance" and "obscurance_draws" in node.inputs.values():
+        if node.output == "obscurance" and not {"obscurance_draws", FITTED}.isdisjoint(node.inputs.values()):
             baked = "baked_obscurance" in node.inputs.values()
             copies[name] = Node.of(baked_or_open if baked else stages.alpha, name)
         elif any(f"{OPEN}{need}" in copies for need in node.inputs.values()):

@@ -24,6 +24,7 @@ from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.records import Value
 from illumcli.render_graph.build import GIVEN, Graph
+from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.keys import Keys, code
 
 CachedTiles: TypeAlias = Literal["all", "some", "none"]
@@ -51,16 +52,18 @@ def substitute_cached(
 ) -> tuple[Graph, Lookup]:
     """The graph with nodes that load the cached buffers among all that `buffers` need, and which these are.
 
+    Nodes that load buffers already are kept.
+
     Parameters
     ----------
     look : bool
         Read nothing: an entry that exists counts as valid, and the graph cannot run.
     tiles : {"all", "some", "none"}
         Load buffers of tiles for all pixels; for those pixels that all of these buffers are cached for; or
-        not at all.
+        not at all. Fitted obscurance is loaded for all or computed: its fit depends on all pixels.
     """
     keys = Keys(graph.nodes, view, code())
-    loaders: dict[str, Node] = {}
+    loaders: dict[str, Node] = dict(graph.loaders)
     reused: dict[str, str] = {}
     keeps: dict[str, str] = {}
     pixels: dict[str, PixelBuffer] = {}
@@ -73,11 +76,16 @@ def substitute_cached(
             continue
         visited.add(name)
         node = graph.nodes[name]
-        if name in graph.known:
+        reads_fit = FITTED in node.inputs.values()  # w of samples is taken from the fit faster than loaded
+        if name in graph.loaders:
+            node = graph.loaders[name]
+        elif name in graph.known:
             known = graph.known[name]
             node = loaders[name] = Node(name, partial(_constant, known.value), {})
             if known.source:
                 reused[name] = known.source
+        elif (name == FITTED and tiles != "all") or (name == "obscurance" and reads_fit):
+            pass
         elif cache.memory is not None or is_kept(name):
             key = keys(name)
             if tiles == "some" and codec_of(name) is not None:

@@ -18,8 +18,14 @@ from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
 from illumcli.graph import Buffers, Node
 from illumcli.memory import keep_freed_memory
 from illumcli.records import Record, Value
-from illumcli.render_graph.adaptive_tile import adaptive_tile, pixel_recorder_of
+from illumcli.render_graph.adaptive_tile import (
+    StartedAdaptive,
+    finished_adaptive,
+    pixel_recorder_of,
+    started_adaptive,
+)
 from illumcli.render_graph.build import SURROUNDINGS
+from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.schedule import Plan
 from illumcli.render_graph.tile_nodes import (
     Develop,
@@ -33,7 +39,7 @@ from illumcli.render_graph.tile_nodes import (
     run_nodes,
     tile_buffers,
 )
-from illumcli.visibility.object_pixels import ObjectPixels, within
+from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
 
 Result = TypeVar("Result")
@@ -120,7 +126,6 @@ def bands(
     common = TileContext(
         plan, shared, run.stats, stop, recorder, develop, pixel_recorder_of(plan, run.cache), run.cache
     )
-    compute = adaptive_tile if plan.all_samples else _tile
     keep_freed_memory()
     with ThreadPoolExecutor(run.threads, thread_name_prefix="tile") as pool:
         try:
@@ -131,7 +136,7 @@ def bands(
             # Keep a row of tiles and a few more in progress, so that no thread waits for the consumer.
             def submit() -> None:
                 for tile in queue:
-                    future = ahead.submit(tile) if plan.before else pool.submit(compute, common, tile)
+                    future = ahead.submit(tile) if plan.before else pool.submit(_tile, common, tile)
                     pending.append((tile, future))
                     if len(pending) >= run.threads + 1 + (0 if plan.before else len(rows[0])):
                         break
@@ -156,6 +161,9 @@ def bands(
                 recorder.write(kept)
                 yield Band(row[0].y, band)
             recorder.finish({name: _cost(plan, name, run.stats) for name in keeps})
+            if common.fits:
+                whole = FittedPixels.joined(common.fits)
+                run.cache.keep(FITTED, keeps[FITTED], whole, _cost(plan, FITTED, run.stats))
             if plan.all_samples is not None and common.pixel_recorder is not None:
                 names = plan.all_samples.lookup.keeps
                 common.pixel_recorder.finish({name: _cost(plan, name, run.stats) for name in names})
@@ -178,7 +186,7 @@ class _Ahead:
     def __init__(self, common: TileContext, rows: Sequence[Sequence[Tile]], pool: ThreadPoolExecutor) -> None:
         self.common, self.rows, self.pool = common, rows, pool
         self.first_row, self.next_row = 0, 0
-        self.started: dict[Tile, Future[StartedTile]] = {}
+        self.started: dict[Tile, Future[StartedTile | StartedAdaptive]] = {}
         self.pixels: dict[Tile, ObjectPixels] = {}
 
     def submit(self, tile: Tile) -> Future[tuple[Mapping[str, NDArray[Any]], Kept]]:
@@ -204,27 +212,34 @@ class _Ahead:
         for row in self.rows[self.first_row : self.next_row]:
             for each in row if row[0].y < lower else ():
                 if each not in self.pixels:
-                    self.pixels[each] = _result(self.started[each]).buffers["object_pixels"].pixels
-                if each.x < tile.x + tile.width + MARGIN and each.x + each.width > tile.x - MARGIN:
+                    self.pixels[each] = _result(self.started[each]).buffers["object_pixels"]
+                if (
+                    each != tile
+                    and each.x < tile.x + tile.width + MARGIN
+                    and each.x + each.width > tile.x - MARGIN
+                ):
                     parts.append(self.pixels[each])
         own = _result(self.started.pop(tile))
-        return self.pool.submit(_last_nodes, self.common, own, parts)
+        return self.pool.submit(_last_nodes, self.common, own, within(parts, tile, MARGIN))
 
 
-def _first_nodes(common: TileContext, tile: Tile) -> StartedTile:
+def _first_nodes(common: TileContext, tile: Tile) -> StartedTile | StartedAdaptive:
     """A tile after the nodes whose results the tiles around read."""
+    if common.plan.all_samples:
+        return started_adaptive(common, tile)
     started = StartedTile(common.plan, tile, given_buffers(common, common.plan, tile), {})
     run_nodes(common, started, range(common.plan.before))
     return started
 
 
 def _last_nodes(
-    common: TileContext, started: StartedTile, parts: Sequence[ObjectPixels]
+    common: TileContext, started: StartedTile | StartedAdaptive, around: ObjectPixels
 ) -> tuple[Mapping[str, NDArray[Any]], Kept]:
-    """One tile's developed layers, and its buffers for the cache; `parts` are the pixels around."""
-    plan = common.plan
-    started.buffers[SURROUNDINGS] = within(parts, started.tile, MARGIN)
-    run_nodes(common, started, range(plan.before, len(plan.tile)))
+    """One tile's developed layers, and its buffers for the cache; `around` are the pixels around it."""
+    started.buffers[SURROUNDINGS] = around
+    if isinstance(started, StartedAdaptive):
+        return finished_adaptive(common, started)
+    run_nodes(common, started, range(common.plan.before, len(common.plan.tile)))
     return developed_layers(common, started.tile, started.buffers), started.kept
 
 
@@ -254,5 +269,7 @@ def at_pixels(plan: Plan, shared: Buffers, run: Run, x: NDArray[np.int64], y: ND
 
 def _tile(common: TileContext, tile: Tile) -> tuple[Mapping[str, NDArray[Any]], Kept]:
     """One tile's developed layers, and its buffers for the cache."""
+    if common.plan.all_samples:
+        return finished_adaptive(common, started_adaptive(common, tile))
     buffers, kept = tile_buffers(common, common.plan, tile)
     return developed_layers(common, tile, buffers), kept

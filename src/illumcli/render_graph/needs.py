@@ -22,7 +22,8 @@ from illumcli.shading.textures import paths
 FEWEST_PROBES, PROBE_SHARE = 2, 4
 """Samples whose first hits adaptive sampling tests: one in so many, but at least so many."""
 FEWEST_ADAPTIVE = 8
-"""Samples per pixel from which on sampling is adaptive by default: of fewer it saves little."""
+"""Samples per pixel from which on sampling is adaptive by default: of fewer it saves little, unless
+obscurance is reconstructed, where a sample costs much more than its rays."""
 
 
 def views(scene: Scene) -> list[View]:
@@ -39,7 +40,7 @@ def views(scene: Scene) -> list[View]:
 def adaptive(scene: Scene, samples: int) -> Adaptive | None:
     """How adaptive sampling finds the pixels that one sample is not enough for; None if all get all."""
     settings = scene.film.adaptive
-    by_default = samples >= FEWEST_ADAPTIVE and not reconstructs(scene)
+    by_default = samples >= FEWEST_ADAPTIVE or reconstructs(scene)
     if samples == 1 or settings is False or (settings is None and not by_default):
         return None
     probes = (settings.probes if settings else None) or max(FEWEST_PROBES, samples // PROBE_SHARE)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from illumcli.cache.recorder import Cache
 from illumcli.film.view import View
 from illumcli.layers import Layer
 from illumcli.render_graph.build import Graph
+from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.cached import substitute_cached
 from illumcli.render_graph.culling import cull, find_bounds
 from illumcli.render_graph.execute import Run
@@ -41,12 +43,14 @@ def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, 
         graph, lookup = substitute_cached(graph, buffers, view, cache, look)
         return schedule(graph, outputs, view, lookup)
 
-    # An adaptive picture: the centres of all pixels, and all samples of some.
+    # An adaptive picture: the centres of all pixels, and all samples of some, which share fitted obscurance.
+    centres, lookup = substitute_cached(graph, buffers, view.centres(), cache, look)
     all_samples = None
     if means := [layer for layer in outputs if not layer.data]:
         of_all = view.all_samples()
+        fitted = {name: node for name, node in centres.loaders.items() if name == FITTED}
+        graph = replace(graph, loaders=fitted)
         needed = needed_buffers(graph, means, [of_all])
-        loaded, lookup = substitute_cached(graph, needed, of_all, cache, look, tiles="some")
-        all_samples = schedule(loaded, means, of_all, lookup)
-    graph, lookup = substitute_cached(graph, buffers, view.centres(), cache, look)
-    return schedule(graph, outputs, view, lookup, all_samples)
+        loaded, of_pixels = substitute_cached(graph, needed, of_all, cache, look, tiles="some")
+        all_samples = schedule(loaded, means, of_all, of_pixels)
+    return schedule(centres, outputs, view, lookup, all_samples)

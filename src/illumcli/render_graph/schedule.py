@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 from illumcli.cache.codec import codec_of
 from illumcli.cache.recorder import Cache
@@ -14,10 +15,10 @@ from illumcli.graph import Node
 from illumcli.layers import FIXED, Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import GIVEN, SURROUNDINGS, Graph
-from illumcli.render_graph.build_adaptive import decision
+from illumcli.render_graph.build_adaptive import FITTED, decision
 from illumcli.render_graph.cached import Lookup, substitute_cached
 from illumcli.render_graph.keys import Keys, code
-from illumcli.render_graph.needs import layers, reconstructs, views
+from illumcli.render_graph.needs import layers, reconstructs
 from illumcli.render_graph.replicates import BLOCK, REPLICATED
 from illumcli.scene.spec import Scene
 
@@ -44,6 +45,8 @@ class Plan(Value):
     before: int = 0
     """Number of a tile's first steps: the later steps read the results of these from the tiles around,
     too."""
+    edges_by: int = 0
+    """How many of the steps of a tile find the edges of an adaptive picture, if any come `before`."""
     decided_by: int = 0
     """How many of the steps of a tile decide which pixels of an adaptive picture need all samples."""
     all_samples: Plan | None = None
@@ -71,7 +74,7 @@ class Plan(Value):
         """Number of the last tile node that reads each buffer of a tile; the film's buffers have none."""
         kept = {layer.buffer for layer in self.sampled} | COVERAGE | {*REPLICATED}
         if self.all_samples:
-            kept |= {"obscurance", *(decision(layer) for layer in self.sampled)}
+            kept |= {"obscurance", "edges", FITTED, *(decision(layer) for layer in self.sampled)}
         of_tile = {node.output for node in self.tile}
         last: dict[str, int] = {}
         for number, node in enumerate(self.tile):
@@ -79,6 +82,15 @@ class Plan(Value):
                 if name in of_tile and name not in kept:
                     last[name] = number
         return last
+
+    @cached_property
+    def with_fit(self) -> tuple[int, ...]:
+        """Numbers of the steps of a tile that run where fitted obscurance is given."""
+        given = {FITTED: Node(FITTED, dict, {})}
+        graph = replace(self.graph, loaders={**self.graph.loaders, **given})
+        needed = graph.topological_order(needed_buffers(self.graph, self.outputs, [self.view]))
+        names = {node.output for node in needed} - {FITTED}
+        return tuple(number for number, node in enumerate(self.tile) if node.output in names)
 
     @property
     def samples_per_pixel(self) -> int:
@@ -116,10 +128,6 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
         Layers that do not exist, or that this film cannot have.
     """
     outputs = tuple(layers(scene, only or scene.outputs.layers))
-    if reconstructs(scene) and any(view.adaptive for view in views(scene)):
-        raise InputError(
-            "obscurance.reconstruct needs the same samples in every pixel; leave it out, or film.adaptive"
-        )
     if reconstructs(scene) and any(layer.per_pixel for layer in outputs):
         raise InputError(
             "the layer error is that of samples which are not reconstructed; leave it out, or "
@@ -138,6 +146,7 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
     if any(view.adaptive for view in shown):
         outputs = sampled_outputs(outputs)
         buffers |= dict.fromkeys(decisions(outputs))
+        buffers |= dict.fromkeys(_fitted(graph, outputs))
     buffers |= dict.fromkeys(layer.buffer for layer in outputs)
     if any(layer.buffer == "beauty" for layer in outputs):
         buffers["alpha"] = None
@@ -145,6 +154,12 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
         buffers["samples"] = None
     repairs = (name for name in REPAIRS if name in graph.nodes)
     return [*(buffers | dict.fromkeys(["render_space", *repairs]))]
+
+
+def _fitted(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
+    """The buffer of fitted obscurance, if layers need it: all samples read that of the centres."""
+    needed = graph.without_loaders().topological_order([layer.buffer for layer in outputs])
+    return [node.output for node in needed if node.output == FITTED]
 
 
 def sampled_outputs(outputs: Sequence[Layer]) -> tuple[Layer, ...]:
@@ -184,12 +199,9 @@ def schedule(
         For the pixels of an adaptive picture that need all samples; by default from the same graph.
     """
     once, tile = _split(graph.topological_order(needed_buffers(graph, outputs, [view])))
+    around = any(SURROUNDINGS in node.inputs.values() for node in tile)
     if view.adaptive is None:
-        before = 0
-        if any(SURROUNDINGS in node.inputs.values() for node in tile):
-            needed = {node.output for node in graph.topological_order(["hits", "object_pixels"])}
-            tile.sort(key=lambda node: node.output not in needed)
-            before = sum(node.output in needed for node in tile)
+        (before,) = _ordered(graph, tile, [["hits", "object_pixels"] if around else []])
         return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
 
     # An adaptive picture: first what decides, at the centres of pixels.
@@ -197,7 +209,8 @@ def schedule(
     means = [layer for layer in own if not layer.data]
     if means and all_samples is None:
         all_samples = schedule(graph, means, view.all_samples())
-    decided_by = len(_split(graph.topological_order(decisions(own)))[1])
+    pairs = [["hits", "edges"], ["object_pixels"]] if around else [[], []]
+    edges_by, before, decided_by = _ordered(graph, tile, [*pairs, decisions(own)])
 
     # The error compares finished pixels with replicates, which have all samples.
     replicates = None
@@ -210,8 +223,27 @@ def schedule(
     for other in (all_samples, replicates):
         once += [node for node in (other.once if other else ()) if node.output not in known]
         known |= {node.output for node in once}
-    plan = Plan(graph, tuple(outputs), view.centres(), tuple(once), tuple(tile), lookup, 0, decided_by)
-    return replace(plan, all_samples=all_samples, replicates=replicates)
+    plan = Plan(graph, tuple(outputs), view.centres(), tuple(once), tuple(tile), lookup, before)
+    return replace(
+        plan, edges_by=edges_by, decided_by=decided_by, all_samples=all_samples, replicates=replicates
+    )
+
+
+def _ordered(graph: Graph, tile: list[Node], groups: Sequence[Sequence[str]]) -> list[int]:
+    """Sort the nodes of a tile: those that the first group of buffers needs, those for the next, and so on.
+
+    Returns
+    -------
+    list of int
+        How many nodes come until the end of each group.
+    """
+    place: dict[str, int] = {}
+    for number, group in enumerate(groups):
+        for node in graph.topological_order(group):
+            place.setdefault(node.output, number)
+    tile.sort(key=lambda node: place.get(node.output, len(groups)))
+    places = [place.get(node.output, len(groups)) for node in tile]
+    return [sum(each <= number for each in places) for number in range(len(groups))]
 
 
 def uncached_plans(plan: Plan, cache: Cache) -> tuple[Plan, Plan]:
@@ -220,7 +252,8 @@ def uncached_plans(plan: Plan, cache: Cache) -> tuple[Plan, Plan]:
     assert others is not None
     if not any(node.inputs for node in (*plan.graph.loaders.values(), *others.graph.loaders.values())):
         return plan, others
-    graph, centres = plan.graph.without_loaders(), replace(plan.view, adaptive=None)
+    fitted = {name: node for name, node in plan.graph.loaders.items() if name == FITTED}
+    graph, centres = replace(plan.graph, loaders=fitted), replace(plan.view, adaptive=None)
     plans = []
     for outputs, view in ((plan.sampled, centres), (others.outputs, others.view)):
         needed = needed_buffers(graph, outputs, [view])
@@ -259,6 +292,7 @@ def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> fro
         common = {name for name in common if first(name) == second(name)}
         read = {name for node in plan.tile if node.output not in common for name in node.inputs.values()}
         read |= {layer.buffer for layer in outputs} | COVERAGE
+        read |= {FITTED}  # of the whole view, read by all samples
         shared |= {second(name) for name in common & read}
         if (
             plan.all_samples is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -22,7 +22,9 @@ from illumcli.lights._incident import LitPoints
 from illumcli.rays.embree import Interrupted
 from illumcli.records import Record
 from illumcli.render_graph.build import READ
+from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.schedule import Plan, uncached_plans
+from illumcli.visibility.object_pixels import FittedPixels
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32; ids are uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> its values as the cache stores them
@@ -73,6 +75,8 @@ class TileContext(Record):
     pixel_recorder: PixelRecorder | None = None
     cache: Cache = NO_CACHE
     lock: threading.Lock = field(default_factory=threading.Lock)
+    fits: list[FittedPixels] = field(default_factory=list)
+    """Fitted obscurance of the tiles so far, if it is kept."""
 
     @cached_property
     def last_use(self) -> dict[int, Mapping[str, int]]:
@@ -115,6 +119,8 @@ class StartedTile(Record):
     kept: Kept
     own: Tile | None = None
     """The part of the tile whose buffers are cached."""
+    pixel_recorder: PixelRecorder | None = None
+    """What keeps its buffers, if it is some pixels of an adaptive picture."""
 
 
 def developed_layers(common: TileContext, tile: Tile, buffers: Buffers) -> Mapping[str, NDArray[Any]]:
@@ -143,9 +149,7 @@ def given_buffers(
     return buffers
 
 
-def run_nodes(
-    common: TileContext, started: StartedTile, numbers: range, pixel_recorder: PixelRecorder | None = None
-) -> None:
+def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int]) -> None:
     """Run the nodes of these numbers on the buffers of a tile."""
     buffers, tracer = started.buffers, started.buffers.get("tracer")
     seconds, rays, unlit = {}, {}, {}
@@ -168,11 +172,14 @@ def run_nodes(
             unlit[node.output] = value.count - len(value.index)
 
         # Hand it to the cache, and drop the buffers that no later node needs.
-        if plan is common.plan and node.output in common.recorder.names:
+        if node.output == FITTED:
+            if FITTED in plan.lookup.keeps:
+                common.fits.append(value)
+        elif plan is common.plan and node.output in common.recorder.names:
             tile, own = started.tile, started.own
             started.kept[node.output] = common.recorder.take(node.output, buffers, tile, own)
-        elif pixel_recorder is not None and node.output in pixel_recorder.names:
-            pixel_recorder.take(node.output, buffers, started.tile)
+        elif started.pixel_recorder is not None and node.output in started.pixel_recorder.names:
+            started.pixel_recorder.take(node.output, buffers, started.tile)
         for name in node.inputs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)

@@ -289,7 +289,7 @@ class Film(Description):
     ) = None
     """Adaptive sampling: all samples only where one is not enough; `true`, the settings of the test for it,
     or its number of probes. `false`: every pixel has all samples. By default `true` for 8 samples or more,
-    unless obscurance is reconstructed."""
+    for 2 or more if obscurance is reconstructed."""
     filter: Filter = DEFAULTS
     """The pixel filter."""
     background: Color | None = None

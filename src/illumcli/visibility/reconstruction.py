@@ -25,10 +25,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats
-from illumcli.film.tiles import Tile
+from illumcli.arrays import F
 from illumcli.records import Record
-from illumcli.visibility.object_pixels import ObjectPixels, SampledPixels, is_within
+from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, joined
 from illumcli.visibility.regression import (
     COUNT,
     FEATURE,
@@ -55,18 +54,17 @@ CELLS_AT_ONCE = 1 << 13
 """Cells that are solved together: their moments fit into a core's own cache."""
 
 
-def reconstructed_obscurance(
-    tile: Tile, object_pixels: SampledPixels, surrounding_pixels: ObjectPixels, raw_obscurance: Floats
-) -> Floats:
-    """(M,) float32 w of every sample: that of its object in its pixel.
+def fitted_obscurance(object_pixels: ObjectPixels, surrounding_pixels: ObjectPixels) -> FittedPixels:
+    """w of the pairs of a tile.
 
     Parameters
     ----------
     surrounding_pixels : ObjectPixels
-        Of the tile and `MARGIN` pixels around it.
+        Those within `MARGIN` pixels around the tile.
     """
-    w = reconstructed(surrounding_pixels, is_within(surrounding_pixels, tile))
-    return object_pixels.to_samples(raw_obscurance, w)
+    count, around = len(object_pixels.x), len(surrounding_pixels.x)
+    own = np.arange(count + around) < count
+    return FittedPixels.of(object_pixels, reconstructed(joined([object_pixels, surrounding_pixels]), own))
 
 
 def reconstructed(around: ObjectPixels, wanted: NDArray[np.bool_]) -> NDArray[np.float32]:

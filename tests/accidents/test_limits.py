@@ -146,10 +146,10 @@ def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_pa
 
 @pytest.mark.parametrize("said", ["9" * 5000, "\u00b2"])
 def test_references_are_numbers_of_variants_or_files(tmp_path, said):
-    from illumcli.commands.sweep_reference import reference_of
+    from illumcli.commands.sweep_reference import references_of
 
     with pytest.raises(InputError):
-        reference_of(said, [])
+        references_of(said, [])
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):

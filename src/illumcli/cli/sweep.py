@@ -77,8 +77,13 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
     type=click.IntRange(1, 1000),
     help="Pictures along a row of the sheet; by default the last -D.",
 )
-@click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, error.")
-@click.option("--reference", metavar="N|FILE", help="Reference of the table's errors: variant N or an image.")
+@click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, errors.")
+@click.option(
+    "--reference",
+    metavar="N|FILE",
+    help="What the table's errors are relative to: variant N, an image, or a pattern with an image for each.",
+)
+@click.option("--flip", "flips", is_flag=True, help="Measure FLIP, too, which takes far longer.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")
 @seed_option("By default the scene's.")
 @threads_option
@@ -138,3 +143,5 @@ def sweep(
         say(warning)
     if not quiet:
         say_kept(result.kept)
+        if result.summary:
+            say(result.summary)

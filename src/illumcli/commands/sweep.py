@@ -12,7 +12,7 @@ from pathlib import Path
 from illumcli.commands.batch import Batch
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.report import Report
-from illumcli.commands.sweep_files import SweepFiles, plan_files
+from illumcli.commands.sweep_files import PlannedFiles, SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome, SweepResult, following_due
 from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
@@ -49,15 +49,18 @@ def sweep_scene(
 
     # Find faults before the first ray.
     works = SweepWorks(path, replace(options, pattern=options.pattern or default_pattern(variants)))
-    outcomes, warnings = _planned(works, variants, batch, written)
+    outcomes, warnings = _planned(works, variants, batch, written, files.reference)
     if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
     planned = plan_files(files, outcomes, options.force)
 
     # Render the images.
-    outcomes, of_images = _rendered(works, outcomes, batch, progress, written)
-    warnings += of_images
+    try:
+        warnings += _render(works, outcomes, batch, progress, written, planned)
+    except BaseException:
+        planned.update(outcomes, now=True)
+        raise
     seconds = time.perf_counter() - start
 
     # Write the files about all variants.
@@ -66,11 +69,17 @@ def sweep_scene(
     if has_images:
         unchanged = planned.write(outcomes)
     batch.finish(*warnings, *unchanged)
-    return SweepResult(tuple(outcomes), planned.kept if has_images else (), tuple(warnings), seconds)
+    summary = planned.table.extremes(outcomes) if planned.table else ""
+    kept = planned.kept if has_images else ()
+    return SweepResult(tuple(outcomes), kept, tuple(warnings), summary, seconds)
 
 
 def _planned(
-    works: SweepWorks, variants: Sequence[Variant], batch: Batch, written: Callable[[Outcome], None]
+    works: SweepWorks,
+    variants: Sequence[Variant],
+    batch: Batch,
+    written: Callable[[Outcome], None],
+    reference: str | None,
 ) -> tuple[list[Outcome], list[str]]:
     """The outcomes with the facts about every variant without a fault, and the warnings about the scene that
     all of them have."""
@@ -81,7 +90,7 @@ def _planned(
     def planned(outcome: Outcome) -> Outcome:
         nonlocal warnings
         work = works.of(outcome)
-        outcome = replace(outcome, planned=planned_variant(work))
+        outcome = replace(outcome, planned=planned_variant(work, reference))
         lines = unused_keys(work)
         warnings = lines if warnings is None else [line for line in warnings if line in lines]
         if outcome.number > HELD:
@@ -93,15 +102,15 @@ def _planned(
     return outcomes, warnings or []
 
 
-def _rendered(
+def _render(
     works: SweepWorks,
-    outcomes: Sequence[Outcome],
+    done: list[Outcome],
     batch: Batch,
     progress: Progress,
     written: Callable[[Outcome], None],
-) -> tuple[list[Outcome], list[str]]:
-    """The outcomes with their reports, and warnings."""
-    done = list(outcomes)
+    planned: PlannedFiles,
+) -> list[str]:
+    """Render every variant, and replace its outcome by one with its report. Returns warnings."""
     following = following_due(done)
     last: Report | None = None
 
@@ -120,10 +129,11 @@ def _rendered(
         done[index] = _attempt(done[index], partial(images, upcoming), batch, written)
         last = done[index].report or last
         works.drop(done[index])
+        planned.update(done)
 
     # Collect the warnings.
     of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
-    return done, [*dict.fromkeys(of_images), *works.worker.finish()]
+    return [*dict.fromkeys(of_images), *works.worker.finish()]
 
 
 def _attempt(

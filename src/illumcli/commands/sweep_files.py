@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from illumcli.cache.fingerprint import digest
+from illumcli.commands.sweep_measures import Measurer
 from illumcli.commands.sweep_outcome import Outcome
-from illumcli.commands.sweep_reference import Reference, reference_of
+from illumcli.commands.sweep_reference import references_of
 from illumcli.commands.sweep_sheet import refuse_sheet, sheet_contents, write_sheet
-from illumcli.commands.sweep_table import sweep_table
+from illumcli.commands.sweep_table import SweepTable
 from illumcli.files.outputs import INCOMPLETE, is_complete, is_kept, refresh, refuse_suffix
 from illumcli.files.reports import report_contents, sealed_json
-from illumcli.records import Value
+from illumcli.records import Record, Value
 
 
 class SweepFiles(Value):
@@ -25,17 +26,24 @@ class SweepFiles(Value):
     table: Path | None = None
     report: Path | None = None
     reference: str | None = None
-    """Image that the table's errors are relative to: a variant's number, or a file."""
+    """What the table's measures are relative to: a variant's number, a file, or a pattern of files."""
+    flips: bool = False
+    """True to measure FLIP, too."""
 
 
-class PlannedFiles(Value):
-    """The files to write, with the hashes of their contents."""
+class PlannedFiles(Record):
+    """The files to write, with the hashes of their contents; the table unless it is kept."""
 
     files: SweepFiles
-    reference: Reference | None
+    table: SweepTable | None
     contents: dict[int, str]
     """Number of a variant -> hash of its content; variants that failed have none."""
     kept: tuple[Path, ...]
+
+    def update(self, outcomes: Sequence[Outcome], now: bool = False) -> None:
+        """Write the unfinished table, `now` or if it was not written for a while."""
+        if self.table is not None:
+            self.table.update(outcomes, now)
 
     def write(self, outcomes: Sequence[Outcome]) -> list[str]:
         """Write the files that are not kept. Returns a message for each that failures leave unchanged."""
@@ -43,8 +51,8 @@ class PlannedFiles(Value):
 
         files, unchanged = self.files, []
         contents = [self._content(outcome) for outcome in outcomes]
-        if files.table is not None and files.table not in self.kept:
-            write_text(files.table, sweep_table(outcomes, contents, self.reference))
+        if self.table is not None:
+            self.table.write(outcomes)
         if files.sheet is not None and files.sheet not in self.kept:
             content = content_of_all([*contents, str(files.columns)])
             if content == INCOMPLETE and is_complete(files.sheet, sheet_contents):
@@ -81,7 +89,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         refuse_sheet(files.sheet, outcomes, files.columns)
 
     # Hash the contents of each file, and find the files that exist already.
-    reference = None if files.reference is None else reference_of(files.reference, outcomes)
+    references = {} if files.reference is None else references_of(files.reference, outcomes)
     contents = {
         outcome.number: digest(
             (
@@ -90,7 +98,8 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
                 outcome.variant.frame,
                 [str(path) for path in outcome.paths],
                 outcome.planned.content,
-                reference.content if reference else None,
+                references[outcome.number].content if references else None,
+                files.flips,
             )
         )
         for outcome in outcomes
@@ -103,7 +112,10 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         (files.report, each, report_contents),
     )
     kept = tuple(path for path, named, read in held if path is not None and is_kept(path, named, read, force))
-    return PlannedFiles(files, reference, contents, kept)
+    table = None
+    if files.table is not None and files.table not in kept:
+        table = SweepTable(files.table, outcomes, each, Measurer(references, files.flips))
+    return PlannedFiles(files, table, contents, kept)
 
 
 def content_of_all(contents: Sequence[str]) -> str:

@@ -24,6 +24,8 @@ class PlannedVariant(Value):
     channels: int
     """Channels of the first image that are compared: 3 for colours, otherwise 1."""
     exposure: float
+    reference: Path | None
+    """The image that its first one is compared with, where that is named by a pattern."""
     is_due: bool
     """True if some image has to be written."""
 
@@ -69,4 +71,6 @@ class SweepResult(Record):
     kept: tuple[Path, ...]
     """Those files about all variants that existed with the same content."""
     warnings: tuple[str, ...]
+    summary: str
+    """Which variants are nearest to their references and farthest from them; empty if nothing is compared."""
     seconds: float

@@ -1,30 +1,33 @@
-"""The image that `--reference` names: errors in a sweep's table are relative to it."""
+"""The images that `--reference` names: measures in a sweep's table are relative to them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeAlias
 
 from illumcli.cache.fingerprint import file_digest
+from illumcli.commands.sweep_colors import channel_count
 from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
-from illumcli.errors import InputError, OutputError
-from illumcli.records import Record, Value
+from illumcli.errors import InputError
+from illumcli.files.names import fields
+from illumcli.records import Value
 
 MAX_DIGITS = 9
 """Digits of a variant's number; a longer text is the name of a file."""
 
 
-class Reference(Record):
+_Images: TypeAlias = Mapping[Path, tuple[int, PlannedVariant]]
+"""First images of this sweep -> their variants."""
+
+
+class Reference(Value):
     """An image that others are compared with."""
 
+    path: Path
     content: str
     number: int | None = None
     """Number of the variant whose image it is; None for another image."""
-    pixels: NDArray[np.float32] | None = None
-    """(H, W, 1 or 3) of another image; None for a variant's."""
 
 
 class _Kind(Value):
@@ -36,34 +39,65 @@ class _Kind(Value):
     encoded: bool  # display values; else linear light
 
 
-def reference_of(text: str, outcomes: Sequence[Outcome]) -> Reference:
-    """The image that `--reference` names: a variant's first one, by its number or its file, or another image.
+def references_of(text: str, outcomes: Sequence[Outcome]) -> dict[int, Reference]:
+    """Number of a variant -> the image that its first one is compared with; variants with a fault have none.
+
+    Parameters
+    ----------
+    text : str
+        What `--reference` names: a variant's first image, by its number or its file, another image, or a
+        pattern of names with an image for each variant.
 
     Raises
     ------
     InputError
-        It does not exist, is no image, or differs in size or kind from the image of a variant.
+        An image does not exist, is no image, or differs in size or kind from the one of its variant.
     """
     variants = {each.number: each.planned for each in outcomes if each.planned is not None}
+    images = {variant.paths[0]: (number, variant) for number, variant in variants.items()}
+    if fields(text):
+        return _of_pattern(text, variants, images)
     number = _variant_number(text, len(outcomes), variants)
-    if number is not None:
-        kind, reference = _kind(variants[number]), Reference(variants[number].image_content, number)
-    else:
-        pixels, encoded = colors(Path(text))
-        height, width, count = pixels.shape
-        kind, reference = (
-            _Kind(height, width, count, encoded),
-            Reference(file_digest(Path(text)), None, pixels),
-        )
+    path = Path(text) if number is None else variants[number].paths[0]
+    reference, kind = _reference(path, images)
     for variant in variants.values():
-        if fault := _difference(_kind(variant), kind):
-            name = f"--reference {text}: {variant.paths[0]}"
-            raise InputError(f"{name} {fault}; take a picture of the same kind and size")
-    return reference
+        if fault := _misfit(variant, kind):
+            raise InputError(f"--reference {text}: {fault}")
+    return dict.fromkeys(variants, reference)
 
 
-def _variant_number(text: str, count: int, variants: dict[int, PlannedVariant]) -> int | None:
-    """The number of the variant that `text` names; None where it names another file."""
+def _of_pattern(text: str, variants: Mapping[int, PlannedVariant], images: _Images) -> dict[int, Reference]:
+    """An image for each variant."""
+    references, problems = {}, []
+    for number, variant in variants.items():
+        assert variant.reference is not None
+        try:
+            references[number], kind = _reference(variant.reference, images)
+            if fault := _misfit(variant, kind):
+                problems.append(fault)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError([f"--reference {text}: {problem}" for problem in dict.fromkeys(problems)])
+    return references
+
+
+def _reference(path: Path, images: _Images) -> tuple[Reference, _Kind]:
+    """The image of a variant, or a file that is there; reads its header and hashes it."""
+    if path in images:
+        number, variant = images[path]
+        return Reference(path, variant.image_content, number), _kind(variant)
+    return Reference(path, file_digest(path)), _kind_of_file(path)
+
+
+def _misfit(variant: PlannedVariant, kind: _Kind) -> str:
+    """Why the first image of a variant cannot be compared with one of this kind; empty if it can."""
+    fault = _difference(_kind(variant), kind)
+    return f"{variant.paths[0]} {fault}; take a picture of the same kind and size" if fault else ""
+
+
+def _variant_number(text: str, count: int, variants: Mapping[int, PlannedVariant]) -> int | None:
+    """The variant that `text` gives the number of; None where it names a file."""
     if text.isascii() and text.isdecimal() and len(text) <= MAX_DIGITS:
         number = int(text)
         if not 1 <= number <= count:
@@ -71,13 +105,21 @@ def _variant_number(text: str, count: int, variants: dict[int, PlannedVariant]) 
         if number not in variants:
             raise InputError(f"--reference {text}: this variant has a fault; take another")
         return number
-    return next((each for each, variant in variants.items() if variant.paths[0] == Path(text)), None)
+    return None
 
 
 def _kind(variant: PlannedVariant) -> _Kind:
     """Of a variant's first image."""
     encoded = variant.paths[0].suffix.lower() == ".png"
     return _Kind(variant.height, variant.width, variant.channels, encoded)
+
+
+def _kind_of_file(path: Path) -> _Kind:
+    """Of an image, by its header."""
+    from illumcli.images.reader import ImageSource
+
+    with ImageSource(path) as image:
+        return _Kind(image.height, image.width, channel_count(image.names), image.encoded)
 
 
 def _difference(kind: _Kind, reference: _Kind) -> str:
@@ -91,32 +133,3 @@ def _difference(kind: _Kind, reference: _Kind) -> str:
         kinds = "linear light", "display values"
         return f"holds {kinds[kind.encoded]}, the reference {kinds[reference.encoded]}"
     return ""
-
-
-def channel_count(names: Collection[str]) -> int:
-    """3 where an image with these channels has colours, else 1: its first channel."""
-    return 3 if {"R", "G", "B"} <= set(names) else 1
-
-
-def colors(path: Path) -> tuple[NDArray[np.float32], bool]:
-    """(H, W, 3) R, G and B of an image, or (H, W, 1) its first channel if it has no colours; and whether the
-    values are display values."""
-    from illumcli.images.reader import read_image
-
-    image = read_image(path)
-    names = ("R", "G", "B") if channel_count(image.channels) == 3 else (next(iter(image.channels)),)
-    return np.stack([image.channels[name] for name in names], axis=-1), image.encoded
-
-
-def written_colors(path: Path) -> tuple[NDArray[np.float32], bool]:
-    """The `colors` of an image that this sweep wrote.
-
-    Raises
-    ------
-    OutputError
-        It does not exist any more.
-    """
-    try:
-        return colors(path)
-    except InputError as error:
-        raise OutputError(f"{path}: was written, but has been removed since; run the sweep again") from error

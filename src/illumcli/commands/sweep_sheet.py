@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.commands.sweep_colors import written_colors
 from illumcli.commands.sweep_outcome import Outcome
-from illumcli.commands.sweep_reference import written_colors
 from illumcli.files.outputs import refuse_suffix
 from illumcli.files.reports import report_contents
 from illumcli.images.contents import image_contents

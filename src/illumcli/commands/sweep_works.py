@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.sweep_colors import channel_count
 from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
-from illumcli.commands.sweep_reference import channel_count
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work
+from illumcli.commands.work import Work, expanded
+from illumcli.files.names import fields
 
 HELD = 256
 """The work of so many variants is held from planning until rendering, some 80 kB each; later variants are
@@ -41,9 +42,15 @@ class SweepWorks:
         self._held.pop(outcome.number, None)
 
 
-def planned_variant(work: Work) -> PlannedVariant:
-    """The facts about a variant that a sweep keeps of its work."""
+def planned_variant(work: Work, reference: str | None = None) -> PlannedVariant:
+    """The facts about a variant that a sweep keeps of its work; `reference` may be a pattern of names."""
     first = work.targets[0]
+    layer = first.layers[0].name
+    image = (
+        reference is not None
+        and fields(reference)
+        and expanded(reference, work.job, work.loaded, first.view, layer)
+    )
     return PlannedVariant(
         paths=tuple(target.path for target in work.targets),
         content=work.content,
@@ -52,5 +59,6 @@ def planned_variant(work: Work) -> PlannedVariant:
         width=first.view.width,
         channels=channel_count(work.development.channels(first)),
         exposure=work.scene.film.exposure,
+        reference=image or None,
         is_due=bool(work.due()),
     )

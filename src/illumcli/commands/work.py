@@ -111,13 +111,18 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
             sets = [outputs] if suffix == ".exr" else [(layer,) for layer in outputs]
             for layers in sets:
                 name = "all" if suffix == ".exr" else layers[0].name
-                fields = {"scene": loaded.name, "camera": view.name, "layer": name, "frame": 0}
-                path = Path(expand(pattern, {**loaded.overrides, **fields, **job.fields}))
+                path = expanded(pattern, job, loaded, view, name)
                 if not given:
                     refuse_outside(loaded, number, path)
                 targets.append(Target(path, view, layers, file_content(graph, view, layers, suffix)))
     check_unique([str(target.path) for target in targets])
     return targets
+
+
+def expanded(pattern: str, job: RenderJob, loaded: SceneFile, view: View, layer: str) -> Path:
+    """The file that a pattern names for a view and layer of a job."""
+    fields = {"scene": loaded.name, "camera": view.name, "layer": layer, "frame": 0}
+    return Path(expand(pattern, {**loaded.overrides, **fields, **job.fields}))
 
 
 def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str) -> str:

@@ -8,8 +8,9 @@ from pathlib import Path
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep_colors import channel_count
 from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
+from illumcli.commands.targets import expanded
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, expanded
+from illumcli.commands.work import Work
 from illumcli.files.names import fields
 
 HELD = 256

@@ -1,0 +1,60 @@
+"""The files that a job writes: their names and what their pixels depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from illumcli.cache.fingerprint import digest
+from illumcli.commands.options import RenderJob
+from illumcli.errors import InputError
+from illumcli.files.names import check_unique, expand
+from illumcli.film.develop import Target
+from illumcli.film.view import View
+from illumcli.layers import Layer
+from illumcli.render_graph.build import Graph
+from illumcli.render_graph.keys import content_key
+from illumcli.scene.access import refuse_outside
+from illumcli.scene.scene_file import SceneFile
+
+
+def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[Layer, ...]) -> list[Target]:
+    """The files of all views: one with all layers per `.exr` pattern, one of each layer per `.png` pattern.
+
+    Patterns of the scene must lead to folders that the scene may read; those of the command line may lead
+    anywhere.
+    """
+    given = job.options.pattern
+    patterns = (given,) if given else graph.scene.outputs.files
+    targets = []
+    for view in graph.views:
+        if job.cameras and view.name not in job.cameras:
+            continue
+        for number, pattern in enumerate(patterns):
+            suffix = Path(pattern).suffix.lower()
+            if suffix not in (".exr", ".png"):
+                raise InputError(f"output pattern '{pattern}': no image format '{suffix}'; use .exr or .png")
+            sets = [outputs] if suffix == ".exr" else [(layer,) for layer in outputs]
+            for layers in sets:
+                name = "all" if suffix == ".exr" else layers[0].name
+                path = expanded(pattern, job, loaded, view, name)
+                if not given:
+                    refuse_outside(loaded, number, path)
+                targets.append(Target(path, view, layers, file_content(graph, view, layers, suffix)))
+    check_unique([str(target.path) for target in targets])
+    return targets
+
+
+def expanded(pattern: str, job: RenderJob, loaded: SceneFile, view: View, layer: str) -> Path:
+    """The file that a pattern names for a view and layer of a job."""
+    fields = {"scene": loaded.name, "camera": view.name, "layer": layer, "frame": 0}
+    return Path(expand(pattern, {**loaded.overrides, **fields, **job.fields}))
+
+
+def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str) -> str:
+    """Hash of everything that a file's pixels depend on: the buffers of its layers, and their encoding."""
+    film = graph.scene.film
+    coded = (suffix, view.name, [layer.name for layer in layers], graph.scene.outputs.colour)
+    shown = (film.background, film.exposure if suffix == ".png" else 0.0)
+    buffers = dict.fromkeys([*(layer.buffer for layer in layers), "alpha"])
+    return digest((coded, shown, content_key(graph.nodes, view, buffers)))

@@ -18,6 +18,7 @@ from illumcli.baking.files import SUFFIXES, baked_contents
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.errors import InputError
+from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import CornerVectors, corner_normals
@@ -59,6 +60,11 @@ class BakeWork(Record):
     def settings(self) -> BakeSettings:
         """The settings of the bake."""
         return self.job.settings
+
+    @property
+    def claim(self) -> Path | None:
+        """The path of the claim on this bake; None with `force`, which does it whoever has done it."""
+        return None if self.job.options.force else claim_path(self.outputs[0], self.content)
 
     def due(self) -> tuple[Path, ...]:
         """The outputs to write: those that do not exist with the same content.

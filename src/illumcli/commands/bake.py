@@ -10,6 +10,7 @@ from illumcli.baking.report import BakeReport
 from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
+from illumcli.commands.turns import turns
 from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
 from illumcli.progress import Progress
@@ -57,16 +58,18 @@ def bake_inputs(
 
     # Find faults before the first ray. The meshes of a single input are kept for its bake.
     single: BakeWork | None = None
+    claims: dict[int, Path | None] = {}
     for index in batch.due():
         with batch.piece(index):
             work = worker.prepare(request.job(inputs[index]))
             entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
+            claims[index] = work.claim if work.due() else None
             single = work if len(inputs) == 1 else None
             del work
     entries.look(request.options.force)
 
     # Bake.
-    for index in batch.due():
+    for index in turns(batch, claims.__getitem__, progress):
         with batch.piece(index):
             work = single or worker.prepare(request.job(inputs[index]))
             paths, done = worker.run(work, progress)

@@ -24,16 +24,18 @@ class Batch:
 
     def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
         self.failures: dict[int, IllumError] = {}
-        self._what, self._count = what, count
+        self.count = count
+        self._what = what
         self._keep_going, self._tell = keep_going, tell
 
     def due(self) -> Iterator[int]:
         """The indices of the pieces that have not failed, until the batch has to stop."""
-        for number in range(self._count):
-            if self.failures and not self._keep_going and number > min(self.failures):
-                return
-            if number not in self.failures:
-                yield number
+        return (number for number in range(self.count) if self.is_due(number))
+
+    def is_due(self, number: int) -> bool:
+        """False for a piece that has failed, or that comes after one whose failure stops the batch."""
+        stops = self.failures and not self._keep_going and number > min(self.failures)
+        return not stops and number not in self.failures
 
     @contextmanager
     def piece(self, number: int, label: str = "") -> Iterator[None]:
@@ -42,7 +44,7 @@ class Batch:
             yield
         except Exception as error:
             failure = known(error)
-            if failure is None or self._count == 1:
+            if failure is None or self.count == 1:
                 raise
             self.failures[number] = failure
             self._tell(f"{label}: {failure}" if label else str(failure))
@@ -50,7 +52,7 @@ class Batch:
     def finish(self, *also: str) -> None:
         """If pieces failed, raise their number and the lines of `also`, with the exit code of the first."""
         if self.failures:
-            failed = f"{len(self.failures)} of {self._count} {self._what} failed"
+            failed = f"{len(self.failures)} of {self.count} {self._what} failed"
             error = IllumError("\n".join([failed, *also]))
             error.exit_code = self.failures[min(self.failures)].exit_code
             raise error

@@ -10,6 +10,7 @@ from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.report import Report
+from illumcli.commands.turns import turns
 from illumcli.commands.unit import Worker
 from illumcli.commands.work import Work, unused_keys
 from illumcli.files.names import check_unique
@@ -43,21 +44,21 @@ def render_scenes(
         At the end if any scene failed; at once if files have equal names or the report cannot be written.
     """
     batch = Batch("scenes", len(scenes), options.keep_going, tell)
-    worker, works = Worker(), dict[int, Work]()
+    worker, works, claims = Worker(), dict[int, Work](), dict[int, Path | None]()
     entries = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
 
     # Find faults before the first ray.
     for number in batch.due():
         with batch.piece(number):
             works[number] = work = worker.prepare(RenderJob(scenes[number], options))
-            work.due()
+            claims[number] = work.claim if work.due() else None
             names = [str(target.path) for target in work.targets]
             entries.plan(number, digest((work.content, names, options.target_error)))
     check_unique([str(path) for path, _ in _files(works)])
     entries.look(options.force)
 
     # Render.
-    for number in batch.due():
+    for number in turns(batch, claims.__getitem__, progress):
         with batch.piece(number):
             work = works.pop(number)
             paths, done = worker.run(work, progress)

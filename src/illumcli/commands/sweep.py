@@ -16,6 +16,7 @@ from illumcli.commands.sweep_files import PlannedFiles, SweepFiles, plan_files
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome, SweepResult, following_due
 from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
+from illumcli.commands.turns import turns
 from illumcli.commands.work import Work, unused_keys
 from illumcli.errors import IllumError
 from illumcli.files.names import check_unique
@@ -121,7 +122,7 @@ def _render(
         return outcome
 
     # Render one variant after the other; buffers that the next one reads stay in memory.
-    for index in batch.due():
+    for index in turns(batch, lambda index: done[index].claim, progress):
         number, upcoming = following[index], None
         if number is not None:
             with suppress(IllumError):  # reported when it is its turn

@@ -28,6 +28,8 @@ class PlannedVariant(Value):
     """The image that its first one is compared with, where that is named by a pattern."""
     is_due: bool
     """True if some image has to be written."""
+    claim: Path | None
+    """Held while they are written."""
 
 
 class Outcome(Record):
@@ -51,6 +53,11 @@ class Outcome(Record):
     def paths(self) -> tuple[Path, ...]:
         """The images of the variant."""
         return self.planned.paths if self.planned else ()
+
+    @property
+    def claim(self) -> Path | None:
+        """The path of the claim on the variant, where some image has to be written."""
+        return self.planned.claim if self.planned and self.planned.is_due else None
 
 
 def following_due(outcomes: Sequence[Outcome]) -> list[int | None]:

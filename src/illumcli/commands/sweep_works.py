@@ -62,4 +62,5 @@ def planned_variant(work: Work, reference: str | None = None) -> PlannedVariant:
         exposure=work.scene.film.exposure,
         reference=image or None,
         is_due=bool(work.due()),
+        claim=work.claim,
     )

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 from illumcli.cache.fingerprint import FileFingerprints, digest
 from illumcli.commands.options import RenderJob
 from illumcli.commands.targets import image_set
+from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
 from illumcli.film.develop import Development, Target
 from illumcli.film.tiles import MAX_TILE_SAMPLES
@@ -49,6 +51,11 @@ class Work(Value):
     def content(self) -> str:
         """Hash of everything that the pixels of its files depend on."""
         return digest([target.content for target in self.targets])
+
+    @property
+    def claim(self) -> Path | None:
+        """The path of the claim on this work; None with `force`, which does it whoever has done it."""
+        return None if self.job.options.force else claim_path(self.targets[0].path, self.content)
 
     def due(self) -> list[Target]:
         """The files to write, without those that exist with the same content.

@@ -298,15 +298,15 @@ def _digest(name: bytes) -> str:
     return hashlib.blake2b(name, digest_size=6).hexdigest()
 
 
-def remove_left_over(folder: Path) -> None:
-    """Remove the abandoned temporary files in a folder; once per folder and process.
+def remove_left_over(folder: Path, again: bool = False) -> None:
+    """Remove the abandoned temporary files in a folder; once per folder and process, unless `again`.
 
     Raises
     ------
     OSError
         The folder cannot be read.
     """
-    if folder in _tidied:
+    if folder in _tidied and not again:
         return
     for entry in os.scandir(folder):
         if _LEFT_OVER.fullmatch(entry.name):

@@ -16,6 +16,7 @@ from typing import TypeAlias
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import os_errors_as_output_errors, remove_left_over
+from illumcli.files.claims import tidy
 from illumcli.files.seal import is_sealed
 
 INCOMPLETE = "incomplete"
@@ -90,7 +91,9 @@ def refresh(path: Path) -> None:
     """Set the time of a kept file to now, so that `make` considers it built; tidy up after killed runs."""
     with suppress(OSError):  # the file of another user, a read-only folder
         os.utime(path)
-        remove_left_over(Path(os.path.realpath(path)).parent)
+        folder = Path(os.path.realpath(path)).parent
+        remove_left_over(folder)
+        tidy(folder)
 
 
 def stored_contents(path: Path, read: ContentReader) -> Sequence[str]:

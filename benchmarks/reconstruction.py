@@ -89,7 +89,7 @@ def obscurance(path: Path, *overrides: str) -> tuple[NDArray[np.float32], NDArra
     w, alpha = (
         np.concatenate([band.layers[name] for band in made])[..., 0] for name in ("obscurance", "alpha")
     )
-    return w, alpha > 0, seconds, run.stats.seconds["obscurance"]
+    return w, alpha > 0, seconds, run.stats.seconds["fitted_obscurance"]
 
 
 def rmse(w: NDArray[np.float32], first: NDArray[np.float32], second: NDArray[np.float32]) -> float:

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.sampled import OF_SAMPLING, Sampling, sampled_layer
+from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.keys import Keys
+from illumcli.render_graph.tile_nodes import RenderStats
 from illumcli.scene.load import load
+from planned import planned
 from ring import RING
 
 SAMPLING = Sampling(2, 4, "spiral", 1)
@@ -53,3 +56,20 @@ def test_an_image_does_not_depend_on_those_before(layer, other):
     assert np.array_equal(after, expected)
     assert same_rays == rays
     assert not np.array_equal(after, layer.render(SAMPLING)[0])
+
+
+@pytest.mark.parametrize("adaptive", ["null", "false"])
+def test_a_reconstructed_image_is_that_of_a_render(tmp_path, adaptive):
+    """Adaptive as the scene is, whatever its cameras' own samples."""
+    path = tmp_path / "ring.yaml"
+    path.write_text(RING.format(samples=1, ambient=1))
+    own = f"film.adaptive={adaptive}"
+    layer = sampled_layer(load(path, [own, "camera.samples=1"]), "beauty", threads=1)
+    values, rays, _ = layer.render(Sampling(4, 2, "spiral", 3, reconstruct=True))
+    counts = ("camera.samples=4", "obscurance.samples=2", "obscurance.reconstruct=true", "seed=3")
+    stats = RenderStats()
+    steps = planned(load(path, [own, *counts]), ["beauty"])
+    made = [band.layers["beauty"] for band in bands(steps, run_once(steps, Run()), Run(stats))]
+    assert values.tobytes() == np.concatenate(made).tobytes()
+    assert rays == sum(stats.rays.values())
+    assert (stats.refined > 0) == (adaptive == "null")

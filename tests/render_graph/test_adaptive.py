@@ -415,7 +415,8 @@ def test_damaged_entries_of_some_pixels_are_made_again(scene, whole, tmp_path, k
         (["film.samples=8", "film.adaptive={probes: 3}"], True),
         (["film.samples=1", "film.adaptive=true"], False),
         (["camera.samples=9", "film.samples=1"], True),
-        (["film.samples=8", "obscurance.reconstruct=true"], False),
+        (["film.samples=2", "obscurance.reconstruct=true"], True),
+        (["film.samples=4", "obscurance.reconstruct=true", "film.adaptive=false"], False),
     ],
 )
 def test_eight_samples_or_two_reconstructed_are_adaptive_by_default(scene, overrides, is_adaptive):

@@ -38,7 +38,7 @@ from illumcli.render_graph.schedule import Plan, schedule
 from illumcli.visibility.obscurance import obscurance_method
 
 FEWEST_PILOTS, MOST_PILOTS = 1800, 7200
-"""Pixels whose errors determine how many more are audited, with how many rays: one in 128, within these."""
+"""Pixels whose errors determine how many more are audited, with how many rays: one in 512, within these."""
 LARGEST = 1 << 24
 """Pixels of a picture that is audited, at most: its layer is held in memory."""
 PRECISION = 0.04
@@ -122,7 +122,7 @@ class Audit(Record):
         chances = pixel_chances(self.picture)
 
         # The pilot: how large the error is, how unevenly it is spread, and how noisy C and D are.
-        number = min(max(chances.size // 128, FEWEST_PILOTS), MOST_PILOTS)
+        number = min(max(chances.size // 512, FEWEST_PILOTS), MOST_PILOTS)
         products, weights, noise = self._products(chances, number, RAYS, "pilot", buffers, run)
         pilot = AuditedError.of_products(self.layer.name, products, weights)
         if not pilot.rmse:

@@ -27,6 +27,7 @@ from illumcli.render_graph.build import Graph, build
 from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.limits import refuse_rays
+from illumcli.render_graph.needs import PROBE_SHARE
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.schedule import needed_buffers, outputs_of
 from illumcli.render_graph.tile_nodes import Planes
@@ -36,6 +37,8 @@ from illumcli.scene.spec import Scene
 FIRST_FIT, FIRST_EDGES = 0.012, 0.0125
 """RMSE of the fit at one ray per pixel, and of antialiasing at one sample, that the first attempt is chosen
 by: those of a mesh that fills half the picture."""
+FIRST_REFINED = 0.05
+"""Share of the pixels that the first attempt expects to have edges."""
 FIT_POWER = 0.9
 """Mean square error of the fit falls by this power of the rays per pixel: much less than that of the rays
 alone, as a bias remains where w bends."""
@@ -87,6 +90,14 @@ class Parts(Record):
     obscurance: int
     total: float
     fit: float
+    refined: float
+    """Share of the pixels that take all samples."""
+
+    def cost(self, pixel: int, obscurance: int) -> float:
+        """Cost of a pixel at counts, in obscurance rays: of one sample and its probes, and of all samples
+        where it is refined; all if every pixel is."""
+        samples = pixel if self.refined == 1 else 1 + pixel * (self.refined + 0.5 / PROBE_SHARE)
+        return SAMPLE_COST * samples + pixel * obscurance
 
     def expected(self, pixel: int, obscurance: int) -> float:
         """Mean square error at other counts."""
@@ -98,7 +109,7 @@ class Parts(Record):
         """Samples per pixel and rays per sample of least cost that should reach the target; None: no counts
         that are tried."""
         enough = [
-            (pixel * (SAMPLE_COST + each), pixel, each)
+            (self.cost(pixel, each), pixel, each)
             for pixel in (1 << k for k in range(MOST_PIXEL_SAMPLES.bit_length()))
             for each in (1 << k for k in range(MOST_RAYS.bit_length()))
             if pixel * each <= max(MOST_RAYS, pixel)
@@ -170,10 +181,11 @@ class Attempts(Record):
                 audit.take(tile, layers)
             return {}
 
-        shared = run_once(plan, run)
+        shared, before = run_once(plan, run), run.stats.refined
         for _ in bands(plan, shared, replace(run, cache=Cache(None, self.memory)), develop=develop):
             pass
-        return Attempt(view.name, shared, audits, self)
+        refined = run.stats.refined - before if plan.all_samples else view.width * view.height
+        return Attempt(view.name, shared, audits, refined / (view.width * view.height), self)
 
 
 class Attempt(Record):
@@ -182,6 +194,8 @@ class Attempt(Record):
     camera: str
     shared: Mapping[str, Any]
     audits: Mapping[str, Audit]
+    refined: float
+    """Share of the pixels that took all samples."""
     attempts: Attempts
 
     def error(self, purpose: str) -> AuditedError:
@@ -211,7 +225,8 @@ def choose_reconstruction(attempts: Attempts, target: float) -> ReconstructedCho
     scene = attempts.graph().scene
     if not can_reconstruct(attempts.graph(_fixed(scene)), attempts.only):
         return None
-    first = Parts(1, 1, FIRST_FIT**2 + FIRST_EDGES**2, FIRST_FIT**2)
+    refined = FIRST_REFINED if scene.film.adaptive is not False else 1.0
+    first = Parts(1, 1, FIRST_FIT**2 + FIRST_EDGES**2, FIRST_FIT**2, refined)
     counts = (1, 1) if first.total <= (MARGIN * target) ** 2 else first.next_counts(target)
     for _ in range(ATTEMPTS):
         if counts is None:
@@ -225,7 +240,8 @@ def choose_reconstruction(attempts: Attempts, target: float) -> ReconstructedCho
             rays = sum(attempts.spent.values())
             return ReconstructedChoice(target, scene, pixel, each, audited, rays, attempts.memory)
         fit = max(view.error("fit").rmse for view in views)
-        counts = Parts(pixel, each, total**2, fit**2).next_counts(target)
+        refined = max(view.refined for view in views)
+        counts = Parts(pixel, each, total**2, fit**2, refined).next_counts(target)
     return None
 
 

@@ -21,7 +21,7 @@ from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import Run, at_pixels, bands
 from illumcli.render_graph.framing import placed
 from illumcli.render_graph.limits import refuse_rays
-from illumcli.render_graph.needs import views
+from illumcli.render_graph.needs import adaptive, views
 from illumcli.render_graph.schedule import Plan, outputs_of, schedule
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
@@ -38,7 +38,8 @@ class Sampling(Value):
     sampler: str
     seed: int
     reconstruct: bool = False
-    """Is obscurance fitted to the surface?"""
+    """Is obscurance fitted to the surface? Then pixels without edges have one sample, unless the scene gives
+    all to all."""
 
     @property
     def name(self) -> str:
@@ -69,7 +70,7 @@ class SampledLayer(Record):
         return self.loaded.scene
 
     def seen_by(self, view: View) -> SampledLayer:
-        """The same layer from another view, without adaptive sampling."""
+        """The same layer from another view."""
         if view.camera.fit is not None:
             name = f"camera:{view.name}"
             self._compute(build(self.scene, self.loaded).topological_order([name]))
@@ -92,10 +93,16 @@ class SampledLayer(Record):
                 "reconstruct": sampling.reconstruct,
             }
             update["obscurance"] = self.scene.obscurance.model_copy(update=finer)
+        view = replace(self.view, samples=sampling.pixel)
+        if sampling.reconstruct:  # only such pictures are adaptive here: the scene must be, too
+            named = self.scene.named_cameras().items()
+            own = {name: camera.model_copy(update={"samples": sampling.pixel}) for name, camera in named}
+            update |= {"camera": None, "cameras": own}
+            view = replace(view, adaptive=adaptive(self.scene.model_copy(update=update), sampling.pixel))
         graph = build(self.scene.model_copy(update=update), self.loaded)
         outputs = outputs_of(graph.scene, [self.layer.name])
         refuse_rays(graph, outputs)
-        plan = schedule(graph, outputs, replace(self.view, samples=sampling.pixel))
+        plan = schedule(graph, outputs, view)
         self._compute(plan.once)
         return plan
 

@@ -83,6 +83,8 @@ class SamplingChoice(Record):
         """The counts as `-D` overrides."""
         scene = self.layers[0].scene
         counts = count_overrides(scene, self.sampling.pixel, self.sampling.obscurance)
+        if scene.film.adaptive is not False:  # the choice is for images without adaptive sampling
+            counts = (*counts, "film.adaptive=false")
         fitted = scene.obscurance is not None and scene.obscurance.reconstruct
         return (*counts, "obscurance.reconstruct=false") if fitted else counts
 
@@ -114,8 +116,6 @@ class SamplingChoice(Record):
 def count_overrides(scene: Scene, pixel: int, obscurance: int) -> tuple[str, ...]:
     """`-D` overrides for samples per pixel and, unless 0, obscurance rays per sample, of all cameras."""
     overrides = [f"film.samples={pixel}"]
-    if scene.film.adaptive is not False:  # the choice is for images without adaptive sampling
-        overrides.append("film.adaptive=false")
     for name, camera in scene.named_cameras().items():
         if camera.samples is not None:
             place = f"cameras.{name}" if scene.cameras else "camera"

@@ -19,8 +19,8 @@ from illumcli.shading.rates import RATES, Rate
 from illumcli.shading.terms import given_terms
 from illumcli.shading.textures import paths
 
-FEWEST_PROBES, PROBE_SHARE = 2, 4
-"""Samples whose first hits adaptive sampling tests: one in so many, but at least so many."""
+PROBE_SHARE = 4
+"""One in so many samples has its first hit tested by adaptive sampling."""
 FEWEST_ADAPTIVE = 8
 """Samples per pixel from which on sampling is adaptive by default: of fewer it saves little, unless
 obscurance is reconstructed, where a sample costs much more than its rays."""
@@ -43,7 +43,7 @@ def adaptive(scene: Scene, samples: int) -> Adaptive | None:
     by_default = samples >= FEWEST_ADAPTIVE or reconstructs(scene)
     if samples == 1 or settings is False or (settings is None and not by_default):
         return None
-    probes = (settings.probes if settings else None) or max(FEWEST_PROBES, samples // PROBE_SHARE)
+    probes = (settings.probes if settings else None) or max(1, samples // PROBE_SHARE)
     reach, spread = footprint(scene.film.filter)
     return Adaptive(min(probes, samples), reach, spread)
 

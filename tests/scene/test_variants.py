@@ -90,7 +90,7 @@ def test_labels_hold_what_differs(tmp_path):
         "matte, small", "matte, c 8", "shiny, small", "shiny, c 8"
     ]  # fmt: skip
     assert variants[0].values == {"m.a": "1", "m.b": "2", "s.c": "4", "s.d": "9"}
-    assert variants[0].fields == {"frame": 0, "label": "matte", "s.c": "small"}
+    assert variants[0].fields == {"label": "matte", "s.c": "small"}
     moving = variants_of(["s.c=2*frame", "s.d=5,6"], frames="3:4")
     assert [variant.label for variant in moving] == [
         "d 5, frame 3", "d 5, frame 4", "d 6, frame 3", "d 6, frame 4"

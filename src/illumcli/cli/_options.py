@@ -118,6 +118,12 @@ def studio_options(command: C) -> C:
     return cast(C, look(turn(arranged)))
 
 
+frames_option = click.option(
+    "--frames",
+    metavar="FIRST:LAST[:STEP]",
+    help="Frames to render, by default the scene's; values of -D may be formulas of frame and time.",
+)
+
 pattern_option = click.option(
     "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."
 )

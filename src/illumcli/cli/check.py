@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import overrides_option, scenes_argument, studio_options
+from illumcli.cli._options import frames_option, overrides_option, scenes_argument, studio_options
 from illumcli.cli._printing import say
 
 
@@ -14,12 +14,16 @@ from illumcli.cli._printing import say
 @scenes_argument
 @overrides_option
 @studio_options
-def check(scenes: tuple[Path, ...], overrides: tuple[str, ...]) -> None:
-    """Validate each SCENE and print every problem at once; nothing is rendered and no mesh is read."""
+@frames_option
+def check(scenes: tuple[Path, ...], overrides: tuple[str, ...], frames: str | None) -> None:
+    """Validate each SCENE at all its frames and print every problem at once.
+
+    Nothing is rendered, and no mesh is read.
+    """
     from illumcli.commands.check import check_scenes
     from illumcli.errors import InputError
 
-    checks = check_scenes(scenes, overrides)
+    checks = check_scenes(scenes, overrides, frames)
     for line in checks.unused:
         say(line)
     for path in checks.valid:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +11,7 @@ import click
 
 from illumcli.cli._options import (
     force_option,
+    frames_option,
     gathered,
     keep_going_option,
     no_cache_option,
@@ -37,6 +40,7 @@ if TYPE_CHECKING:
 @pattern_option
 @overrides_option
 @studio_options
+@frames_option
 @only_option
 @click.option(
     "--target-error",
@@ -66,9 +70,22 @@ def render(
       illum render scene.yaml --only normal --only depth -o '{scene}.{layer}.png'
     A mesh stands on a floor under two lights:
       illum render bunny.obj
+    Frames of a film, and a film of any scene:
+      illum render scenes/film.yaml --frames 0:47:12
+      illum render scene.yaml --frames 0:47 -D 'ambient=frame/47' -o 'film/{frame:04d}.png'
     """
     from illumcli.cli._progress import reporter
     from illumcli.commands import render_all as job
+
+    said: set[str] = set()
+
+    films: dict[Path, list[Rendered]] = {}
+
+    def say_once(line: str) -> None:
+        # what is said of a scene is the same at most of its frames
+        if line not in said:
+            say(line)
+        said.add(line)
 
     def written(done: Rendered) -> None:
         if done.report.chosen and not quiet:
@@ -76,24 +93,38 @@ def render(
             reached = f"for an error of {error['target']:g}; reached {error['reached']:.3g}"
             say(f"{done.scene}: {' '.join(done.report.chosen)}, {reached}")
         print_paths(done.paths)
-        _say_report(done, quiet, verbose)
+        _say_report(done, quiet, verbose, say_once)
+        if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
+            film.append(done)
 
     is_kept = job.render_scenes(scenes, options, report, reporter(quiet), written, say)
     if is_kept and not quiet:
         say_kept([report])
+    if not quiet and sys.stderr.isatty():
+        _say_films(films)
 
 
-def _say_report(done: Rendered, quiet: bool, verbose: bool) -> None:
-    """Print the report of a scene."""
+def _say_films(films: Mapping[Path, Sequence[Rendered]]) -> None:
+    """Print how to make a film of the frames of each scene."""
+    from illumcli.commands.film_command import film_command
+
+    for frames in films.values():
+        numbered = [(done.frame, done.paths[0]) for done in frames if done.frame is not None]
+        if command := film_command(numbered, frames[0].fps):
+            say(f"for a film: {command}")
+
+
+def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[str], None]) -> None:
+    """Print the report of a scene or frame."""
     from illumcli.render_graph.repairs import repair_lines
 
     report = done.report
     if not quiet:
         say_kept(report.kept)
         for line in repair_lines(report.repairs, verbose):
-            say(f"{done.scene}: {line}")
+            say_once(f"{done.scene}: {line}")
     for warning in report.warnings:
-        say(warning)
+        say_once(warning)
     if not verbose:
         return
 

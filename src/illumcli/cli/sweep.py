@@ -11,6 +11,7 @@ from illumcli.cli._options import (
     FILE,
     allow_option,
     force_option,
+    frames_option,
     gathered,
     keep_going_option,
     no_cache_option,
@@ -46,10 +47,13 @@ def _files(options: dict[str, Any]) -> SweepFiles:
 
 
 def _variants(options: dict[str, Any]) -> list[Variant]:
+    from illumcli.scene.load import read_frames
     from illumcli.scene.variants import variants_of
 
     names = ("overrides", "together", "rows", "frames")
-    return variants_of(*(options.pop(name) for name in names))
+    overrides, *others = (options.pop(name) for name in names)
+    together, rows, frames = others
+    return variants_of(overrides, together, rows, frames, read_frames(options["scene"], overrides))
 
 
 @click.command()
@@ -64,11 +68,7 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 @studio_options
 @click.option("--zip", "together", is_flag=True, help="First values together, then second ones, ...")
 @click.option("--rows", type=FILE, metavar="FILE.csv", help="A variant per row: paths in the first line.")
-@click.option(
-    "--frames",
-    metavar="FIRST:LAST[:STEP]",
-    help="A variant per frame; a value may be a formula of frame.",
-)
+@frames_option
 @pattern_option
 @only_option
 @click.option("--sheet", type=FILE, metavar="FILE", help="Write a contact sheet, labelled: .png, .svg, .pdf.")
@@ -119,13 +119,14 @@ def sweep(
     from illumcli.cli._progress import reporter
     from illumcli.commands.sweep import sweep_scene
     from illumcli.render_graph.repairs import repair_lines
+    from illumcli.scene.problems import without_frame
 
     printed: set[str] = set()
 
     def written(outcome: Outcome) -> None:
         # a fault of the scene is the same in all variants: print it once
-        if outcome.error is not None and str(outcome.error) not in printed:
-            printed.add(str(outcome.error))
+        if outcome.error is not None and (fault := without_frame(str(outcome.error))) not in printed:
+            printed.add(fault)
             say(f"{outcome.label}: {outcome.error}")
         if outcome.report is None:
             return

@@ -34,6 +34,8 @@ class RenderOptions(Value):
     """Measure the error of reconstructed layers."""
     target_error: float | None = None
     """RMSE that sample counts are chosen for; by default the scene's counts."""
+    frames: str | None = None
+    """`FIRST:LAST` or `FIRST:LAST:STEP`, the frames to render; by default those of the scene."""
 
 
 class RenderJob(Value):
@@ -41,7 +43,9 @@ class RenderJob(Value):
 
     scene: Path
     options: RenderOptions = RenderOptions()
+    frame: int | None = None
+    """The frame of an animation; by default the scene's first, or none."""
     cameras: tuple[str, ...] = ()
     """Names of the cameras whose images are rendered; by default all."""
     fields: Mapping[str, Any] = field(default_factory=dict)
-    """Further fields for the names of its files, such as `frame`."""
+    """Further fields for the names of its files."""

@@ -1,29 +1,33 @@
-"""Render several scenes: faults are reported before the first ray, and the other scenes are rendered."""
+"""Render scenes and their frames: faults are reported before the first ray, and the others are rendered."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
 from illumcli.commands.turns import turns
-from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, unused_keys
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress
 from illumcli.records import Value
+from illumcli.scene.frames import FRAMES_PER_SECOND
+from illumcli.scene.problems import without_value
 
 
 class Rendered(Value):
-    """A rendered scene."""
+    """A rendered scene, or a frame of it."""
 
     scene: Path
     paths: list[Path]
     report: Report
+    frame: int | None = None
+    fps: float = FRAMES_PER_SECOND
 
 
 def render_scenes(
@@ -34,43 +38,62 @@ def render_scenes(
     written: Callable[[Rendered], None],
     tell: Tell,
 ) -> bool:
-    """Render every scene. True if the report is kept because it would be the same.
+    """Render every scene, or every frame of it. True if the report is kept because it would be the same.
 
-    `written` is called with each rendered scene, `tell` with the error of each that failed.
+    `written` is called with each rendered scene or frame, `tell` with the error of each that failed.
 
     Raises
     ------
     IllumError
         At the end if any scene failed; at once if files have equal names or the report cannot be written.
     """
-    batch = Batch("scenes", len(scenes), options.keep_going, tell)
-    worker, works, claims = Worker(), dict[int, Work](), dict[int, Path | None]()
-    entries = BatchReport(report, [{"scene": str(scene)} for scene in scenes])
+    jobs = RenderJobs(scenes, options)
+    what = "frames" if any(job.frame is not None for job in jobs) else "scenes"
+    batch = Batch(what, len(jobs), options.keep_going, _once(tell) if what == "frames" else tell)
+    entries = BatchReport(report, [_entry(job) for job in jobs])
+    claims: dict[int, Path | None] = {}
+    files: dict[tuple[Path, str], None] = {}  # every file once, even if a scene is given twice
 
     # Find faults before the first ray.
     for number in batch.due():
-        with batch.piece(number):
-            works[number] = work = worker.prepare(RenderJob(scenes[number], options))
+        with batch.piece(number, jobs.label(number)):
+            work = jobs.planned(number)
             claims[number] = work.claim if work.due() else None
             names = [str(target.path) for target in work.targets]
             entries.plan(number, digest((work.content, names, options.target_error)))
-    check_unique([str(path) for path, _ in _files(works)])
+            files |= dict.fromkeys((target.path, target.content) for target in work.targets)
+    check_unique([str(path) for path, _ in files])
     entries.look(options.force)
 
-    # Render.
+    # Render; buffers that the next frame reads stay in memory.
     for number in turns(batch, claims.__getitem__, progress):
-        with batch.piece(number):
-            work = works.pop(number)
-            paths, done = worker.run(work, progress)
-            done = replace(done, warnings=(*done.warnings, *unused_keys(work), *worker.finish()))
+        with batch.piece(number, jobs.label(number)):
+            work, following = jobs.work(number), jobs.following(number)
+            paths, done = jobs.worker.run(work, progress, following)
+            ending = jobs.worker.finish() if following is None else ()
+            done = replace(done, warnings=(*done.warnings, *jobs.unused(work.job.scene), *ending))
             if report is not None:
-                entries.add(number, done.as_data())
-            written(Rendered(work.job.scene, paths, done))
+                entries.add(number, _entry(work.job) | done.as_data())
+            frames = work.scene.frames
+            fps = frames.fps if frames else FRAMES_PER_SECOND
+            written(Rendered(work.job.scene, paths, done, work.job.frame, fps))
+        jobs.drop(number)
     return entries.finish(batch)
 
 
-def _files(works: dict[int, Work]) -> list[tuple[Path, str]]:
-    """Every file once, even if a scene is given twice."""
-    return list(
-        dict.fromkeys((target.path, target.content) for work in works.values() for target in work.targets)
-    )
+def _once(tell: Tell) -> Tell:
+    """Tells a fault at the first frame that has it, and names the frame once."""
+    told: set[str] = set()
+
+    def tell_once(text: str) -> None:
+        fault = without_value(text)
+        if fault not in told:
+            tell(text.partition(": ")[2] if ": at frame " in text else text)
+        told.add(fault)
+
+    return tell_once
+
+
+def _entry(job: RenderJob) -> dict[str, Any]:
+    """What the report says of a job before it is done."""
+    return {"scene": str(job.scene)} | ({} if job.frame is None else {"frame": job.frame})

@@ -7,13 +7,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from illumcli.commands.schema_generator import DIALECT, schema_of
+from illumcli.scene.curves import AnyCurve
 from illumcli.scene.spec import Scene
+from illumcli.schema.description import Description
 
 EXTENDS = {
     "description": "Scenes that this one extends, by path from its own folder: mappings merge, anything else "
     "replaces, null removes a key.",
     "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
 }
+
+FIXED = ("version", "frames")
+"""Keys of a scene that do not vary with the frame."""
+CURVE = "A value that varies with the frame."
 
 NULL = {"type": "null"}
 REFERENCE = "#/$defs/"
@@ -30,8 +36,12 @@ def schema() -> dict[str, Any]:
     A scene that extends another may leave out required keys, and remove keys of the other by null.
     """
     scene_schema = schema_of(Scene)
-    scene_schema["properties"] = {"extends": EXTENDS, **scene_schema["properties"]}
     parts = scene_schema.pop("$defs")
+    frames = parts.pop("Frames")
+    parts = {name: _varying(part) for name, part in parts.items()} | {"Frames": frames} | _curves()
+    fixed = {key: scene_schema["properties"][key] for key in FIXED}
+    scene_schema = _varying(scene_schema)
+    scene_schema["properties"] = {"extends": EXTENDS, **scene_schema["properties"], **fixed}
     partial = _Partial(parts)
     return {
         "$schema": DIALECT,
@@ -43,6 +53,39 @@ def schema() -> dict[str, Any]:
         "else": scene_schema,
         "$defs": parts | partial.definitions,
     }
+
+
+class _AnyCurve(Description):
+    curve: AnyCurve
+
+
+def _curves() -> dict[str, Any]:
+    """Definitions of the curves, and `Curve`, which is any of them."""
+    curves = schema_of(_AnyCurve)
+    return {**curves["$defs"], "Curve": {"description": CURVE, **curves["properties"]["curve"]}}
+
+
+def _varying(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """A schema in which every value may be a curve; the tags of mappings may not."""
+
+    def value(part: dict[str, Any]) -> dict[str, Any]:
+        if "const" in part:
+            return part
+        part = _varying(part)
+        about: dict[str, Any] = {key: part.pop(key) for key in ("description", "default") if key in part}
+        plain = part.pop("anyOf") if list(part) == ["anyOf"] else [part]
+        return {**about, "anyOf": [*plain, {"$ref": f"{REFERENCE}Curve"}]}
+
+    varying = dict(schema)
+    for key in ("properties", "patternProperties"):
+        if key in varying:
+            varying[key] = {name: value(part) for name, part in varying[key].items()}
+    for key in ("anyOf", "oneOf"):
+        if key in varying:
+            varying[key] = [_varying(part) for part in varying[key]]
+    if "items" in varying:
+        varying["items"] = value(varying["items"])
+    return varying
 
 
 class _Partial:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from illumcli.errors import InputError
-from illumcli.files.names import fields
+from illumcli.files.names import fields, frame_field
 from illumcli.scene.variants import LABEL, Variant
 
 
 def default_pattern(variants: Sequence[Variant]) -> str:
-    """A pattern that names every variant: by frame if frames differ, otherwise by the names that differ."""
-    if len({variant.frame for variant in variants}) > 1:
-        return "{scene}.{frame:04d}.png"
-    differ = [
-        path for path in variants[0].names if len({variant.names.get(path) for variant in variants}) > 1
-    ]
-    return "{scene}" + "".join(f"-{{{name}}}" for name in differ) + ".png"
+    """A pattern that names every variant: by the names that differ, and by the frame."""
+    now = [variant.names for variant in variants if variant.frame == variants[0].frame]
+    differ = [path for path in now[0] if len({names.get(path) for names in now}) > 1]
+    frames = [variant.frame for variant in variants if variant.frame is not None]
+    return "{scene}" + "".join(f"-{{{name}}}" for name in differ) + frame_field(frames) + ".png"
 
 
 def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:

@@ -30,7 +30,7 @@ class SweepWorks:
     def unit(self, outcome: Outcome) -> RenderJob:
         """The unit of work of a variant."""
         options = replace(self.options, overrides=tuple(outcome.variant.overrides), audit=False)
-        return RenderJob(self._path, options, fields=outcome.variant.fields)
+        return RenderJob(self._path, options, outcome.variant.frame, fields=outcome.variant.fields)
 
     def of(self, outcome: Outcome) -> Work:
         """The work of a variant."""

@@ -17,12 +17,15 @@ from illumcli.commands.render import rendered
 from illumcli.commands.report import Report
 from illumcli.commands.work import Work, prepared
 from illumcli.progress import Progress
+from illumcli.scene.animation import overrides_of_frame
 
 
 def rendered_to_target(work: Work, store: Store | None, progress: Progress) -> tuple[list[Path], Report]:
     """Choose sample counts that reach the target error of a job, and render its scene with them."""
     start = time.perf_counter()
-    job, options = work.job, work.job.options
+    options = work.job.options
+    options = replace(options, overrides=(*options.overrides, *overrides_of_frame(work.loaded)))
+    job = replace(work.job, options=options)
     assert options.target_error is not None
     choice, memory = _choice(job, options.target_error, store)
     overrides = (*options.overrides, *choice.overrides)

@@ -8,7 +8,7 @@ from pathlib import Path
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
-from illumcli.files.names import check_unique, expand
+from illumcli.files.names import check_unique, expand, frame_field
 from illumcli.film.develop import Target
 from illumcli.film.view import View
 from illumcli.layers import Layer
@@ -16,6 +16,7 @@ from illumcli.render_graph.build import Graph
 from illumcli.render_graph.keys import content_key
 from illumcli.scene.access import refuse_outside
 from illumcli.scene.scene_file import SceneFile
+from illumcli.scene.spec import Scene
 
 
 def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[Layer, ...]) -> list[Target]:
@@ -25,7 +26,7 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
     anywhere.
     """
     given = job.options.pattern
-    patterns = (given,) if given else graph.scene.outputs.files
+    patterns = (given,) if given else file_patterns(job, graph.scene)
     targets = []
     for view in graph.views:
         if job.cameras and view.name not in job.cameras:
@@ -45,9 +46,20 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
     return targets
 
 
+def file_patterns(job: RenderJob, scene: Scene) -> tuple[str, ...]:
+    """Name patterns of the scene; the default one has the number of the frame, if there are frames."""
+    frames = [
+        *([] if job.frame is None else [job.frame]),
+        *(scene.frames.numbers[-1:] if scene.frames else ()),
+    ]
+    if not frames or "files" in scene.outputs.model_fields_set:
+        return scene.outputs.files
+    return ("{scene}.{camera}" + frame_field(frames) + ".png",)
+
+
 def expanded(pattern: str, job: RenderJob, loaded: SceneFile, view: View, layer: str) -> Path:
     """The file that a pattern names for a view and layer of a job."""
-    fields = {"scene": loaded.name, "camera": view.name, "layer": layer, "frame": 0}
+    fields = {"scene": loaded.name, "camera": view.name, "layer": layer, "frame": loaded.frame}
     return Path(expand(pattern, {**loaded.overrides, **fields, **job.fields}))
 
 

@@ -63,6 +63,12 @@ class Worker:
     def _store(self) -> Store | None:
         return open_store()
 
+    def shared(self, scene: Path) -> SharedParts:
+        """What the units of a scene share; the scene's text is read once."""
+        if scene not in self._scenes:
+            self._scenes[scene] = SharedParts(read_text(scene))
+        return self._scenes[scene]
+
     @overload
     def prepare(self, unit: RenderJob) -> Work: ...
     @overload
@@ -76,10 +82,9 @@ class Worker:
             Any fault that can be found before the first ray.
         """
         if isinstance(unit, RenderJob):
-            if unit.scene not in self._scenes:
-                self._scenes[unit.scene] = SharedParts(read_text(unit.scene))
-            shared = self._scenes[unit.scene]
-            return work_of(unit, load(unit.scene, unit.options.overrides, shared.text), shared.files)
+            shared = self.shared(unit.scene)
+            loaded = load(unit.scene, unit.options.overrides, shared.text, unit.frame)
+            return work_of(unit, loaded, shared.files)
         from illumcli.baking.inputs import prepare_bake
 
         return prepare_bake(unit)

@@ -81,7 +81,7 @@ def prepared(job: RenderJob) -> Work:
     InputError, LimitError
         Any fault that can be found before rendering.
     """
-    return work_of(job, load(job.scene, job.options.overrides))
+    return work_of(job, load(job.scene, job.options.overrides, frame=job.frame))
 
 
 def work_of(job: RenderJob, loaded: SceneFile, files: FileFingerprints | None = None) -> Work:

@@ -65,6 +65,11 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
     return name
 
 
+def frame_field(frames: Sequence[int]) -> str:
+    """The part of a pattern that names frames, with at least four digits; empty without frames."""
+    return f".{{frame:0{max(4, len(str(max(frames))))}d}}" if frames else ""
+
+
 def fields(pattern: str) -> set[str]:
     """The names of the fields in `pattern`."""
     return {match["name"] for match in _FIELD.finditer(pattern) if match["name"] is not None}

@@ -52,6 +52,7 @@ FUNCTIONS: dict[str, _Parts] = {
     "sqrt": (np.sqrt, (lambda a, f: 0.5 / f,)),
     "abs": (np.abs, (lambda a, f: np.sign(a),)),
     "atan2": (np.arctan2, (lambda a, b, f: b / (a * a + b * b), lambda a, b, f: -a / (a * a + b * b))),
+    "mod": (np.mod, (lambda a, b, f: 1.0, lambda a, b, f: -np.floor(a / b))),
     "min": (np.minimum, (lambda a, b, f: a <= b, lambda a, b, f: a > b)),
     "max": (np.maximum, (lambda a, b, f: a >= b, lambda a, b, f: a < b)),
 }

@@ -77,9 +77,16 @@ def file_problems(loaded: SceneFile) -> list[str]:
 def paths_in(tree: Node) -> Iterator[tuple[source.Path, Node]]:
     """The nodes of a tree whose text is the path of a file."""
     for path, node in tree.places():
-        key = path[-1] if path else None
-        if isinstance(node.value, str) and (key in PATHS or (key == "mesh" and "." in node.value)):
+        if isinstance(node.value, str) and is_path(path, node.value):
             yield path, node
+
+
+def is_path(path: source.Path, text: str) -> bool:
+    """True if a text at `path` of a scene is the path of a file; the keys of a curve stand for its place."""
+    if len(path) > 2 and path[-2] == "keys":
+        path = path[:-2]
+    key = path[-1] if path else None
+    return key in PATHS or (key == "mesh" and "." in text)
 
 
 def readable_folders(folder: Path) -> tuple[Path, ...]:

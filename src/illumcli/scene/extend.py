@@ -10,7 +10,9 @@ from typing import Any
 
 from illumcli.scene import source
 from illumcli.scene.access import file_inside, paths_in
+from illumcli.scene.curves import CURVES
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
+from illumcli.schema.families import tags
 from illumcli.schema.messages import describe
 
 MAX_EXTENDS = 8  # length of a chain of files, each of which extends the next
@@ -110,9 +112,10 @@ def merged(base: Node, over: Node) -> Node:
 def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
     """The tag of a mapping, from its keys; a mesh or material that is named like a tag is not text."""
     texts = {key: node.value for key, node in entries.items() if isinstance(node.value, str)}
-    return {key: value for key, value in texts.items() if key in CHOICES} | {
-        key: True for key in ("file", "texture", "vertex") if key in texts
-    }
+    kind: dict[str, Any] = {key: value for key, value in texts.items() if key in CHOICES}
+    if "curve" in texts and texts["curve"] in tags(CURVES):
+        return kind | {"curve": texts["curve"]}
+    return kind | {key: True for key in ("file", "texture", "vertex") if key in texts}
 
 
 def _moved(tree: Node, folder: str) -> Node:

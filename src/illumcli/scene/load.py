@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,9 +13,11 @@ from illumcli.errors import InputError
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Value
 from illumcli.scene.access import readable_folders
+from illumcli.scene.animation import AtFrame, Surroundings, TableFiles, at_frame, frames_of
 from illumcli.scene.blame import Applied, PlacedFault, blamed
 from illumcli.scene.extend import SceneReader
 from illumcli.scene.faults import faults
+from illumcli.scene.frames import Frames
 from illumcli.scene.override import Override, assign, parse
 from illumcli.scene.problems import problem_at, problem_lines
 from illumcli.scene.references import reference_faults
@@ -33,6 +36,8 @@ class SceneText(Value):
     tree: Node | None
     problems: tuple[Problem, ...]
     roots: tuple[Path, ...]
+    tables: TableFiles = field(default_factory=TableFiles)
+    """Files that its curves name, once they were read."""
 
 
 def read_text(path: Path) -> SceneText:
@@ -42,8 +47,23 @@ def read_text(path: Path) -> SceneText:
     return SceneText(tree, tuple(reader.problems), reader.roots)
 
 
-def load(path: Path, overrides: Sequence[str] = (), text: SceneText | None = None) -> SceneFile:
-    """The scene in a file, or the studio scene with the mesh of a mesh file.
+def read_frames(path: Path, overrides: Sequence[str] = (), text: SceneText | None = None) -> Frames | None:
+    """The frames of the scene in a file; None if it has none, or faulty ones, which `load` reports.
+
+    Parameters are those of `load`.
+    """
+    ignored: list[Problem] = []
+    tree = (text or read_text(path)).tree or Node({}, Place(str(path)))
+    for each in overrides:
+        if each.lstrip().startswith("frames") and (change := parse(each, ignored)):
+            tree = assign(tree, change, ignored) or tree
+    return frames_of(tree)
+
+
+def load(
+    path: Path, overrides: Sequence[str] = (), text: SceneText | None = None, frame: int | None = None
+) -> SceneFile:
+    """The scene in a file at a frame, or the studio scene with the mesh of a mesh file.
 
     A scene may read files in its own folder, the folder above, the current one and those of ILLUM_ALLOW.
 
@@ -55,6 +75,8 @@ def load(path: Path, overrides: Sequence[str] = (), text: SceneText | None = Non
         `PATH=VALUE`, applied in turn; the value is YAML, and `null` removes a part.
     text : SceneText, optional
         Of the file, where it was read before: variants of a scene are what it was then.
+    frame : int, optional
+        Where the scene's curves are evaluated; by default at the first of its frames.
 
     Raises
     ------
@@ -83,12 +105,20 @@ def load(path: Path, overrides: Sequence[str] = (), text: SceneText | None = Non
                 applied.append(Applied(change, tree))
                 tree = changed
 
-    # Validate the tree.
-    scene = None if tree is None else _validated(Scene, tree, reader.problems, applied)
-    if scene is None or tree is None or reader.problems:
+    # Evaluate its curves, and validate the tree.
+    surroundings = Surroundings(path.parent, reader.roots, text.tables)
+
+    def animated(tree: Node) -> AtFrame:
+        return at_frame(tree, frame, surroundings)
+
+    now = None if tree is None else animated(tree)
+    scene = None if now is None else _validated(Scene, now, reader.problems, applied, animated)
+    if scene is None or now is None or reader.problems:
         raise InputError(problem_lines(reader.problems, overrides))
     values = {change.text: change.value.plain() for change in changes if change.text}
-    return SceneFile(scene, path, path.parent, path.stem, values, tree, reader.roots)
+    return SceneFile(
+        scene, path, path.parent, path.stem, values, now.tree, reader.roots, now.frame, now.varying
+    )
 
 
 def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> Node | None:
@@ -96,7 +126,7 @@ def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> No
     tree, given = reader.file(STUDIO, ()), Node({}, Place(str(STUDIO)))
     for change in settings:
         given = assign(given, change, reader.problems) or given
-    studio_settings = _validated(Settings, given, reader.problems)
+    studio_settings = _validated(Settings, AtFrame(given, 0), reader.problems)
     if tree is None or studio_settings is None:
         return tree
     mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
@@ -104,26 +134,33 @@ def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> No
 
 
 def _validated(
-    kind: type[D], tree: Node, problems: list[Problem], applied: Sequence[Applied] = ()
+    kind: type[D],
+    now: AtFrame,
+    problems: list[Problem],
+    applied: Sequence[Applied] = (),
+    animated: Callable[[Node], AtFrame] = lambda tree: AtFrame(tree, 0),
 ) -> D | None:
     """The description that a tree describes; None if it has faults, which are added to `problems`."""
-    description, tree_faults = _judged(kind, tree)
-    known = {problem.place for problem in problems}
+    description, tree_faults = _judged(kind, now)
+    known = {problem.place for problem in (*problems, *now.problems)}
+    problems += now.problems
     problems += [
         fault if isinstance(fault, Problem) else problem_at(*fault)
-        for fault in blamed(tree_faults, tree, applied, lambda before: _judged(kind, before)[1])
+        for fault in blamed(tree_faults, now.tree, applied, lambda before: _judged(kind, animated(before))[1])
         if fault.place not in known
     ]
     return description
 
 
-def _judged(kind: type[D], tree: Node) -> tuple[D | None, list[PlacedFault]]:
+def _judged(kind: type[D], now: AtFrame) -> tuple[D | None, list[PlacedFault]]:
     """The description that a tree describes, or None and its faults."""
-    plain = tree.plain()
+    plain = now.tree.plain()
     try:
         return kind.model_validate(plain), []
     except ValidationError as error:
         tree_faults = [*faults(error, kind, plain), *(reference_faults(plain) if kind is Scene else ())]
     return None, [
-        PlacedFault((tree.find(path) or tree).at, path, fact) for path, fact in dict.fromkeys(tree_faults)
+        PlacedFault((now.tree.find(path) or now.tree).at, path, now.said(path, fact))
+        for path, fact in dict.fromkeys(tree_faults)
+        if not any(path[: len(faulty)] == faulty for faulty in now.faulty)
     ]

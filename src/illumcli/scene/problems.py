@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from illumcli.scene.source import Path, Place, Problem
@@ -24,3 +25,32 @@ def problem_lines(problems: Sequence[Problem], overrides: Sequence[str] = ()) ->
         return sources.index(name) if name in sources else -1, line, column
 
     return list(dict.fromkeys(str(problem) for problem in sorted(problems, key=order)))
+
+
+def without_frame(text: str) -> str:
+    """A fault without frame, place and value: the same for a value that has it at several frames."""
+    return _OF_FRAME.sub("", text)
+
+
+_OF_FRAME = re.compile(r"\bframe \d+|:\d+:\d+:(?= )|\bis [-+.\de]+")
+
+
+def without_value(text: str) -> str:
+    """The same, without the value of an override, which may vary too."""
+    return re.sub(r"(-D [^=]*=).*?: (?:[\w.-]+: )?(?:at : )?", r"\1", without_frame(text))
+
+
+def at_all_frames(lines: Sequence[str]) -> list[str]:
+    """Faults of several frames, in order; one that several frames have stands there once, and names them."""
+    groups: dict[str, list[str]] = {}
+    for line in lines:
+        groups.setdefault(without_value(line), []).append(line)
+    joined = []
+    for first, *others in groups.values():
+        frames = [match for line in (first, *others) for match in re.findall(r": at frame (\d+): ", line)]
+        if others and frames:
+            frames_text = f": at {len(frames)} frames from {frames[0]} to {frames[-1]}: "
+            joined.append(re.sub(r": at frame \d+: ", frames_text, first, count=1))
+        else:
+            joined.append(first)
+    return joined

@@ -28,9 +28,13 @@ class SceneFile(Value):
     overrides: dict[str, Any]
     """Value by path, as given with -D, for patterns of file names."""
     tree: Node = field(repr=False)
-    """The file's tree after extension and overrides, with the place of every node."""
+    """The file's tree after extension, overrides and curves, with the place of every node."""
     roots: tuple[Path, ...] = field(repr=False)
     """The folders that the scene may read from."""
+    frame: int = 0
+    """The frame that the scene's curves were evaluated at."""
+    varying: tuple[source.Path, ...] = field(default=(), repr=False)
+    """The paths of the values that vary with the frame."""
 
 
 def unused_lines(

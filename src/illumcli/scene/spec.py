@@ -24,6 +24,7 @@ from illumcli.geometry.shapes import AnyShape, Shape
 from illumcli.layers import NAMES
 from illumcli.lights import AnyLight
 from illumcli.models import AnyModel
+from illumcli.scene.frames import Frames
 from illumcli.scene.references import reference_faults
 from illumcli.schema.description import DEFAULTS, Description, default_of
 from illumcli.schema.fields import (
@@ -390,6 +391,8 @@ class Scene(Description):
     """A single camera, named `main`."""
     cameras: dict[Name, Camera] = DEFAULTS
     """Several cameras by name, instead of `camera`."""
+    frames: Frames | None = None
+    """The frames of an animation: any value of the scene may then be a curve; by default a single picture."""
     film: Film = DEFAULTS
     """Size and sampling of the image."""
     shading: Rate = "phong"

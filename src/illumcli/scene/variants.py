@@ -15,15 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from illumcli.errors import InputError, LimitError
-from illumcli.geometry.formula import parse as formula
 from illumcli.records import Value
+from illumcli.scene.curves._formula import formula_at
+from illumcli.scene.frames import FRAMES_PER_SECOND, Frames, Moment, frame_numbers
 from illumcli.scene.source import MAX_DEPTH
 from illumcli.schema.messages import short
 
 MAX_VARIANTS = 100_000
 MAX_TABLE_BYTES = 2**26
-LAST_FRAME = 2**53
-"""Formulas of `frame` are computed in double precision."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)(log)?")
@@ -46,7 +45,8 @@ class Variant(Value):
     """A variant of a scene: the value of each path that varies, and the frame."""
 
     values: Mapping[str, str]
-    frame: int = 0
+    frame: int | None = None
+    """None if there are no frames."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Path -> name of its value, by default the value. The name of a row, as `label`, replaces its paths."""
     parts: tuple[str, ...] = ()
@@ -64,14 +64,17 @@ class Variant(Value):
         return ", ".join(self.parts)
 
     @property
-    def fields(self) -> dict[str, str | int]:
-        """Fields for names of files: the frame and all names that are not the values themselves."""
-        named = {path: name for path, name in self.names.items() if name != self.values.get(path)}
-        return {"frame": self.frame, **named}
+    def fields(self) -> dict[str, str]:
+        """Fields for names of files: all names that are not the values themselves."""
+        return {path: name for path, name in self.names.items() if name != self.values.get(path)}
 
 
 def variants_of(
-    texts: Sequence[str], together: bool = False, rows: Path | None = None, frames: str | None = None
+    texts: Sequence[str],
+    together: bool = False,
+    rows: Path | None = None,
+    frames: str | None = None,
+    of_scene: Frames | None = None,
 ) -> list[Variant]:
     """The variants that a sweep's options describe.
 
@@ -87,14 +90,18 @@ def variants_of(
         CSV: paths in its first line, the values of a variant in each other line. A column `label` has the
         names of the rows.
     frames : str, optional
-        `FIRST:LAST` or `FIRST:LAST:STEP`, both ends included; values may be formulas of `frame`.
+        `FIRST:LAST` or `FIRST:LAST:STEP`, both ends included; by default the frames of the scene. Every
+        variant has every frame, and values may be formulas of `frame` and `time`.
+    of_scene : Frames, optional
+        The frames of the scene.
 
     Raises
     ------
     InputError
     """
     # Values of each path, rows of the table, frames; refuse too many.
-    numbers = _frames(frames) if frames else None
+    numbers = frame_numbers(frames) if frames else of_scene.numbers if of_scene else None
+    fps = of_scene.fps if of_scene else FRAMES_PER_SECOND
     axes = [axis_of(text) for text in texts]
     table = _rows(rows) if rows else [_Point({}, {})]
     lengths = [len(axis.values) for axis in axes]
@@ -117,10 +124,11 @@ def variants_of(
             for path in differ
         ]
         if numbers is None:
-            variants.append(Variant(values, 0, names, tuple(parts)))
+            variants.append(Variant(values, None, names, tuple(parts)))
         for n in numbers or ():
             values_then, names_then = (
-                {path: at_frame(path, text, n) for path, text in texts.items()} for texts in (values, names)
+                {path: at_frame(path, text, n, fps) for path, text in texts.items()}
+                for texts in (values, names)
             )
             variants.append(Variant(values_then, n, names_then, (*parts, f"frame {n}")))
     return variants
@@ -183,34 +191,19 @@ def split_at_commas(text: str) -> list[str]:
     return [*parts, text[start:]]
 
 
-def at_frame(path: str, value: str, frame: int) -> str:
-    """`value` with every formula of `frame` evaluated."""
+def at_frame(path: str, value: str, frame: int, fps: float = FRAMES_PER_SECOND) -> str:
+    """`value` with every formula of `frame` and `time` evaluated."""
     text = value.strip()
-    if not re.search(r"\bframe\b", text):
+    if not re.search(r"\b(frame|time)\b", text) or text.startswith("{"):
         return text
     if text.startswith("[" * MAX_DEPTH):
         raise InputError(f"-D {path}={short(value)}: nested deeper than {MAX_DEPTH} levels")
     if text.startswith("[") and text.endswith("]"):
-        return f"[{', '.join(at_frame(path, part, frame) for part in split_at_commas(text[1:-1]))}]"
+        return f"[{', '.join(at_frame(path, part, frame, fps) for part in split_at_commas(text[1:-1]))}]"
     try:
-        number = float(formula(text, ("frame",)).value(frame))
+        return str(formula_at(text, Moment(frame, frame / fps)))
     except ValueError as error:
-        raise InputError(f"-D {path}={value}: {error}") from None
-    if not math.isfinite(number):
-        raise InputError(f"-D {path}={value}: is not a finite number at frame {frame}")
-    return written_number(number)
-
-
-def _frames(text: str) -> range:
-    span = re.fullmatch(r"(\d+):(\d+)(?::(\d+))?", text, re.ASCII)
-    if span and max(len(digits) for digits in span.groups("")) > len(str(LAST_FRAME)):
-        raise InputError(f"--frames {short(text)}: frames are counted up to {LAST_FRAME}")
-    first, last, step = (int(digits) for digits in span.groups("1")) if span else (0, -1, 1)
-    if last < first or step == 0:
-        raise InputError(f"--frames {short(text)}: write FIRST:LAST or FIRST:LAST:STEP, as in 0:119")
-    if last > LAST_FRAME:
-        raise InputError(f"--frames {text}: frames are counted up to {LAST_FRAME}")
-    return range(first, last + 1, step)
+        raise InputError(f"-D {path}={value}: at frame {frame}: {error}") from None
 
 
 class _Point(Value):

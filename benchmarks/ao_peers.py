@@ -40,7 +40,7 @@ from illumcli.baking.settings import BakeSettings
 from illumcli.files.journal import Journal
 from illumcli.progress import no_progress
 from illumcli.rays.sampling import GOLDEN
-from illumcli.visibility.hemisphere import turned_frame
+from illumcli.visibility.hemisphere import PACKET, turned_frame
 from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64) if SMALL else (16, 64, 256, 1024)
@@ -156,9 +156,13 @@ def peers(path: Path, own: BakeSampler, few: np.ndarray, truth: np.ndarray) -> l
 
 def starts(own: BakeSampler) -> np.ndarray:
     """(M, 3) one of the places around each point from which rays start."""
-    every = np.arange(len(own.points.key))
-    over = own.points.hemispheres(every, np.zeros(len(every)))
-    return over.origins[:: over.origins_per_point]
+    out = np.empty_like(own.points.position)
+    for is_flat in (False, True):
+        some = np.flatnonzero(own.points.is_flat == is_flat)
+        if some.size:
+            over = own.points.hemispheres(some, np.zeros(len(some)), PACKET, own.method.sampler)
+            out[some] = over.origins[:: over.origins_per_point]
+    return out
 
 
 def even(own: BakeSampler, few: np.ndarray) -> np.ndarray:

@@ -44,12 +44,16 @@ def main() -> None:
     at_once = max(1, obscurance.RAYS_AT_ONCE // SAMPLES)
 
     def prepared(order: np.ndarray, at_once: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        calls = []
-        for first in range(0, len(order), at_once):
-            part = order[first : first + at_once]
+        calls, sampler, flat = [], bake.method.sampler, bake.points.is_flat[order]
+        parts = [
+            some[first : first + at_once]
+            for some in (order[~flat], order[flat])
+            for first in range(0, len(some), at_once)
+        ]
+        for part in parts:
             draws = np.stack([unit_interval(hashed(key, bake.points.key[part])) for key in keys])
-            over = bake.points.hemispheres(part, draws[2])
-            rays = hemisphere_rays(over, draws[:2], SAMPLES, bake.method.sampler)
+            over = bake.points.hemispheres(part, draws[2], SAMPLES, sampler)
+            rays = hemisphere_rays(over, draws[:2], SAMPLES, sampler)
             calls.append((np.ascontiguousarray(rays.starts()), np.ascontiguousarray(rays.directions())))
         return calls
 

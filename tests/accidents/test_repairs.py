@@ -110,6 +110,14 @@ def test_strict_refuses_every_class_and_writes_nothing(illum, scene, words):
     assert sorted(path.name for path in scene.iterdir() if path.name != "cache") == before
 
 
+def test_strict_refuses_where_every_image_is_kept(illum, scene):
+    assert illum("render", "s.yaml").returncode == 0
+    assert "kept" in illum("render", "s.yaml").stderr
+    done = illum("render", "s.yaml", "--strict")
+    assert done.returncode == 2
+    assert sum("leave --strict out" in line for line in done.stderr.splitlines()) == len(EXPECTED)
+
+
 def test_strict_takes_a_sound_mesh(illum, scene):
     (scene / "bad.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert illum("render", "s.yaml", "--strict").returncode == 0

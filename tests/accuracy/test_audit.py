@@ -135,6 +135,7 @@ def test_the_report_and_the_terminal_state_it(path, illum, tmp_path):
     assert 0 < stated["low"] < stated["rmse"] < stated["high"]
     assert report["rays"]["audit"] == stated["rays"]
     assert f"RMSE of beauty of main: {stated['rmse']:.3g}" in done.stderr
+    assert f"from {stated['draws']} draws of pixels" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def test_a_target_that_is_missed_by_far_is_seen_early():
     whole = audit(Sampler(truth, 0.01, 0), values, 0)
     early = audit(Sampler(truth, 0.01, 0), values, 0, target=0.005)
     assert early.mean_square - 3 * early.spread > 0.005**2
-    assert early.points < whole.points
+    assert early.draws < whole.draws
 
 
 def test_no_values_have_no_error():

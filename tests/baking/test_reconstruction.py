@@ -26,6 +26,7 @@ def points_at(position, n, objects=None):
         position=np.asfortranarray(position, np.float32),
         key=np.arange(count, dtype=np.uint32),
         objects=np.zeros(count, np.int32) if objects is None else objects,
+        is_flat=np.ones(count, bool),
     )
 
 

@@ -537,7 +537,7 @@ def test_a_mesh_stands_in_the_studio(write, tmp_path):
     assert resolve(loaded, "bunny.obj") == mesh
     assert load(tmp_path / "none.ply").scene.film.width == 1280
     (line,) = file_problems(load(tmp_path / "none.ply"))
-    assert line == f"{tmp_path}/none.ply: meshes.subject.file: no file {tmp_path}/none.ply"
+    assert line == f"{tmp_path}/none.ply: no file {tmp_path}/none.ply"
 
 
 # any text

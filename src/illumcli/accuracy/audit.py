@@ -64,7 +64,8 @@ class AuditedError(Value):
     low: float
     high: float
     """Interval that holds the truth in 95 of 100 pictures."""
-    pixels: int
+    draws: int
+    """Of pixels; one that was drawn twice counts twice, each time with other rays."""
     rays: int = 0
     """Of every kind, that the audit took."""
 

@@ -24,7 +24,9 @@ class AreaPoints(Points):
     v: NDArray[np.float64]  # (M,) barycentric weight of corner 2
     area: NDArray[np.float64]  # (M,) area of the surface that each point represents, in radii^2
 
-    def hemispheres(self, index: NDArray[np.int64], offset: Floats) -> Hemispheres:
+    def hemispheres(
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+    ) -> Hemispheres:
         return Hemispheres(self.n, self.origins, self.ng).take(index)
 
     def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -66,6 +68,7 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
         column_major(interaction.position, F),
         np.arange(len(triangle), dtype=np.uint32),
         geometry.objects[triangle],
+        np.ones(len(triangle), bool),
         offset_ray_origins(interaction.position, interaction.ng, interaction.edge),
         interaction.ng,
         triangle,

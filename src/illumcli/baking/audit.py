@@ -53,7 +53,7 @@ class Audit(Record):
     mean_square: float
     spread: float  # standard error of the mean square
     law: ErrorLaw
-    points: int  # pairs of estimates
+    draws: int  # of points; one that was drawn twice counts twice, each time with other rays
     samples: int  # rays of each estimate
     rays: int
 

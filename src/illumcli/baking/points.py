@@ -26,15 +26,23 @@ class Points(Record):
     position: Vectors  # (M, 3) float32 in radii
     key: NDArray[np.uint32]  # (M,) of each point's random numbers
     objects: Ids  # (M,) object of each point
+    is_flat: NDArray[np.bool_]  # (M,) True where the triangles around a point are nearly in one plane
 
-    def hemispheres(self, index: NDArray[np.int64], offset: Floats) -> Hemispheres:
-        """Origins and axes of the rays of the points at `index`.
+    def hemispheres(
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+    ) -> Hemispheres:
+        """Origins and axes of the rays of some points.
 
         Parameters
         ----------
         index : (K,) int64
+            Points that are all flat, or all not.
         offset : (K,) float64
             Random, in [0, 1): shifts how each point's origins are divided among its triangles.
+        samples : int
+            Rays of each point.
+        sampler : str
+            Name of their pattern.
         """
         raise NotImplementedError
 

@@ -143,7 +143,7 @@ class ReconstructedBake(Record):
             "audit": {
                 "low": low,
                 "high": high,
-                "points": measured.points,
+                "draws": measured.draws,
                 "samples": measured.samples,
             },
         }

@@ -140,7 +140,8 @@ class BakeSampler(Record):
         def compute(unit: WorkUnit, stop: threading.Event) -> tuple[Estimates, int]:
             key = self.points.key[unit.points]
             draws = np.stack([unit_interval(hashed(stream_key, key)) for stream_key in keys])
-            hemispheres = self.points.hemispheres(unit.points, draws[2])
+            sampler = self.method.sampler
+            hemispheres = self.points.hemispheres(unit.points, draws[2], unit.samples, sampler)
             occluders = self.occluders[unit.object]
             tracer = occluders.tracer.counting(stop)
             method = replace(self.method, samples=unit.samples, triangle_normals=occluders.normals)
@@ -237,16 +238,21 @@ class BakeSampler(Record):
         return ChosenSamples(samples, pilot.rays, rays)
 
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
-        """Units of neighbouring points of one object that cast the same number of rays."""
+        """Units of neighbouring points of one object that cast the same number of rays in one way."""
         samples = np.zeros(len(self.order), np.int64)
         samples[counts.points] = counts.samples
-        objects, along = self.points.objects[self.order], samples[self.order]
-        for index in np.unique(objects):
-            for count in np.unique(along[(objects == index) & (along > 0)]):
-                group = self.order[(along == count) & (objects == index)]
-                size = max(1, UNIT_RAYS // int(count))
-                for first in range(0, len(group), size):
-                    yield WorkUnit(group[first : first + size], int(count), int(index))
+        # Group them, along their order.
+        order = self.order[samples[self.order] > 0]
+        objects, is_flat = self.points.objects[order].astype(np.int64), self.points.is_flat[order]
+        kind = (objects * (MAX_SAMPLES + 1) + samples[order]) * 2 + is_flat
+        by_kind = np.argsort(kind, kind="stable")
+        begins = np.flatnonzero(np.diff(kind[by_kind], prepend=-1))
+
+        for group in np.split(order[by_kind], begins[1:]) if len(order) else ():
+            count = int(samples[group[0]])
+            size = max(1, UNIT_RAYS // count)
+            for first in range(0, len(group), size):
+                yield WorkUnit(group[first : first + size], count, int(self.points.objects[group[0]]))
 
     def _run(
         self, purpose: str, units: Sequence[WorkUnit], compute: Compute[Result]

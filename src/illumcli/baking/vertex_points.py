@@ -3,6 +3,10 @@
 The value at a vertex is the limit that images tend to there. Its rays are divided among the triangles around
 it by angle; each starts just inside its triangle, offset from it, and is mirrored at that triangle's plane. A
 vertex with several shading normals (a hard edge, a seam) has a point for each.
+
+What a ray meets next to the vertex depends on the angle at which it starts. So the angles, like directions,
+are spread evenly, and there are more of them the more rays there are: the error keeps falling. Where the
+triangles are nearly in one plane, angles matter little, and the rays of a packet share a start.
 """
 
 from __future__ import annotations
@@ -18,10 +22,16 @@ from illumcli.baking.wedges import CornerWedges, Triangles, corner_wedges, polyg
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.records import Record
-from illumcli.visibility.hemisphere import Hemispheres
+from illumcli.visibility.hemisphere import Hemispheres, packet_of_ray
 
-ORIGINS = 16
-"""Places around a vertex from which its rays start."""
+RAYS_PER_ORIGIN = 4
+"""Rays that start at one place, where the triangles around a vertex are not nearly in one plane."""
+ORIGIN_STEP = 3**0.5
+"""From the angle of one start to the next, in turns: with the golden angle of the spiral, the rays fill
+directions and starts evenly."""
+FLAT_COSINE, FLAT_ANGLE = 0.95, 0.95 * 2 * np.pi
+"""Where no triangle around a point is at more than 18 degrees to the normal, and they close the fan, they are
+nearly in one plane. With one start per packet of rays, errors there are the same."""
 INSET = 2.0**-8
 """How far inside its triangle a ray of a vertex starts, as a share of the shorter edge there."""
 SAME_NORMAL = 1e-4
@@ -45,8 +55,16 @@ class VertexPoints(Points):
     wedges: Wedges
     triangles: Triangles
 
-    def hemispheres(self, index: NDArray[np.int64], offset: Floats) -> Hemispheres:
-        # the wedges of these points, and how many of the evenly spaced origins fall into each
+    def hemispheres(
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+    ) -> Hemispheres:
+        if self.is_flat[index].all():
+            origin_of_ray = packet_of_ray(sampler, samples)
+        else:
+            origin_of_ray = np.arange(samples, dtype=np.int32) % -(-samples // RAYS_PER_ORIGIN)
+        origins = int(origin_of_ray.max()) + 1
+
+        # the wedges of these points, and where each begins and ends among those of its point
         first, end = self.wedges.first[index], self.wedges.first[index + 1]
         count = end - first
         ends = np.cumsum(count)
@@ -54,22 +72,24 @@ class VertexPoints(Points):
         angle = self.wedges.angle[wedge].astype(np.float64)
         upto = np.cumsum(angle)
         before = np.repeat((upto - angle)[ends - count], count)
-        total = np.repeat(upto[ends - 1], count) - before
-        slot = np.ceil((upto - before) / total * ORIGINS - np.repeat(offset, count)).clip(0, ORIGINS)
-        slot[ends - 1] = ORIGINS
-        previous = np.concatenate([[0], slot[:-1]])
-        previous[ends - count] = 0
-        holder = np.repeat(np.arange(len(wedge)), (slot - previous).astype(np.int64))
+        begins, total = upto - angle - before, (upto - before)[ends - 1]
 
-        # each origin at its angle inside its wedge
-        place = np.tile(np.arange(ORIGINS), len(index)) + np.repeat(offset, ORIGINS)
-        turn = place / ORIGINS * total[holder] - (upto - before - angle)[holder]
+        # the wedge of each origin, and the origin's angle inside it
+        place = (np.arange(origins) * ORIGIN_STEP + offset[:, None]) % 1
+        point = np.arange(len(index))
+        upto = (upto - before) / np.repeat(total, count) + np.repeat(point, count)
+        holder = np.searchsorted(upto, (place + point[:, None]).ravel(), side="right")
+        holder = np.clip(holder, np.repeat(ends - count, origins), np.repeat(ends - 1, origins))
+        turn = (place * total[:, None]).ravel() - begins[holder]
         turn = turn.clip(0, angle[holder]).astype(F)
+
         base, ahead, aside, ng = self._insets(wedge)
-        origins = take_rows(base, holder)
-        origins += np.cos(turn)[:, None] * take_rows(ahead, holder)
-        origins += np.sin(turn)[:, None] * take_rows(aside, holder)
-        return Hemispheres(take_rows(self.n, index), origins, take_rows(ng, holder))
+        starts = take_rows(base, holder)
+        starts += np.cos(turn)[:, None] * take_rows(ahead, holder)
+        starts += np.sin(turn)[:, None] * take_rows(aside, holder)
+        return Hemispheres(
+            take_rows(self.n, index), starts, take_rows(ng, holder), origin_of_ray=origin_of_ray
+        )
 
     def _insets(self, wedge: NDArray[np.int64]) -> tuple[Vectors, Vectors, Vectors, Vectors]:
         """Of some wedges, (K, 3) float32 each: the corner, offset from its triangle; the step inwards along
@@ -151,13 +171,16 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
     # the points themselves
     corner = first_corner[first_side]
     at = vertex[corner]
+    normal = column_major(take_rows(n, corner), F)
+    grouped = _grouped(wedges, point_of_corner, len(first_side))
     points = VertexPoints(
         geometry,
-        column_major(take_rows(n, corner), F),
+        normal,
         column_major(take_rows(geometry.vertices, at), F),
         _random_keys(at, len(geometry.vertices)),
         objects[at],
-        _grouped(wedges, point_of_corner, len(first_side)),
+        _is_flat(grouped, normal, triangles.ng),
+        grouped,
         triangles,
     )
 
@@ -183,6 +206,17 @@ def _grouped(wedges: CornerWedges, point_of_corner: NDArray[np.int64], count: in
     order = order[np.searchsorted(point[order], 0) :]
     first = np.searchsorted(point[order], np.arange(count + 1))
     return Wedges(first, wedges.triangle[order], wedges.vertex[order], wedges.angle[order].astype(F))
+
+
+def _is_flat(wedges: Wedges, n: Vectors, ng: Vectors) -> NDArray[np.bool_]:
+    """(M,) True for points whose wedges are nearly in one plane, all around."""
+    if not len(n):
+        return np.zeros(0, bool)
+    count = np.diff(wedges.first)
+    cosine = dot(take_rows(n, np.repeat(np.arange(len(n)), count)), take_rows(ng, wedges.triangle))
+    least = np.minimum.reduceat(cosine, wedges.first[:-1])
+    total = np.add.reduceat(wedges.angle, wedges.first[:-1])
+    return (least >= FLAT_COSINE) & (total >= FLAT_ANGLE)
 
 
 def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

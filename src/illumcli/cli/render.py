@@ -133,7 +133,7 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
         fact = f"{report.clamped} values beyond 65504, the largest of half precision, are written as that"
         say(f"{done.scene}: {fact}; outputs.colour: float keeps them")
     for camera, error in report.audited_error.items():
-        fact = f"{error['rmse']:.3g} +- {error['standard_error']:.2g}, at {error['pixels']} pixels"
+        fact = f"{error['rmse']:.3g} +- {error['standard_error']:.2g}, from {error['draws']} draws of pixels"
         say(f"{done.scene}: RMSE of {error['layer']} of {camera}: {fact}")
     for camera, reused in report.reused.items():
         for name, where in reused.items():

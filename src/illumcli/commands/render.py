@@ -24,7 +24,7 @@ from illumcli.render_graph.explain import why_not
 from illumcli.render_graph.framing import place_cameras
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.proportions import disproportion_lines
-from illumcli.render_graph.repairs import refuse_repairs, repairs
+from illumcli.render_graph.repairs import refuse_repairs, repairs, repairs_of
 from illumcli.render_graph.schedule import shared_keys
 from illumcli.render_graph.tile_nodes import RenderStats
 
@@ -61,10 +61,13 @@ def rendered(
         if cache.memory is not None:
             cache.memory.wanted = wanted_by(following, graph, run)
     skipped = why_not(graph, outputs)
+    repaired: Repairs = {}
+    if options.strict and not due:
+        repaired = repairs_of(graph, outputs)
+        refuse_repairs(path, repaired)
 
     # Render each view that has files to write.
     reused: dict[str, Mapping[str, str]] = {}
-    repaired: Repairs = {}
     standard_error: dict[str, dict[str, float]] = {}
     audited_error: dict[str, dict[str, str | float]] = {}
     warnings: Sequence[str] = ()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import APPROXIMATED, HARMLESS, Repairs
+from illumcli.layers import Layer
+from illumcli.render_graph.build import Graph
 from illumcli.render_graph.build_materials import PURPOSES
+from illumcli.render_graph.schedule import reached
 
 _WITH_REPAIRS = (
     "repairs",
@@ -53,3 +56,12 @@ def repairs(shared: Mapping[str, Any]) -> Repairs:
         if name in _WITH_REPAIRS
         for what, each in value.repairs.items()
     }
+
+
+def repairs_of(graph: Graph, outputs: Sequence[Layer]) -> Repairs:
+    """The repairs of everything that pictures with these layers read. Reads the files and casts no ray."""
+    names = set(reached(graph, outputs))
+    buffers: dict[str, Any] = {}
+    for node in graph.topological_order([name for name in _WITH_REPAIRS if name in names]):
+        buffers[node.output] = node.run(buffers)
+    return repairs(buffers)

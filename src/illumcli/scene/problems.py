@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import pathlib
 import re
 from collections.abc import Sequence
 
+from illumcli.mesh_files import is_mesh_file
 from illumcli.scene.source import Path, Place, Problem
 
 
 def problem_at(place: Place, path: Path, fact: str) -> Problem:
-    """A problem; if its place is an override, without the steps of `path` that the override shows already."""
+    """A problem; if its place is an override, without the steps of `path` that the override shows already; if
+    it is a mesh file given instead of a scene, without the path that its name has in the studio scene."""
     if place.source.startswith("-D "):
         path = path[place.source.partition("=")[0].count(".") + 1 :]
+    elif is_mesh_file(pathlib.Path(place.source)):
+        path = ()
     return Problem(place, path, fact)
 
 

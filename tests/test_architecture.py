@@ -15,6 +15,7 @@ MODULES = sorted(SOURCE.rglob("*.py"))
 FOLDERS = (
     "cli",
     "stress",
+    "cluster",
     "commands",
     "accuracy baking brdf verification",
     "render_graph",
@@ -45,6 +46,8 @@ HOMES = {
     "pydantic_core": ("nowhere: it is no dependency of ours",),
     "embreex": ("rays/",),
     "OpenImageIO": ("images/openimageio.py",),
+    "distributed": ("cluster/",),
+    "dask": ("cluster/",),
     "matplotlib": ("brdf/", "accuracy/", "images/sheet_drawing.py"),
 }
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import fields
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import click
 
 if TYPE_CHECKING:
     from illumcli.commands.options import RenderOptions
+    from illumcli.commands.runner import Runner
+    from illumcli.progress import Progress
     from illumcli.records import Value
 
+RunnerOf: TypeAlias = "Callable[[Progress], Runner]"
+"""From what is told about progress to who does the work."""
 C = TypeVar("C", bound=Callable[..., Any])
 R = TypeVar("R", bound="Value")
 
@@ -159,6 +163,37 @@ keep_going_option = click.option(
     show_default=True,
     help="If one of several fails, finish the others, or stop. The exit code is that of the first failure.",
 )
+
+
+def _runner(options: dict[str, Any]) -> RunnerOf:
+    """The runner that the options ask for."""
+    cluster, is_mixed = options.pop("cluster"), options.pop("mixed_workers")
+    if cluster is None:
+        if is_mixed:
+            raise click.UsageError("--mixed-workers is for --cluster; give --cluster, too")
+        from illumcli.commands.runner import Here
+
+        return Here
+    from illumcli.cluster.address import address_of
+    from illumcli.cluster.runner import ClusterRunner
+
+    return partial(ClusterRunner, address_of(cluster), is_mixed, lambda text: click.echo(text, err=True))
+
+
+def cluster_options(command: C) -> C:
+    """Adds `--cluster` and `--mixed-workers` as the parameter `runner`."""
+    where = click.option(
+        "--cluster",
+        metavar="local[:N]|tcp://HOST:PORT|FILE",
+        help="Let the workers of a Dask cluster do the work: N processes here, or those of a scheduler.",
+    )
+    mixed = click.option(
+        "--mixed-workers",
+        is_flag=True,
+        help="Allow workers of other versions or processors; the last digits of pixels then depend on them.",
+    )
+    return where(mixed(gathered("runner", _runner)(command)))
+
 
 quiet_option = click.option(
     "-q",

@@ -12,6 +12,8 @@ from illumcli.cli._options import (
     FALLOFF,
     SAMPLER,
     SCENE,
+    RunnerOf,
+    cluster_options,
     force_option,
     gathered,
     keep_going_option,
@@ -181,6 +183,7 @@ def _options(options: dict[str, Any]) -> BakeOptions:
 @report_option
 @force_option()
 @keep_going_option
+@cluster_options
 @strict_option
 @quiet_option
 @verbose_option
@@ -193,6 +196,7 @@ def ao_bake(
     options: BakeOptions,
     report: Path | None,
     keep_going: bool,
+    runner: RunnerOf,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -216,7 +220,7 @@ def ao_bake(
                 say(f"{seconds:8.3f} s  {name}")
 
     request = BakeRequest(settings, patterns, options, keep_going)
-    is_kept = bake_inputs(inputs, request, report, reporter(quiet), written, say)
+    is_kept = bake_inputs(inputs, request, report, runner(reporter(quiet)), written, say)
     if is_kept and not quiet:
         say_kept([report])
 

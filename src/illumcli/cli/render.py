@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from illumcli.cli._options import (
+    RunnerOf,
+    cluster_options,
     force_option,
     frames_option,
     gathered,
@@ -53,13 +55,19 @@ if TYPE_CHECKING:
 @report_option
 @force_option()
 @keep_going_option
+@cluster_options
 @strict_option
 @no_cache_option
 @quiet_option
 @verbose_option
 @gathered("options", render_options)
 def render(
-    scenes: tuple[Path, ...], options: RenderOptions, report: Path | None, quiet: bool, verbose: bool
+    scenes: tuple[Path, ...],
+    options: RenderOptions,
+    report: Path | None,
+    runner: RunnerOf,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Render each SCENE, a scene file or a mesh; print the path of every image.
 
@@ -97,7 +105,7 @@ def render(
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)
 
-    is_kept = job.render_scenes(scenes, options, report, reporter(quiet), written, say)
+    is_kept = job.render_scenes(scenes, options, report, runner(reporter(quiet)), written, say)
     if is_kept and not quiet:
         say_kept([report])
     if not quiet and sys.stderr.isatty():

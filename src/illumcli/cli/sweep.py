@@ -9,7 +9,9 @@ import click
 
 from illumcli.cli._options import (
     FILE,
+    RunnerOf,
     allow_option,
+    cluster_options,
     force_option,
     frames_option,
     gathered,
@@ -89,6 +91,7 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 @threads_option
 @force_option("Replace files that differ, render those that do not.")
 @keep_going_option
+@cluster_options
 @strict_option
 @no_cache_option
 @allow_option
@@ -102,6 +105,7 @@ def sweep(
     variants: list[Variant],
     options: RenderOptions,
     files: SweepFiles,
+    runner: RunnerOf,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -139,7 +143,7 @@ def sweep(
                 say(f"{scene}: {line}")
             printed.add(line)
 
-    result = sweep_scene(scene, variants, options, files, reporter(quiet), written)
+    result = sweep_scene(scene, variants, options, files, runner(reporter(quiet)), written)
     for warning in result.warnings:
         say(warning)
     if not quiet:

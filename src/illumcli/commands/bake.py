@@ -10,10 +10,9 @@ from illumcli.baking.report import BakeReport
 from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
-from illumcli.commands.turns import turns
+from illumcli.commands.runner import Pieces, Runner
 from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
-from illumcli.progress import Progress
 from illumcli.records import Value
 
 
@@ -39,7 +38,7 @@ def bake_inputs(
     inputs: Sequence[Path],
     request: BakeRequest,
     report: Path | None,
-    progress: Progress,
+    runner: Runner,
     written: Callable[[Path, list[Path], BakeReport], None],
     tell: Tell,
 ) -> bool:
@@ -59,20 +58,26 @@ def bake_inputs(
     # Find faults before the first ray. The meshes of a single input are kept for its bake.
     single: BakeWork | None = None
     claims: dict[int, Path | None] = {}
+    kept: set[int] = set()
     for index in batch.due():
         with batch.piece(index):
             work = worker.prepare(request.job(inputs[index]))
             entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
-            claims[index] = work.claim if work.due() else None
+            is_due = bool(work.due())
+            claims[index] = work.claim if is_due else None
+            kept |= set() if is_due else {index}
             single = work if len(inputs) == 1 else None
             del work
     entries.look(request.options.force)
 
     # Bake.
-    for index in turns(batch, claims.__getitem__, progress):
+    def run(index: int) -> tuple[list[Path], BakeReport]:
+        return worker.run(single or worker.prepare(request.job(inputs[index])), runner.progress)
+
+    pieces = Pieces(lambda index: request.job(inputs[index]), claims.__getitem__, run, frozenset(kept))
+    for index, result in runner.results(batch, pieces):
         with batch.piece(index):
-            work = single or worker.prepare(request.job(inputs[index]))
-            paths, done = worker.run(work, progress)
+            paths, done = result()
             entries.add(index, done.as_data())
             written(inputs[index], paths, done)
     return entries.finish(batch)

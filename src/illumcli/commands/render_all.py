@@ -12,9 +12,8 @@ from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
-from illumcli.commands.turns import turns
+from illumcli.commands.runner import Pieces, Runner
 from illumcli.files.names import check_unique
-from illumcli.progress import Progress
 from illumcli.records import Value
 from illumcli.scene.frames import FRAMES_PER_SECOND
 from illumcli.scene.problems import without_value
@@ -34,7 +33,7 @@ def render_scenes(
     scenes: Sequence[Path],
     options: RenderOptions,
     report: Path | None,
-    progress: Progress,
+    runner: Runner,
     written: Callable[[Rendered], None],
     tell: Tell,
 ) -> bool:
@@ -52,13 +51,16 @@ def render_scenes(
     batch = Batch(what, len(jobs), options.keep_going, _once(tell) if what == "frames" else tell)
     entries = BatchReport(report, [_entry(job) for job in jobs])
     claims: dict[int, Path | None] = {}
+    kept: set[int] = set()
     files: dict[tuple[Path, str], None] = {}  # every file once, even if a scene is given twice
 
     # Find faults before the first ray.
     for number in batch.due():
         with batch.piece(number, jobs.label(number)):
             work = jobs.planned(number)
-            claims[number] = work.claim if work.due() else None
+            is_due = bool(work.due())
+            claims[number] = work.claim if is_due else None
+            kept |= set() if is_due else {number}
             names = [str(target.path) for target in work.targets]
             entries.plan(number, digest((work.content, names, options.target_error)))
             files |= dict.fromkeys((target.path, target.content) for target in work.targets)
@@ -66,12 +68,18 @@ def render_scenes(
     entries.look(options.force)
 
     # Render; buffers that the next frame reads stay in memory.
-    for number in turns(batch, claims.__getitem__, progress):
+    def run(number: int) -> tuple[list[Path], Report]:
+        following = jobs.following(number)
+        paths, done = jobs.worker.run(jobs.work(number), runner.progress, following)
+        ending = jobs.worker.finish() if following is None else ()
+        return paths, replace(done, warnings=(*done.warnings, *ending))
+
+    pieces = Pieces(jobs.unit, claims.__getitem__, run, frozenset(kept))
+    for number, result in runner.results(batch, pieces):
         with batch.piece(number, jobs.label(number)):
-            work, following = jobs.work(number), jobs.following(number)
-            paths, done = jobs.worker.run(work, progress, following)
-            ending = jobs.worker.finish() if following is None else ()
-            done = replace(done, warnings=(*done.warnings, *jobs.unused(work.job.scene), *ending))
+            paths, done = result()
+            work = jobs.work(number)
+            done = replace(done, warnings=(*done.warnings, *jobs.unused(work.job.scene)))
             if report is not None:
                 entries.add(number, _entry(work.job) | done.as_data())
             frames = work.scene.frames

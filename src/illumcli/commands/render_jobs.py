@@ -48,6 +48,10 @@ class RenderJobs:
             overrides = _at_frame(options.overrides, number, frames.fps if frames else FRAMES_PER_SECOND)
             yield RenderJob(scene, replace(options, overrides=overrides), number)
 
+    def unit(self, number: int) -> RenderJob:
+        """A job, by its index."""
+        return self._jobs[number]
+
     def label(self, number: int) -> str:
         """What messages call a job, beside its scene."""
         frame = self._jobs[number].frame

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from illumcli.commands.batch import Batch
 from illumcli.commands.options import RenderOptions
-from illumcli.commands.report import Report
-from illumcli.commands.sweep_files import PlannedFiles, SweepFiles, plan_files
+from illumcli.commands.runner import Here, Runner
+from illumcli.commands.sweep_files import SweepFiles, plan_files
+from illumcli.commands.sweep_images import attempt, render_variants
 from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
-from illumcli.commands.sweep_outcome import Outcome, SweepResult, following_due
+from illumcli.commands.sweep_outcome import Outcome, SweepResult
 from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
-from illumcli.commands.turns import turns
-from illumcli.commands.work import Work, unused_keys
-from illumcli.errors import IllumError
+from illumcli.commands.work import unused_keys
 from illumcli.files.names import check_unique
-from illumcli.progress import Progress, no_progress
 from illumcli.scene.variants import Variant
 
 
@@ -29,7 +25,7 @@ def sweep_scene(
     variants: Sequence[Variant],
     options: RenderOptions | None = None,
     files: SweepFiles | None = None,
-    progress: Progress = no_progress,
+    runner: Runner = Here(),  # noqa: B008
     written: Callable[[Outcome], None] = lambda outcome: None,
 ) -> SweepResult:
     """Render every variant and write the files about all of them; `written` is called with each outcome as
@@ -58,7 +54,7 @@ def sweep_scene(
 
     # Render the images.
     try:
-        warnings += _render(works, outcomes, batch, progress, written, planned)
+        warnings += render_variants(works, outcomes, batch, runner, written, planned)
     except BaseException:
         planned.update(outcomes, now=True)
         raise
@@ -99,50 +95,5 @@ def _planned(
         return outcome
 
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
-    outcomes = [_attempt(outcome, planned, batch, written) for outcome in outcomes]
+    outcomes = [attempt(outcome, planned, batch, written) for outcome in outcomes]
     return outcomes, warnings or []
-
-
-def _render(
-    works: SweepWorks,
-    done: list[Outcome],
-    batch: Batch,
-    progress: Progress,
-    written: Callable[[Outcome], None],
-    planned: PlannedFiles,
-) -> list[str]:
-    """Render every variant, and replace its outcome by one with its report. Returns warnings."""
-    following = following_due(done)
-    last: Report | None = None
-
-    def images(upcoming: Work | None, outcome: Outcome) -> Outcome:
-        _, report = works.worker.run(works.of(outcome), progress, upcoming)
-        outcome = replace(outcome, report=report.sharing(last))
-        written(outcome)
-        return outcome
-
-    # Render one variant after the other; buffers that the next one reads stay in memory.
-    for index in turns(batch, lambda index: done[index].claim, progress):
-        number, upcoming = following[index], None
-        if number is not None:
-            with suppress(IllumError):  # reported when it is its turn
-                upcoming = works.of(done[number])
-        done[index] = _attempt(done[index], partial(images, upcoming), batch, written)
-        last = done[index].report or last
-        works.drop(done[index])
-        planned.update(done)
-
-    # Collect the warnings.
-    of_images = [line for outcome in done if outcome.report for line in outcome.report.warnings]
-    return [*dict.fromkeys(of_images), *works.worker.finish()]
-
-
-def _attempt(
-    outcome: Outcome, step: Callable[[Outcome], Outcome], batch: Batch, written: Callable[[Outcome], None]
-) -> Outcome:
-    """The outcome after a step, or with the step's error."""
-    with batch.piece(outcome.number - 1):
-        return step(outcome)
-    failed = replace(outcome, error=batch.failures[outcome.number - 1])
-    written(failed)
-    return failed

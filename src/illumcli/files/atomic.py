@@ -166,6 +166,11 @@ def refused(place: str, error: OSError) -> OutputError:
     return OutputError(f"{place}: cannot be written: {error.strerror or error}; {advice}")
 
 
+def no_space_left() -> OSError:
+    """The cause of an output that could not be written because no space was left; see `is_full`."""
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 def is_full(error: OutputError) -> bool:
     """True if the output could not be written because no space was left."""
     cause = error.__cause__

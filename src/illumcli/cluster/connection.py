@@ -1,0 +1,125 @@
+"""The connection to the scheduler of a cluster."""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from illumcli.cluster.address import Address
+from illumcli.errors import IllumError, InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
+
+PATIENCE = 300.0
+"""Seconds that a lost scheduler, or the first worker, is waited for."""
+TIMEOUT = 15.0
+"""Seconds that one attempt to connect takes at most."""
+LONGEST_TASK = "24 hours"
+"""Silence after which a local worker counts as dead. Whether its process lives is seen at once."""
+
+
+class Connection:
+    """A client of a cluster, which is started here if its address is local."""
+
+    def __init__(self, address: Address, tell: Callable[[str], None]) -> None:
+        try:
+            import dask
+            import distributed
+        except ImportError:
+            raise InputError(
+                "--cluster needs Dask's distributed; install it: pip install 'illumcli[cluster]'"
+            ) from None
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        logging.getLogger("tornado").setLevel(logging.CRITICAL)
+        dask.config.set(
+            {
+                "distributed.comm.timeouts.connect": TIMEOUT,
+                "distributed.admin.large-graph-warning-threshold": "1GB",
+            }
+        )
+        self._address, self._distributed = address, distributed
+        self._cluster: LocalCluster | None = self._started() if address.local else None
+        self.client: Client = self._connected(time.monotonic() + TIMEOUT)
+        scheduler = str(self.client.scheduler_info()["address"])
+        if not address.local and not scheduler.startswith("tls://"):
+            tell(f"{scheduler}: without TLS; who reaches this scheduler can run code on it and its workers")
+
+    def _started(self) -> LocalCluster:
+        """Worker processes on this machine, which nobody reaches from others."""
+        import dask
+
+        dask.config.set({"distributed.scheduler.worker-ttl": LONGEST_TASK})
+        return self._distributed.LocalCluster(
+            n_workers=self._address.local,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
+
+    def _connected(self, until: float) -> Client:
+        """A client; several attempts until this time.
+
+        Raises
+        ------
+        IllumError
+            No scheduler answers.
+        """
+        place: dict[str, Any] = {"address": self._cluster or self._address.scheduler or None}
+        if self._address.file is not None:
+            place = {"scheduler_file": str(self._address.file)}
+        while True:
+            try:
+                return self._distributed.Client(**place, timeout=TIMEOUT, set_as_default=False)
+            except (OSError, TimeoutError, ValueError) as error:
+                if time.monotonic() > until:
+                    name = self._address.scheduler or self._address.file or "local"
+                    raise IllumError(f"--cluster {name}: no scheduler answers: {error}") from error
+                time.sleep(1)
+
+    @property
+    def is_lost(self) -> bool:
+        """True if the scheduler is gone."""
+        return self.client.status != "running"
+
+    def reconnect(self) -> None:
+        """Connect to the scheduler that took the place of the lost one."""
+        self.client.close(timeout=1)
+        self.client = self._connected(time.monotonic() + PATIENCE)
+
+    def workers(self) -> list[str]:
+        """The addresses of all workers, of which there is at least one.
+
+        Raises
+        ------
+        IllumError
+            No worker came.
+        """
+        until = time.monotonic() + PATIENCE
+        while not (found := list(self.client.scheduler_info(n_workers=-1)["workers"])):
+            if time.monotonic() > until:
+                raise IllumError("--cluster: the scheduler has no workers; start some")
+            time.sleep(0.2)
+        return found
+
+    def close(self, plugin: str) -> None:
+        """End the connection, and the workers that were started here; others give up this plugin."""
+        if self._cluster is None and not self.is_lost:
+            with suppress(OSError, TimeoutError, ValueError):  # never registered, or the scheduler is gone
+                self.client.unregister_worker_plugin(plugin)
+        self.client.close(timeout=2)
+        if self._cluster is not None:
+            self._cluster.close(timeout=5)
+
+
+def threads_of(address: Address, threads: int | None) -> int | None:
+    """Threads of each worker: as asked for; the cores of this machine are shared among local ones."""
+    if threads is None and address.local:
+        return max(1, len(os.sched_getaffinity(0)) // address.local)
+    return threads

@@ -1,0 +1,209 @@
+"""Does the pieces of a batch on the workers of a cluster.
+
+Blocks of pieces that follow each other, which share buffers, are tasks; large ones come first. The scheduler
+holds a few per worker, the others wait here. The client knows every piece whose result it has: whatever
+happens to workers or to the scheduler, only pieces without a result are given out again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from illumcli.cache.fingerprint import digest
+from illumcli.cluster.address import Address
+from illumcli.cluster.inputs import scene_of
+from illumcli.cluster.session import Session
+from illumcli.commands.batch import Batch
+from illumcli.commands.runner import Pieces
+from illumcli.commands.unit import Unit
+from illumcli.errors import IllumError, InputError
+from illumcli.files.atomic import no_space_left, write_bytes
+from illumcli.progress import Progress
+from illumcli.records import Value
+
+if TYPE_CHECKING:
+    from distributed import Future
+
+    from illumcli.cluster.task import BlockResult, UnitResult
+
+HELD = 2
+"""Blocks per worker that the scheduler holds."""
+BLOCKS, LARGEST = 4, 32
+"""Blocks per worker that the pieces left are cut into, and pieces of the largest block."""
+TRIES = 3
+"""Workers on which a piece may fail for a reason that lies with the worker."""
+POLL = 0.02
+"""Seconds between two looks at what is done."""
+
+
+R = TypeVar("R")
+
+
+class Block(Value):
+    """Some pieces that a worker does one after the other."""
+
+    numbers: tuple[int, ...]
+    attempt: int = 0
+    failed_on: frozenset[str] = frozenset()
+    """Workers that had no room for it."""
+    contents: Mapping[Path, bytes] | None = None
+    """Files that a worker asked for."""
+    asker: str | None = None
+    """The worker that asked for them."""
+
+
+class ClusterRunner:
+    """A `Runner`: does pieces on a cluster.
+
+    Parameters
+    ----------
+    is_mixed : bool
+        Workers may differ from this process in versions and instructions.
+    tell : callable
+        Called with warnings.
+    """
+
+    def __init__(
+        self, address: Address, is_mixed: bool, tell: Callable[[str], None], progress: Progress
+    ) -> None:
+        self._address, self._is_mixed, self._tell = address, is_mixed, tell
+        self.progress = progress
+
+    def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
+        """The index of each piece, in the order in which they are done, and a function that returns its
+        result or raises its error."""
+        due = [number for number in batch.due() if number not in pieces.kept]
+        for number in sorted(pieces.kept):
+            yield number, partial(pieces.run, number)
+        if not due:
+            return
+        session = Session(self._address, self._is_mixed, self._tell)
+        try:
+            yield from _Blocks(session, batch, pieces.unit, due).results()
+        finally:
+            session.close()
+
+
+class _Blocks:
+    """The blocks of a batch: those left, those that are to be done again, those given out."""
+
+    def __init__(
+        self, session: Session, batch: Batch, unit_of: Callable[[int], Unit], due: list[int]
+    ) -> None:
+        self._session, self._batch, self._unit_of = session, batch, unit_of
+        self._left, self._again = deque(due), deque[Block]()
+        self._given: dict[Future, Block] = {}
+        # What the pieces of one scene share is made by the first, before the others start.
+        ends = [scene_of(unit_of(number)) for number in (due[0], due[-1])]
+        self._is_first_alone = len(due) > 1 and ends[0] == ends[1]
+
+    def results(self) -> Iterator[tuple[int, Callable[[], Any]]]:
+        """The index of each piece, and a function that returns its result or raises its error."""
+        while self._left or self._again or self._given:
+            self._give_out()
+            done = [future for future in self._given if future.done()]
+            for future in done:
+                block = self._given.pop(future)
+                self._is_first_alone = False
+                if future.status == "finished":
+                    yield from self._taken(block, future.result())
+                elif future.status == "error":
+                    yield from self._failed(block, future.exception())
+                else:  # the scheduler, or this task on it, is lost
+                    self._again.append(replace(block, attempt=block.attempt + 1))
+            if self._session.is_lost:
+                self._again += [replace(each, attempt=each.attempt + 1) for each in self._given.values()]
+                self._given.clear()
+                self._session.reconnect()
+            elif not done:
+                time.sleep(POLL)
+
+    def _give_out(self) -> None:
+        """Give blocks to the scheduler, until it holds enough of them."""
+        workers = len(self._session.workers())
+        most = 1 if self._is_first_alone else HELD * workers
+        while (self._left or self._again) and len(self._given) < most:
+            block = self._again.popleft() if self._again else self._next(workers)
+            due = tuple(number for number in block.numbers if self._batch.is_due(number))
+            if not due:
+                continue
+            block = replace(block, numbers=due)
+            units = [self._unit_of(number) for number in due]
+            key = digest((due, block.attempt))
+            future = self._session.submit(units, key, block.contents, block.asker, block.failed_on)
+            self._given[future] = block
+
+    def _next(self, workers: int) -> Block:
+        """The next pieces: a part of those left, so that all workers end at about the same time."""
+        size = min(LARGEST, max(1, len(self._left) // (BLOCKS * workers)))
+        count = 1 if self._is_first_alone else min(size, len(self._left))
+        return Block(tuple(self._left.popleft() for _ in range(count)))
+
+    def _taken(self, block: Block, result: BlockResult) -> Iterator[tuple[int, Callable[[], Any]]]:
+        """The results of a block, or the block again with the files that the worker lacks."""
+        if result.lacks_files:
+            contents = self._session.contents(result.lacking)
+            asked = replace(block, attempt=block.attempt + 1, contents=contents, asker=result.worker)
+            self._again.append(asked)
+            return
+        for number, done in zip(block.numbers, result.done, strict=True):
+            failed_on = block.failed_on | {result.worker}
+            others = set(self._session.workers()) - failed_on
+            if done.lies_with_worker and others and len(failed_on) < TRIES:
+                self._again.append(Block((number,), block.attempt + 1, failed_on))
+            else:
+                yield number, partial(_result, done)
+
+    def _failed(self, block: Block, error: BaseException | None) -> Iterator[tuple[int, Callable[[], Any]]]:
+        """The pieces of a block that killed its workers, one by one, or their errors.
+
+        Raises
+        ------
+        InputError
+            A worker differs from this process.
+        """
+        from distributed import KilledWorker
+
+        from illumcli.cluster.task import Refusal
+
+        if isinstance(error, Refusal):
+            raise InputError(str(error)) from error
+        if not isinstance(error, KilledWorker):
+            raise error or IllumError("--cluster: a task failed without a reason")
+        if len(block.numbers) > 1:
+            attempt = block.attempt + 1
+            self._again += [Block((number,), attempt, block.failed_on) for number in block.numbers]
+            return
+        scene = scene_of(self._unit_of(block.numbers[0]))
+        fact = "every worker that rendered it died, most often for want of memory"
+        failure = IllumError(
+            f"{scene}: {fact}; give workers more memory, or make the film or its textures smaller"
+        )
+        yield block.numbers[0], partial(_raise, failure)
+
+
+def _result(done: UnitResult) -> Any:
+    """The result of a unit, with its files written where workers could not.
+
+    Raises
+    ------
+    IllumError
+        The error of the unit; a file that cannot be written.
+    """
+    if done.error is not None:
+        raise done.error from (no_space_left() if done.is_disk_full else None)
+    for name, content in done.contents.items():
+        path = Path(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, content)
+    return done.result
+
+
+def _raise(error: IllumError) -> None:
+    raise error

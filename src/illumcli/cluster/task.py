@@ -1,0 +1,226 @@
+"""What runs in the process of a worker: blocks of units, one after the other."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import TYPE_CHECKING, Any, cast
+
+from distributed import WorkerPlugin, get_worker
+
+from illumcli.cluster.facts import ADVICE, facts
+from illumcli.cluster.inputs import Mirror, is_shared
+from illumcli.commands.options import RenderJob
+from illumcli.commands.unit import Unit, Worker
+from illumcli.commands.work import Work
+from illumcli.errors import IllumError, LimitError, OutputError, known
+from illumcli.files.atomic import is_full
+from illumcli.records import Value
+
+if TYPE_CHECKING:
+    from illumcli.baking.inputs import BakeWork
+    from illumcli.baking.report import BakeReport
+    from illumcli.commands.report import Report
+
+WRITTEN_OR_KEPT = ("written", "kept")
+"""Fields of reports with the names of files."""
+
+
+class Command(Value):
+    """What all units of a command share."""
+
+    name: str
+    """Unique."""
+    folder: str
+    """The current folder of the client, which relative names are relative to."""
+    token: Mapping[Path, str]
+    """Files of the client by their hashes: a worker that sees them shares its file system."""
+    facts: Mapping[str, str]
+    is_mixed: bool
+    """True if workers may differ from the client."""
+    allowed: str
+    """The client's ILLUM_ALLOW."""
+
+
+class UnitResult(Value):
+    """The files and the report of a unit, or its error."""
+
+    result: Any = None
+    error: IllumError | None = None
+    is_disk_full: bool = False
+    lies_with_worker: bool = False
+    """True if the worker's own disk was full, or it had too little memory."""
+    contents: Mapping[str, bytes] = field(default_factory=dict)
+    """The files that were written, by their names, where the client does not see them."""
+
+
+class BlockResult(Value):
+    """The results of a block of units."""
+
+    worker: str
+    done: tuple[UnitResult, ...] = ()
+    lacks_files: bool = False
+    """True if nothing was done: the worker does not see the client's files."""
+    lacking: tuple[Path, ...] = ()
+    """Files that it needs first, as far as it knows them."""
+
+
+class Refusal(Exception):
+    """A worker that differs from the client; the text says how."""
+
+
+class CommandPlugin(WorkerPlugin):
+    """What a worker holds for one command: a `Worker`, and copies of the client's files."""
+
+    idempotent = True
+
+    def __init__(self, command: Command) -> None:
+        self.command = command
+        self.name = command.name
+        self.worker: Worker | None = None
+        self.mirror: Mirror | None = None
+        self._folder = ""
+
+    def teardown(self, worker: Any) -> None:
+        """Leave the client's folder, and remove the copies."""
+        if self._folder:
+            os.chdir(self._folder)
+        if self.mirror is not None:
+            shutil.rmtree(self.mirror.root, ignore_errors=True)
+
+    def start(self, folder: str) -> None:
+        """Prepare this process for the units of the command; copies of the client's files go below `folder`.
+
+        Raises
+        ------
+        Refusal
+            It differs from the client.
+        """
+        if self.worker is not None:
+            return
+        own, wanted = facts(), self.command.facts
+        differing = [
+            f"{name} is {own.get(name)}, not {value}"
+            for name, value in wanted.items()
+            if own.get(name) != value
+        ]
+        if differing and not self.command.is_mixed:
+            raise Refusal(f"worker {platform.node()}: {'; '.join(differing)}; {ADVICE}")
+        self._folder = os.getcwd()
+        if is_shared(self.command.token):
+            os.chdir(self.command.folder)
+            os.environ["ILLUM_ALLOW"] = self.command.allowed
+        else:
+            self.mirror = Mirror(Path(mkdtemp(prefix="illum-", dir=folder)))
+            self.mirror.enter(self.command.folder)
+        self.worker = Worker()
+
+
+def do(
+    name: str,
+    units: Sequence[Unit],
+    digests: Mapping[Path, str] | None,
+    contents: Mapping[Path, bytes] | None,
+) -> BlockResult:
+    """Do a block of units of a command.
+
+    Parameters
+    ----------
+    name : str
+        Of the command, whose plugin the worker has.
+    digests : mapping, optional
+        Every file that the units read, and its hash; not given until a worker lacks files.
+    contents : mapping, optional
+        Files that this worker said to lack.
+    """
+    dask_worker = get_worker()
+    plugin = cast(CommandPlugin, dask_worker.plugins[name])
+    plugin.start(dask_worker.local_directory)
+    mirror, worker = plugin.mirror, plugin.worker
+    assert worker is not None
+    if mirror is not None:
+        mirror.add(contents or {})
+        lacking = mirror.lacking(digests or {})
+        if digests is None or lacking:
+            return BlockResult(dask_worker.address, lacks_files=True, lacking=tuple(lacking))
+        units = [_mirrored(unit, mirror) for unit in units]
+    done = _all_done(worker, units, mirror)
+    worker.finish()
+    return BlockResult(dask_worker.address, done)
+
+
+def _all_done(worker: Worker, units: Sequence[Unit], mirror: Mirror | None) -> tuple[UnitResult, ...]:
+    """The results of units in their order; buffers that the next one reads stay in memory."""
+    done, work = [], _prepared(worker, units[0])
+    for upcoming in (*units[1:], None):
+        following = None if upcoming is None else _prepared(worker, upcoming)
+        done.append(work if isinstance(work, UnitResult) else _done(worker, work, following, mirror))
+        work = following or work
+    return tuple(done)
+
+
+def _prepared(worker: Worker, unit: Unit) -> Work | BakeWork | UnitResult:
+    """The work of a unit, or the result of one with a fault."""
+    try:
+        return worker.prepare(unit)
+    except Exception as error:
+        return _failed(error)
+
+
+def _done(
+    worker: Worker,
+    work: Work | BakeWork,
+    following: Work | BakeWork | UnitResult | None,
+    mirror: Mirror | None,
+) -> UnitResult:
+    """The result of a unit."""
+    report: Report | BakeReport
+    try:
+        if isinstance(work, Work):
+            paths, report = worker.run(work, following=following if isinstance(following, Work) else None)
+        else:
+            paths, report = worker.run(work)
+    except Exception as error:
+        return _failed(error, mirror is not None)
+    return UnitResult((paths, report)) if mirror is None else _shipped(paths, report, str(mirror.root))
+
+
+def _failed(error: Exception, has_own_disk: bool = False) -> UnitResult:
+    """The result of a unit that failed; a fault of the program is raised again."""
+    failure = known(error)
+    if failure is None:
+        raise error
+    full = isinstance(failure, OutputError) and is_full(failure)
+    own = (full and has_own_disk) or isinstance(failure, LimitError)
+    return UnitResult(error=failure, is_disk_full=full and not has_own_disk, lies_with_worker=own)
+
+
+def _shipped(paths: Sequence[Path], report: Any, prefix: str) -> UnitResult:
+    """The result of a unit whose files are moved from below `prefix` to the client."""
+    contents = {path: path.read_bytes() for path in paths}
+    for path in paths:
+        path.unlink()
+    names = [Path(str(path).removeprefix(prefix)) for path in paths]
+    shown = {
+        key: tuple(str(each).removeprefix(prefix) for each in getattr(report, key)) for key in WRITTEN_OR_KEPT
+    }
+    by_name = {str(name): content for name, content in zip(names, contents.values(), strict=True)}
+    return UnitResult((names, replace(report, **shown)), contents=by_name)
+
+
+def _mirrored(unit: Unit, mirror: Mirror) -> Unit:
+    """The unit with absolute names in the mirror; relative ones stay as they are."""
+
+    def at(path: Path) -> Path:
+        return mirror.at(path) if path.is_absolute() else path
+
+    if isinstance(unit, RenderJob):
+        pattern = unit.options.pattern
+        options = replace(unit.options, pattern=str(at(Path(pattern))) if pattern else None)
+        return replace(unit, scene=at(unit.scene), options=options)
+    return replace(unit, path=at(unit.path), outputs=tuple(at(each) for each in unit.outputs))

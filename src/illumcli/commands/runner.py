@@ -1,0 +1,53 @@
+"""Who does the pieces of a batch: this process, or the workers of a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+from illumcli.commands.batch import Batch
+from illumcli.commands.turns import turns
+from illumcli.progress import Progress, no_progress
+from illumcli.records import Value
+
+if TYPE_CHECKING:
+    from illumcli.commands.unit import Unit
+
+R = TypeVar("R")
+
+
+class Pieces(Value, Generic[R]):
+    """The pieces of a batch, by index."""
+
+    unit: Callable[[int], Unit]
+    """The unit of work of a piece."""
+    claim_of: Callable[[int], Path | None]
+    """The path of the claim on a piece; None for a piece that needs none."""
+    run: Callable[[int], R]
+    """Does a piece in this process."""
+    kept: frozenset[int]
+    """Those of which all files exist already: nothing is computed."""
+
+
+class Runner(Protocol):
+    """Does the pieces of a batch that have not failed."""
+
+    @property
+    def progress(self) -> Progress:
+        """What is told how far pieces are that this process does."""
+
+    def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
+        """The index of each piece, and a function that returns its result or raises its error."""
+
+
+class Here(Value):
+    """The runner of this process: one piece after the other, when its result is asked for."""
+
+    progress: Progress = no_progress
+
+    def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
+        """The index of each piece, and a function that does it."""
+        for number in turns(batch, pieces.claim_of, self.progress):
+            yield number, partial(pieces.run, number)

@@ -181,3 +181,18 @@ def test_what_a_sweep_keeps_changes_no_bit(path, change):
     assert_same(rendered(path, *CHANGES[change], only=["beauty"])[0], again)
     if change in ("a material", "a light"):
         assert not {"raw_obscurance", "shadow:key"} & stats.rays.keys()
+
+
+def test_decisions_in_memory_go_with_another_fit(path):
+    """The attempts for a target error keep what decides about pixels, too."""
+    memory = MemoryCache()
+    cache = Cache(None, memory)
+    memory.wanted = frozenset(planned(load(path), ["beauty"], cache).lookup.keeps.values())
+    rendered(path, only=["beauty"], cache=cache)
+    finer = "obscurance.samples=5"
+    steps = planned(load(path, [finer]), ["beauty"], cache)
+    assert "refined:beauty" in steps.lookup.reused
+    assert "fitted_obscurance" not in steps.lookup.reused
+    assert_same(
+        rendered(path, finer, only=["beauty"])[0], rendered(path, finer, only=["beauty"], cache=cache)[0]
+    )

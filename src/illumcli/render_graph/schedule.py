@@ -158,9 +158,9 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
 
 
 def _fitted(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
-    """The buffer of fitted obscurance, if layers need it: all samples read that of the centres."""
+    """The buffers of fitted obscurance and of the edges that it reads all samples of, if layers need them."""
     needed = graph.without_loaders().topological_order([layer.buffer for layer in outputs])
-    return [node.output for node in needed if node.output == FITTED]
+    return ["edges", FITTED] if any(node.output == FITTED for node in needed) else []
 
 
 def sampled_outputs(outputs: Sequence[Layer]) -> tuple[Layer, ...]:

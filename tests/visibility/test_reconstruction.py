@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from illumcli.visibility.object_pixels import ObjectPixels, joined
-from illumcli.visibility.reconstruction import MARGIN, RADII, reconstructed, window_sums
+from illumcli.visibility.reconstruction import MARGIN, reconstructed, window_sums
 
 
 @pytest.fixture
@@ -33,12 +33,11 @@ def everything(pixels: ObjectPixels) -> np.ndarray:
     return reconstructed(pixels, np.ones(len(pixels.x), np.bool_))
 
 
-def test_window_sums_are_sums_over_windows(rng):
+@pytest.mark.parametrize("radius", [1, 2])
+def test_window_sums_are_sums_over_windows(rng, radius):
     planes = rng.normal(size=(2, 30, 27))
-    for radius in RADII:
-        padded = np.pad(planes, ((0, 0), (radius, radius), (radius, radius)))
-        windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * radius + 1,) * 2, axis=(1, 2))
-        np.testing.assert_allclose(window_sums(planes, radius), windows.sum(axis=(3, 4)), rtol=0, atol=1e-12)
+    windows = np.lib.stride_tricks.sliding_window_view(planes, (2 * radius + 1,) * 2, axis=(1, 2))
+    np.testing.assert_allclose(window_sums(planes, radius), windows.sum(axis=(3, 4)), rtol=0, atol=1e-12)
 
 
 def test_what_is_linear_in_normal_and_position_is_kept(rng):

@@ -4,10 +4,10 @@ The noise of w differs from pixel to pixel, w itself follows the surface. So eac
 first-order polynomial of the normal that w is taken about and of the position, fitted to the raw values
 around it. Objects are fitted apart: no value crosses from one object to another.
 
-Pixels are grouped into cells of 2 x 2, whose moments are summed over square windows of a few radii. Each cell
-takes the radius of the least estimated risk, and pixels the bilinear mean of the polynomials of the cells
-around. Every sum is taken in one order that does not depend on where a tile begins: the values are the same
-for any tiling.
+Pixels are grouped into cells of 2 x 2, these into cells of 4 x 4 and 8 x 8: the wider a window, the coarser
+the cells that it is made of and that get a polynomial of it. Each cell of 4 x 4 takes the window of the least
+estimated risk, and pixels the bilinear mean of the polynomials of the cells around. Every sum is taken in one
+order that does not depend on where a tile begins: the values are the same for any tiling.
 
 References
 ----------
@@ -20,38 +20,44 @@ reconstruction. ACM Transactions on Graphics 31(6).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F
+from illumcli.arrays import F, Floats
 from illumcli.records import Record
 from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, joined
 from illumcli.visibility.regression import (
     COUNT,
     FEATURE,
     FEATURES,
+    HIDDEN,
     MOMENTS,
     PAIR,
     Planes,
     moments,
     polynomials,
 )
+from illumcli.visibility.sheets import CELL, Area, sheets
 
-CELL = 2
-"""Pixels along a cell, which begin at even columns and rows of the film."""
-RADII = (1, 2, 4, 8)
-"""Of the windows that polynomials are fitted in [cells]: 6, 10, 18 and 34 pixels wide."""
-SMOOTHING = 3
-"""Radius of the windows that the risk is averaged over [cells]: one cell's own is too uncertain."""
-MARGIN = CELL * (RADII[-1] + SMOOTHING + 1)
-"""Pixels around a rectangle that its values depend on."""
+WINDOWS = ((0, 1), (1, 1), (2, 1), (2, 2))
+"""Level and radius [cells of that level] of the windows: 6, 12, 24 and 40 pixels wide. Level 0 has cells of
+2 x 2 pixels, each further one cells of twice the size."""
+BORDERS = (1, 1, 2)
+"""Empty cells around each level, as wide as its widest windows reach."""
+SMOOTHING = 2
+"""Radius of the windows that the risk is averaged over [cells of level 1]: one cell's own is too uncertain.
+"""
+MARGIN = CELL * (1 + 2 * (1 + SMOOTHING) + 4 * (1 + BORDERS[-1]))
+"""Pixels around a rectangle that its values depend on: a pixel depends on the polynomials of the cells beside
+its own, these on the coarser ones beside them."""
 COHERENCE = 0.75
 """Variance of a fit over what independent errors of the same size would give it: the rays of neighbouring
 pixels are dithered, so that their errors cancel in part."""
-CELLS_AT_ONCE = 1 << 13
-"""Cells that are solved together: their moments fit into a core's own cache."""
+STRIP = 1 << 12
+"""Cells whose moments are summed and solved together: they fit into a core's own cache."""
 
 
 def fitted_obscurance(object_pixels: ObjectPixels, surrounding_pixels: ObjectPixels) -> FittedPixels:
@@ -77,135 +83,126 @@ def reconstructed(around: ObjectPixels, wanted: NDArray[np.bool_]) -> NDArray[np
     wanted : (G,) bool
     """
     out = np.ones(len(around.x), F)
-    for sheet in _sheets(around, wanted):
-        out[sheet.pair] = sheet.values()
+    for sheet in sheets(around, wanted):
+        planes = sheet.planes(around)
+        if not planes[1].any():
+            continue
+
+        # The polynomials of the cells around what is wanted, and their values there.
+        levels = pyramid(planes)
+        area = sheet.wanted.coarser(1 + SMOOTHING).clipped(levels[1].shape)
+        coefficients = cell_polynomials(levels, area)
+        area = area.finer()
+        rows, columns = area.slices
+        hidden = interpolated(coefficients, planes[2:, :, rows, columns])
+
+        # Read them at the pixels.
+        own = wanted.take(sheet.pair)
+        row, column = sheet.row[own] - area.top, sheet.column[own] - area.left
+        at = (sheet.place[own] * hidden.shape[1] + row) * hidden.shape[2] + column
+        out[sheet.pair[own]] = (1 - np.clip(hidden.ravel().take(at), 0, 1)).astype(F)
     return out[wanted]
 
 
-# --- objects side by side on sheets --------------------------------------------------------------------
+# --- moments of cells and windows -----------------------------------------------------------------------
 
 
-class Sheet(Record):
-    """Pixels of some objects, so far apart that no window holds two of them."""
+class Cells(Record):
+    """Moments of the pixels of each cell, weighted by their share, with a border of empty cells."""
 
-    pixels: ObjectPixels
-    pair: NDArray[np.intp]  # (G,) number of each pair
-    row: NDArray[np.intp]  # (G,) pixel of the sheet
-    column: NDArray[np.intp]  # (G,)
-    shape: tuple[int, int]  # rows and columns of the sheet [cells]
+    moments: Planes  # (36, rows + 2 border, columns + 2 border)
+    border: int
 
-    def values(self) -> NDArray[np.float32]:
-        """(G,) float32 w of the pairs."""
-        rows, columns = self.shape
-        if not self.pixels.hidden.any():
-            return np.ones(len(self.pair), F)
-        at = self.row * (CELL * columns) + self.column
-        flat = np.zeros((2 + FEATURES, CELL * rows * CELL * columns))
-        values = (self.pixels.share, self.pixels.hidden, *self.pixels.features)
-        for plane, each in zip(flat, values, strict=True):
-            plane[at] = each
-        planes = flat.reshape(-1, CELL * rows, CELL * columns)
-        coefficients = cell_polynomials(cell_moments(planes[0], planes[1], planes[2:]))
-        hidden = interpolated(coefficients, planes[2:]).ravel().take(at)
-        return (1 - np.clip(hidden, 0, 1)).astype(F)
+    @classmethod
+    def empty(cls, shape: tuple[int, int], border: int) -> Cells:
+        """Cells without pixels."""
+        rows, columns = shape
+        return cls(np.zeros((MOMENTS, rows + 2 * border, columns + 2 * border)), border)
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns without the border."""
+        _, rows, columns = self.moments.shape
+        return rows - 2 * self.border, columns - 2 * self.border
 
-def _sheets(pixels: ObjectPixels, wanted: NDArray[np.bool_]) -> Iterator[Sheet]:
-    """Sheets that hold every object of which a pair is wanted.
-
-    The objects' bounding boxes stand side by side, a window's radius apart, those of like height together.
-    """
-    # bounding box of each object, from even columns and rows on
-    order = np.argsort(pixels.object, kind="stable")
-    first = np.flatnonzero(np.diff(pixels.object[order], prepend=-1))
-    x, y = pixels.x[order], pixels.y[order]
-    left, top = (np.minimum.reduceat(each, first) // CELL for each in (x, y))
-    width, height = (
-        np.maximum.reduceat(each, first) // CELL + 1 - low for each, low in ((x, left), (y, top))
-    )
-    ends = np.append(first[1:], len(order))
-    needed = np.flatnonzero(np.logical_or.reduceat(wanted[order], first))
-    needed = needed[np.argsort(height[needed], kind="stable")]
-
-    # as many of them on a sheet as it holds
-    gap = RADII[-1]
-    step = width[needed] + gap
-    k = 0
-    while k < len(needed):
-        end, across = k + 1, int(step[k])
-        while end < len(needed):
-            wider = across + int(step[end])
-            if wider * int(height[needed[end]]) > CELLS_AT_ONCE:
-                break
-            end, across = end + 1, wider
-        which = needed[k:end]
-        place = np.cumsum(step[k:end]) - step[k:end]
-        numbers = np.concatenate([np.arange(first[i], ends[i]) for i in which])
-        sizes = ends[which] - first[which]
-        pair = order[numbers]
-        yield Sheet(
-            pixels.take(pair),
-            pair,
-            y[numbers] - np.repeat(CELL * top[which], sizes).astype(np.intp),
-            x[numbers] - np.repeat(CELL * (left[which] - place), sizes).astype(np.intp),
-            (int(height[which].max()), across),
-        )
-        k = end
+    def within(self, area: Area, grown: int = 0) -> Planes:
+        """(36, rows, columns) moments of an area, grown by so many cells on all sides."""
+        start, end = self.border - grown, self.border + grown
+        rows = slice(area.top + start, area.bottom + end)
+        return self.moments[:, rows, area.left + start : area.right + end]
 
 
-# --- fits over windows of cells -------------------------------------------------------------------------
-
-
-def cell_moments(share: NDArray[np.float64], hidden: NDArray[np.float64], features: Planes) -> Planes:
-    """(36, rows / 2, columns / 2) moments of the pixels of each cell, weighted by their `share`."""
-    out = np.empty((MOMENTS, share.shape[0] // CELL, share.shape[1] // CELL))
-    moments(share, hidden, features, _sum_cells, out)
-    return out
-
-
-def _sum_cells(pixels: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    rows = pixels[0::2] + pixels[1::2]
-    np.add(rows[:, 0::2], rows[:, 1::2], out=out)
-
-
-def window_sums(planes: Planes, radius: int) -> Planes:
-    """Sums over windows of (2 radius + 1)^2 cells, zero outside.
-
-    By halves of the window, so that each sum is taken in the same order wherever the array begins.
-    """
-    out = np.empty_like(planes)
-    rows, columns = planes.shape[1:]
-    padded = np.zeros((rows + 2 * radius, columns))
-    across = np.zeros((rows, columns + 2 * radius))
-    for plane, sums in zip(planes, out, strict=True):
-        padded[radius : radius + rows] = plane
-        _sum_rows(padded, radius, across[:, radius : radius + columns])
-        _sum_rows(across.T, radius, sums.T)
-    return out
-
-
-def _sum_rows(padded: NDArray[np.float64], radius: int, out: NDArray[np.float64]) -> None:
-    """Sums over 2 radius + 1 rows, from sums over 1, 2, 4, ... rows.
+def pyramid(planes: NDArray[np.float32]) -> list[Cells]:
+    """The cells of all levels.
 
     Parameters
     ----------
-    padded : (rows + 2 radius, columns) float64
-    out : (rows, columns) float64
+    planes : (8, 4, rows, columns) float32
+        Share, hidden share and features of the pixels of each cell of level 0.
     """
-    size, length = len(out), 2 * radius + 1
-    run, width, offset = padded, 1, 1
-    out[...] = padded[:size]
-    while 2 * width <= length:
-        rest = len(run) - width
-        run = run[:rest] + run[width:]
-        width *= 2
-        if length & width:
-            out += run[offset : offset + size]
-            offset += width
+    shape = planes.shape[2:]
+    levels = [Cells.empty((shape[0] >> k, shape[1] >> k), border) for k, border in enumerate(BORDERS)]
+    for strip in strips(Area(0, shape[0], 0, shape[1]), 2):
+        each = planes[:, :, strip.top : strip.bottom].astype(np.float64)
+        sums = np.empty((MOMENTS, *strip.shape))
+        moments(each[0], each[1], each[2:], _sum_places, sums)
+        levels[0].within(strip)[...] = sums
+        _sum_cells(sums, levels[1].within(strip.coarser(0)))
+    for fine, coarse in pairwise(levels[1:]):
+        everything = Area(0, coarse.shape[0], 0, coarse.shape[1])
+        _sum_cells(fine.within(everything.finer()), coarse.within(everything))
+    return levels
+
+
+def strips(area: Area, multiple: int = 1) -> Iterator[Area]:
+    """Strips of rows of an area, each of a multiple of so many rows."""
+    step = max(STRIP // max(area.right - area.left, 1) // multiple, 1) * multiple
+    for top in range(area.top, area.bottom, step):
+        yield Area(top, min(top + step, area.bottom), area.left, area.right)
+
+
+def _sum_places(pixels: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Sums over the pixels of each cell, (4, rows, columns)."""
+    np.add(pixels[0], pixels[1], out=out)
+    out += pixels[2] + pixels[3]
+
+
+def _sum_cells(planes: Planes, out: Planes) -> None:
+    """Sums over 2 x 2 cells."""
+    rows = planes[:, 0::2] + planes[:, 1::2]
+    np.add(rows[:, :, 0::2], rows[:, :, 1::2], out=out)
+
+
+def window_sums(planes: Planes, radius: int) -> Planes:
+    """(K, rows, columns) sums over windows of (2 radius + 1)^2 values.
+
+    Each sum is taken in the same order wherever the array begins.
+
+    Parameters
+    ----------
+    planes : (K, rows + 2 radius, columns + 2 radius) float64
+    """
+    rows, columns = planes.shape[1] - 2 * radius, planes.shape[2] - 2 * radius
+    down = planes[:, :rows] + planes[:, 1 : 1 + rows]
+    for k in range(2, 2 * radius + 1):
+        down += planes[:, k : k + rows]
+    sums = down[:, :, :columns] + down[:, :, 1 : 1 + columns]
+    for k in range(2, 2 * radius + 1):
+        sums += down[:, :, k : k + columns]
+    return sums
+
+
+def _averages(planes: Planes) -> Planes:
+    """Sums over the windows that risks are averaged over, empty outside."""
+    border = ((0, 0), (SMOOTHING, SMOOTHING), (SMOOTHING, SMOOTHING))
+    return window_sums(np.pad(planes, border), SMOOTHING)
+
+
+# --- fits -----------------------------------------------------------------------------------------------
 
 
 class Fit(Record):
-    """First-order polynomials fitted in the windows around all cells."""
+    """First-order polynomials fitted in the windows around cells; 0 where nothing in a window is hidden."""
 
     coefficients: Planes  # (7, rows, columns) constant and slopes of the hidden share
     at_cell: NDArray[np.float64]  # (rows, columns) value at the mean features of the cell itself
@@ -214,92 +211,155 @@ class Fit(Record):
     count: NDArray[np.float64]  # (rows, columns) pixels in the window
 
 
-def fit(cells: Planes, radius: int) -> Fit:
-    """The polynomial of least squares in the window around each cell."""
-    of_windows = polynomials(window_sums(cells, radius))
-    own = cells[FEATURE:PAIR] / np.maximum(cells[COUNT], 1e-30)
-    return Fit(
-        of_windows.coefficients(),
-        of_windows.at(own),
-        of_windows.leverage(own),
-        of_windows.square,
-        of_windows.count,
+def fit(cells: Cells, radius: int, area: Area) -> Fit:
+    """The polynomial of least squares in the window around each cell of an area."""
+    out = np.zeros((FEATURES + 5, *area.shape))
+    for strip in strips(area):
+        held = cells.within(strip)
+        sums = window_sums(cells.within(strip, radius), radius)
+        place = out[:, strip.top - area.top : strip.bottom - area.top]
+        place[-1] = sums[COUNT]
+
+        # Solve where a window has something hidden.
+        some = (held[COUNT] > 0) & (sums[HIDDEN] > 0)
+        own = held[FEATURE:PAIR] / np.maximum(held[COUNT], 1e-30)
+        if some.all():
+            place[:-1] = _solved(sums, own)
+            continue
+        np.divide(1, np.maximum(sums[COUNT], 1), out=place[-3])
+        which = np.flatnonzero(some)
+        if len(which):
+            few = (each.reshape(len(each), -1).take(which, axis=1) for each in (sums, own))
+            for plane, values in zip(place[:-1], _solved(*few), strict=True):
+                plane.reshape(-1)[which] = values
+    return Fit(out[: 1 + FEATURES], out[-4], out[-3], out[-2], out[-1])
+
+
+def _solved(sums: Planes, own: Planes) -> Planes:
+    """(10, ...) coefficients, value and leverage at a cell's own features, sum of the squared residuals."""
+    of_windows = polynomials(sums)
+    return np.stack(
+        [*of_windows.coefficients(), of_windows.at(own), of_windows.leverage(own), of_windows.square]
     )
 
 
-def cell_polynomials(cells: Planes) -> Planes:
-    """(8, rows, columns) coefficients of each cell's polynomial, of the radius of least risk, and whether
-    the cell holds any pixel.
+def cell_polynomials(levels: list[Cells], area: Area) -> Planes:
+    """(8, 2 rows, 2 columns) coefficients of the polynomial of each cell of level 0, of the window of least
+    risk, and whether the cell holds any pixel.
 
-    The risk of radius k is the mean square of F_k - F_1, where F_1 is the fit in the smallest window, less
-    what noise alone would give it, plus the variance of F_k: an unbiased estimate but for the bias of F_1.
+    The risk of window k is the mean square of F_k - F_0, where F_0 is the fit in the smallest window, less
+    what noise alone would give it, plus the variance of F_k: an unbiased estimate but for the bias of F_0.
     The variance of a pixel is that of the residuals in the smallest window.
-    """
-    # Fit the smallest windows, and estimate the variance of pixels from their residuals.
-    held = cells[COUNT]
-    smallest = fit(cells, RADII[0])
-    freedom = np.maximum(smallest.count - (1 + FEATURES), 0.05 * smallest.count)
-    squares, freedoms, weight = window_sums(
-        np.stack([held * smallest.square, held * freedom, held]), SMOOTHING
-    )
-    variance = COHERENCE * squares / np.maximum(freedoms, 1e-30)
-    weight = np.maximum(weight, 1e-30)
-
-    # The risk of the smallest windows is their variance.
-    best = smallest.coefficients
-    mean_leverage = window_sums((held * smallest.leverage)[None], SMOOTHING)[0] / weight
-    least = variance * mean_leverage
-
-    # Take a wider fit where it has less risk.
-    for radius in RADII[1:]:
-        wider = fit(cells, radius)
-        leverage, departure = (
-            window_sums(
-                np.stack([held * wider.leverage, held * np.square(wider.at_cell - smallest.at_cell)]),
-                SMOOTHING,
-            )
-            / weight
-        )
-        risk = departure + variance * (2 * leverage - mean_leverage)
-        better = risk < least
-        least = np.where(better, risk, least)
-        best = np.where(better, wider.coefficients, best)
-    return np.concatenate([best, (held > 0)[None]])
-
-
-def interpolated(coefficients: Planes, features: Planes) -> NDArray[np.float64]:
-    """(rows, columns) hidden share of pixels: bilinear means of the polynomials of cells that hold pixels.
 
     Parameters
     ----------
-    coefficients : (8, rows / 2, columns / 2) float64
-        From `cell_polynomials`.
-    features : (6, rows, columns) float64
+    area : Area
+        Cells of level 1.
     """
-    there = coefficients[-1:]
-    planes = np.concatenate([coefficients[:-1] * there, there])
-    for axis in (1, 2):
-        planes = _between(planes, axis)
-    value = planes[0].copy()
-    for slope, feature in zip(planes[1:-1], features, strict=True):
+    # Fit the smallest windows. Estimate the variance of pixels from their residuals.
+    finest = levels[0].within(area.finer())
+    smallest = fit(levels[0], WINDOWS[0][1], area.finer())
+    freedom = np.maximum(smallest.count - (1 + FEATURES), 0.05 * smallest.count)
+    own = finest[FEATURE:PAIR] / np.maximum(finest[COUNT], 1e-30)
+    of_cells = np.stack([finest[COUNT], smallest.square, freedom, smallest.leverage, smallest.at_cell, *own])
+    weight, squares, freedoms, leverages, at_cell, *own = _by_place(of_cells)
+    sums = np.empty((4, *area.shape))
+    _sum_places(weight, sums[0])
+    for values, out in zip((squares, freedoms, leverages), sums[1:], strict=True):
+        _sum_places(weight * values, out)
+    held = sums[0]
+    total, squares, freedoms, leverages = _averages(sums)
+    per_weight = 1 / np.maximum(total, 1e-30)
+    variance = COHERENCE * squares / np.maximum(freedoms, 1e-30)
+
+    # The risk of the smallest windows is their variance. Take a wider fit where it has less.
+    mean_leverage = leverages * per_weight
+    least = variance * mean_leverage
+    best: Planes | None = None
+    is_wider = np.zeros(area.shape, np.bool_)
+    for level, radius in WINDOWS[1:]:
+        coefficients, leverage = wider_fit(levels, level, radius, area)
+        sums = np.empty((2, *area.shape))
+        _sum_places(weight * np.square(_value(coefficients, own) - at_cell), sums[0])
+        np.multiply(held, leverage, out=sums[1])
+        departure, leverage = _averages(sums) * per_weight
+        risk = departure + variance * (2 * leverage - mean_leverage)
+        better = risk < least
+        least = np.where(better, risk, least)
+        best = coefficients if best is None else np.where(better, coefficients, best)
+        is_wider |= better
+    assert best is not None
+    wider = finer(best, held > 0)
+    is_wider = is_wider.repeat(2, axis=0).repeat(2, axis=1)
+    there = finest[COUNT] > 0
+    return np.concatenate([np.where(is_wider, wider, smallest.coefficients), there[None]])
+
+
+def _by_place(planes: Planes) -> Planes:
+    """(K, 4, rows, columns) values of 2 x 2 cells, (K, 2 rows, 2 columns), side by side."""
+    return np.stack([planes[:, y::2, x::2] for y in (0, 1) for x in (0, 1)], axis=1)
+
+
+def wider_fit(levels: list[Cells], level: int, radius: int, area: Area) -> tuple[Planes, Planes]:
+    """Coefficients and leverage of the fits of a level at the cells of an area of level 1."""
+    wide = area
+    for cells in levels[2 : level + 1]:
+        wide = wide.coarser(1).clipped(cells.shape)
+    fits = fit(levels[level], radius, wide)
+    planes = np.concatenate([fits.coefficients, fits.leverage[None]])
+    for cells in reversed(levels[2 : level + 1]):
+        planes, wide = finer(planes, cells.within(wide)[COUNT] > 0), wide.finer()
+    top, left = area.top - wide.top, area.left - wide.left
+    planes = planes[:, top : top + area.shape[0], left : left + area.shape[1]]
+    return planes[:-1], planes[-1]
+
+
+def _value(coefficients: Planes, features: Sequence[Floats] | Floats) -> NDArray[np.float64]:
+    """Value of polynomials."""
+    value = coefficients[0] + coefficients[1] * features[0]
+    for slope, feature in zip(coefficients[2 : 1 + FEATURES], features[1:], strict=True):
         value += slope * feature
-    return value / np.maximum(planes[-1], 1e-30)
+    return value
 
 
-def _between(planes: Planes, axis: int) -> Planes:
-    """Twice as many values along an axis, linear between the cells' centres; cells outside hold nothing."""
-    shape = list(planes.shape)
-    shape[axis] *= CELL
-    out = np.empty(shape)
-    near = 0.75 * planes
-    far = 0.25 * planes
-    for side in (0, 1):
-        part = out[:, side::CELL] if axis == 1 else out[:, :, side::CELL]
-        part[...] = near
-        size = planes.shape[axis] - 1
-        _part(part, axis, 1 - side, size)[...] += _part(far, axis, side, size)
+def finer(planes: Planes, there: NDArray[np.bool_]) -> Planes:
+    """(K, 2 rows, 2 columns) bilinear means of (K, rows, columns) values of those cells that are `there`."""
+    weighted = np.concatenate([planes * there, there[None]])
+    count, rows, columns = weighted.shape
+    down = np.stack(_between(weighted, 1), axis=2).reshape(count, 2 * rows, columns)
+    weighted = np.stack(_between(down, 2), axis=3).reshape(count, 2 * rows, 2 * columns)
+    return weighted[:-1] / np.maximum(weighted[-1], 1e-30)
+
+
+def _between(planes: Planes, axis: int) -> tuple[Planes, Planes]:
+    """Values a quarter of a cell before and after the centres of cells along an axis; cells outside hold
+    nothing."""
+    far, size = 0.25 * planes, planes.shape[axis]
+    before = 0.75 * planes
+    after = before.copy()
+    if axis == 1:
+        before[:, 1:] += far[:, : size - 1]
+        after[:, : size - 1] += far[:, 1:]
+    else:
+        before[:, :, 1:] += far[:, :, : size - 1]
+        after[:, :, : size - 1] += far[:, :, 1:]
+    return before, after
+
+
+def interpolated(coefficients: Planes, features: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(4, rows, columns) hidden share of pixels: bilinear means of the polynomials of cells that hold pixels.
+
+    Parameters
+    ----------
+    coefficients : (8, rows, columns) float64
+        From `cell_polynomials`.
+    features : (6, 4, rows, columns) float32
+    """
+    planes = coefficients * coefficients[-1]
+    out = np.empty(features.shape[1:])
+    for upper, down in enumerate(_between(planes, 1)):
+        for left, mean in enumerate(_between(down, 2)):
+            value = _value(mean, features[:, 2 * upper + left])
+            value /= np.maximum(mean[-1], 1e-30)
+            out[2 * upper + left] = value
     return out
-
-
-def _part(planes: Planes, axis: int, first: int, size: int) -> Planes:
-    return planes[:, first : first + size] if axis == 1 else planes[:, :, first : first + size]

@@ -64,8 +64,12 @@ class Pictures:
             for k in range(3)
         )
         own = dict(self.known)
-        own["hits"] = Hits(np.arange(len(triangle), dtype=np.int32), triangle, u, v)
-        own["interaction"] = interact(geometry, triangle, u, v, unit(cross(b - a, c - a)))
+        own["hits"] = Hits(
+            np.arange(len(triangle), dtype=np.int32), geometry.objects[triangle], triangle, u, v
+        )
+        own["interaction"] = interact(
+            geometry, geometry.objects[triangle], triangle, u, v, unit(cross(b - a, c - a))
+        )
         own["obscurance_draws"] = np.random.default_rng(seed).random((2, len(triangle)))
         for step in self.steps:
             if step.output in self.at:

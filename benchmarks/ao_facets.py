@@ -57,8 +57,9 @@ def beside(geometry: Any, side: np.ndarray) -> tuple[Hits, SurfaceInteraction]:
         for k in range(3)
     ]
     front = unit(np.cross(corner[1] - corner[0], corner[2] - corner[0]))
-    hits = Hits(np.arange(len(side), dtype=np.int32), triangle, u, v)
-    return hits, interact(geometry, triangle, u, v, column_major(front, np.float64))
+    objects = geometry.objects[triangle]
+    hits = Hits(np.arange(len(side), dtype=np.int32), objects, triangle, u, v)
+    return hits, interact(geometry, objects, triangle, u, v, column_major(front, np.float64))
 
 
 def jumps(path: Path) -> tuple[int, float, float, float]:

@@ -149,7 +149,7 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
         parts = list(bands(plan, shared, run))
     counts["rays"] = sum(run.stats.rays.values())
     counts["steps"] = len(plan.once) + len(plan.tile)
-    counts["triangles"] = len(shared["geometry"].triangles)
+    counts["triangles"] = shared["geometry"].triangle_count
     return {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}, counts
 
 

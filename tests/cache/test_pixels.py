@@ -21,7 +21,7 @@ W = codec_of("obscurance")
 def hits_of(count):
     """Every sample of so many pixels hits something."""
     sample = np.arange(count * VIEW.samples, dtype=np.int32)
-    return Hits(sample, sample, sample.astype(np.float32), sample.astype(np.float32))
+    return Hits(sample, sample, sample, sample.astype(np.float32), sample.astype(np.float32))
 
 
 def values_at(numbers):

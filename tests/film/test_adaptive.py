@@ -20,7 +20,7 @@ def wanted(plane, difference=0.02, reach=1, spread=1.0, seen=None):
     """(5, 12) pixels of a layer with these values that are refined because of the values alone."""
     view = View("main", None, SHAPE[1], SHAPE[0], 1, Adaptive(2, reach, spread), 16)
     sample = np.arange(plane.size, dtype=np.int32) if seen is None else np.flatnonzero(seen).astype(np.int32)
-    hits = Hits(sample, sample, sample.astype(np.float32), sample.astype(np.float32))
+    hits = Hits(sample, sample, sample, sample.astype(np.float32), sample.astype(np.float32))
     values = np.asarray(plane, np.float32).ravel()[sample]
     tile = Tile(0, 0, SHAPE[1], SHAPE[0])
     return refined(difference, view, tile, hits, NONE, values).reshape(SHAPE)

@@ -21,6 +21,7 @@ from metamorphic.premises import (
     from_polygons,
     grained,
     plain_material,
+    with_own_meshes,
     without_images,
     without_rays,
 )
@@ -32,9 +33,10 @@ from metamorphic.surfaces import Surface
 @relation("rounding")
 def a_mesh_in_two_parts(case: Case, random: Random, studio: Studio) -> None:
     """The polygons of a file dealt to two files are the same picture. Premises: fixed samples, normals of
-    the file, a grain for every object, since tangents along u are means over polygons, and shadows that begin
-    on polygons, since both parts are no smooth surface any more."""
-    case = grained(from_polygons(files_alone(fixed_samples(case), random)))
+    the file, a grain for every object, since tangents along u are means over polygons, shadows that begin on
+    polygons, since both parts are no smooth surface any more, and a mesh for every object, since a copy of a
+    mesh is an instance only while there is another."""
+    case = with_own_meshes(grained(from_polygons(files_alone(fixed_samples(case), random))))
     number = random.randrange(len(case.scene["objects"]))
     thing = case.scene["objects"][number]
     file = case.scene["meshes"][thing["mesh"]]["file"]

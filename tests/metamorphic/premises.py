@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from random import Random
 from typing import Any
 
@@ -48,6 +49,19 @@ def from_polygons(case: Case) -> Case:
     """Shadows begin on the polygons, whatever surface their normals imply."""
     case = case.copy()
     case.scene["terminator"] = "none"
+    return case
+
+
+def with_own_meshes(case: Case) -> Case:
+    """Each object has a mesh of its own, from another file or of another name: none is an instance."""
+    case = case.copy()
+    for k, thing in enumerate(case.scene["objects"]):
+        source = copy.deepcopy(case.scene["meshes"][thing["mesh"]])
+        if "file" in source:
+            old, name = source["file"], f"own{k}.{source['file'].partition('.')[2]}"
+            case.meshes[name], source["file"] = case.meshes[old], name
+        case.scene["meshes"][f"own{k}"] = source
+        thing["mesh"] = f"own{k}"
     return case
 
 

@@ -45,7 +45,7 @@ NAMED = {
 
 
 def weights_at(geometry, planar, triangle, u, v):
-    return corner_weights(geometry, TriangleCorners(None, triangle, u, v), planar)
+    return corner_weights(geometry, TriangleCorners(None, geometry.objects[triangle], triangle, u, v), planar)
 
 
 def ring(radii, squeeze=1.0):
@@ -301,7 +301,7 @@ def test_some_of_the_hits_and_hits_put_together_keep_their_weights():
 def test_the_mean_of_polygons_of_any_size():
     geometry = place_meshes([polygon(L_SHAPE), two_quads()], [np.eye(4)] * 2)
     centres = polygon_centres(geometry)
-    group = MeanCorners(None, centres, np.array([0, 2, 1, 0], np.int32))
+    group = MeanCorners(None, np.zeros(4, np.int32), centres, np.array([0, 2, 1, 0], np.int32))
     weights = CornerWeights(weights_at(geometry, None, *anywhere(geometry, 4)).hits, (group,))
     found = weights.interpolate_vertices(geometry, geometry.vertices)
     np.testing.assert_allclose(found, centres.position[[0, 2, 1, 0]], atol=1e-6)

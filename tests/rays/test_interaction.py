@@ -33,7 +33,7 @@ def position(geometry, triangle, u, v):
 
 
 def along_u(geometry, triangle, u, v):
-    weights = corner_weights(geometry, TriangleCorners(None, triangle, u, v))
+    weights = corner_weights(geometry, TriangleCorners(None, geometry.objects[triangle], triangle, u, v))
     return weights.interpolate(geometry, uv_tangents(geometry, scene_uvs(geometry)))
 
 

@@ -106,7 +106,7 @@ def test_results_do_not_depend_on_the_split_into_calls(scene, monkeypatch):
     *_, single, widths = scene
     rays = pattern_rays(scene, 61, 20, 3)
     monkeypatch.setattr("illumcli.rays.packet_loop.RAYS_PER_CALL", 150)
-    monkeypatch.setattr("illumcli.rays.single_ray_loop.PATTERN_RAYS_PER_CALL", 70)
+    monkeypatch.setattr("illumcli.rays.ray_loop.PATTERN_RAYS_PER_CALL", 70)
     for loop in widths.values():
         assert_same(loop, single, rays)
     part = rays.between(7, 31)

@@ -313,7 +313,8 @@ def test_buffers_come_back_as_they_were(scene):
     ) + sum(a.nbytes for placed in geometry.placed for a in arrays_in(placed))
     again = decode(said, tuple(arrays))
     assert again.render_space == geometry.render_space
-    assert again.placed[1].mesh.corners is again.placed[2].mesh.corners
+    assert again.placed_mesh[1] == again.placed_mesh[2]
+    np.testing.assert_array_equal(again.instances.matrix, geometry.instances.matrix)
     for name in ("vertices", "triangles", "corners", "polygons", "objects"):
         a, b = getattr(geometry, name), getattr(again, name)
         np.testing.assert_array_equal(a, b)

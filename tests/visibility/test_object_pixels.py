@@ -14,7 +14,7 @@ from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, object
 def sampled(sample, objects, w, baked=None, read=None):
     """Two pixels of four samples each, some of which see objects."""
     count = len(sample)
-    hits = Hits(np.array(sample, np.int32), *(np.zeros(count),) * 3)
+    hits = Hits(np.array(sample, np.int32), *(np.zeros(count),) * 4)
     place = np.column_stack([np.arange(count), np.zeros(count), np.ones(count)])
     surface = SurfaceInteraction(place, place.astype(np.float32), np.ones(count), np.zeros(count, np.bool_))
     over = Hemispheres(place.astype(np.float32), place.astype(np.float32))

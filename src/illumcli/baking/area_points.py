@@ -60,14 +60,15 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
     a, b = np.where(over, 1 - a, a), np.where(over, 1 - b, b)
 
     # Shading normals, or the triangle's normal if there is none.
-    interaction = interact(geometry, triangle, a, b, np.zeros((len(triangle), 3), F))
+    objects = geometry.objects.take(triangle)
+    interaction = interact(geometry, objects, triangle, a, b, np.zeros((len(triangle), 3), F))
     n = or_geometric(_interpolated(surfaces.normals, geometry, triangle, a, b), interaction.ng)
     return AreaPoints(
         geometry,
         column_major(n, F),
         column_major(interaction.position, F),
         np.arange(len(triangle), dtype=np.uint32),
-        geometry.objects[triangle],
+        objects,
         np.ones(len(triangle), bool),
         offset_ray_origins(interaction.position, interaction.ng, interaction.edge),
         interaction.ng,

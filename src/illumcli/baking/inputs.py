@@ -142,11 +142,12 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The placed meshes of a scene, as in a render, with the normals that are the axes of hemispheres; and
     their repairs."""
     buffers: dict[str, Any] = {}
-    for node in build(scene, loaded).topological_order(["geometry", "corner_normals", "repairs"]):
+    graph = build(scene, loaded, shares_meshes=False)
+    for node in graph.topological_order(["geometry", "corner_normals", "repairs"]):
         buffers[node.output] = node.run(buffers)
     geometry, normals = buffers["geometry"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":
-        normals = corner_normals(("flat",) * len(geometry.placed), buffers["meshes"], geometry)
+        normals = corner_normals(("flat",) * len(geometry.placed), geometry)
     return Surfaces(geometry, normals), buffers["repairs"].repairs
 
 

@@ -104,7 +104,8 @@ class BakeSampler(Record):
 
         def compute(unit: WorkUnit, stop: threading.Event) -> NDArray[np.bool_]:
             triangle = unit.points.astype(np.int32)
-            planes = triangle_planes(geometry, triangle, np.zeros(len(triangle), bool))
+            objects = geometry.objects.take(triangle)
+            planes = triangle_planes(geometry, objects, triangle, np.zeros(len(triangle), bool))
             return self.occluders[unit.object].clusters.is_open(*planes)
 
         open_triangles = np.zeros(len(geometry.triangles), bool)

@@ -52,7 +52,7 @@ def triangles_of(geometry: SceneGeometry) -> Triangles:
     """Normal, edge, height and area of every triangle of the scene."""
     every = np.arange(len(geometry.triangles), dtype=np.int32)
     zero = np.zeros(len(every), F)
-    interaction = interact(geometry, every, zero, zero, np.zeros((len(every), 3), F))
+    interaction = interact(geometry, geometry.objects, every, zero, zero, np.zeros((len(every), 3), F))
     corner = triangle_corners(geometry.vertices, geometry.triangles)
     edges = [corner[k - 2] - corner[k] for k in range(3)]
     area = length(cross(edges[0], edges[1]))

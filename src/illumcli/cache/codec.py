@@ -13,6 +13,7 @@ from illumcli.cache.store import Stored
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds
+from illumcli.geometry.instances import Instances
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.repairs import MeshRepairs, Repair
@@ -33,6 +34,7 @@ CLASSES = {
         PlanarPolygons,
         SceneGeometry,
         PlacedMesh,
+        Instances,
         RenderSpace,
         CornerVectors,
         MeshRepairs,
@@ -73,7 +75,7 @@ class BufferCodec(Value):
 
 
 def _pack_hits(hits: Hits, buffers: Buffers) -> NDArray[np.int32]:
-    return np.stack([hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
+    return np.stack([hits.objects, hits.triangle, hits.u.view(np.int32), hits.v.view(np.int32)])
 
 
 def _pack_points(points: ShadingPoints, buffers: Buffers) -> NDArray[np.float32] | None:
@@ -83,7 +85,8 @@ def _pack_points(points: ShadingPoints, buffers: Buffers) -> NDArray[np.float32]
 
 
 def _unpack_points(planes: NDArray[np.float32], hits: Hits) -> ShadingPoints:
-    return ShadingPoints(hits.triangle, hits.u, hits.v, planes[:3].T, planes[3:].T, Identity())
+    places = hits.objects, hits.triangle, hits.u, hits.v
+    return ShadingPoints(*places, planes[:3].T, planes[3:].T, Identity())
 
 
 def _pack_material(material: NDArray[np.int32], buffers: Buffers) -> NDArray[np.uint16] | None:
@@ -97,7 +100,7 @@ def _first(planes: NDArray[Any], hits: Hits) -> Any:
 
 
 CODECS = {
-    "hits": BufferCodec(np.int32, 3, _pack_hits, lambda planes, hits: hits),
+    "hits": BufferCodec(np.int32, 4, _pack_hits, lambda planes, hits: hits),
     "points": BufferCodec(np.float32, 6, _pack_points, _unpack_points),
     "material": BufferCodec(np.uint16, 1, _pack_material, lambda planes, hits: planes[0].astype(np.int32)),
     "obscurance": BufferCodec(np.float32, 1, lambda w, buffers: w[None], _first),
@@ -147,10 +150,11 @@ class Loads(Protocol):
 
 def load_hits(stored: Loads, tile: Tile) -> Hits:
     """The stored hits of a tile."""
-    triangle, u, v = stored.tile(tile)
+    objects, triangle, u, v = stored.tile(tile)
     sample = np.flatnonzero(triangle >= 0).astype(np.int32)
     return Hits(
         sample,
+        take_or_all(objects, sample),
         take_or_all(triangle, sample),
         take_or_all(u, sample).view(F),
         take_or_all(v, sample).view(F),

@@ -74,7 +74,8 @@ def probes(
     """First hits of some samples of every pixel."""
     closest = tracer.closest(probe_rays.origins, probe_rays.directions)
     hit = closest.triangle >= 0
-    number = np.where(hit, geometry.objects.take(closest.triangle, mode="wrap") + np.int32(1), np.int32(0))
+    objects = geometry.objects_of(closest.triangle, closest.instance)
+    number = np.where(hit, objects + np.int32(1), np.int32(0))
 
     # depth from origins near the scene: single precision does for it, however far the eye is
     forward = axes(probe_view.camera)[2]

@@ -44,7 +44,7 @@ class PlanarPolygons(Record):
     """
 
     row: NDArray[np.int32]  # (T,) polygon of each triangle, -1 where the triangle is interpolated alone
-    first_corner: NDArray[np.int32]  # (Q,) corner number, in the scene, of each polygon's first corner
+    first_corner: NDArray[np.int32]  # (Q,) corner number, among all stored, of each polygon's first corner
     starts: NDArray[np.int32]  # (Q + 1,) first row in `flat` of each polygon, and the end
     flat: NDArray[np.float64]  # (K, 2) corners in the plane, from their mean; the farthest lies at distance 1
     padded: NDArray[np.int16]  # (Q,) corners rounded up to a power of 2; 0 for clearly convex quads
@@ -65,8 +65,8 @@ class PlanarPolygons(Record):
 def planar_polygons(geometry: SceneGeometry, normals: CornerVectors | None = None) -> PlanarPolygons | None:
     """The planar polygons of a scene; None if there are none.
 
-    Corners are those of the meshes in double precision, before they are rounded for Embree. Polygons
-    that cross themselves, or have no area, are left out.
+    Corners are those of the meshes in double precision, before they are rounded for Embree; those of shared
+    meshes in a space of their own. Polygons that cross themselves, or have no area, are left out.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def _candidates(geometry: SceneGeometry) -> tuple[NDArray[Any], NDArray[Any], Ve
         firsts.append(first + placed.first_corner)
         sizes.append(size)
         positions.append(
-            geometry.render_space.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex))
+            placed.space.from_world(take_rows(transformed_vertices(mesh, placed.matrix), vertex))
         )
         vertices.append(vertex + np.int32(placed.first_vertex))
     if not firsts:

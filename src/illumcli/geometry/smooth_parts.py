@@ -29,7 +29,7 @@ class SmoothParts:
         self._normals = normals
 
     def are_joined(self, a: Ids, b: Ids) -> NDArray[np.bool_]:
-        """(N,) True where triangles `a` and `b`, both (N,), belong to one smooth part."""
+        """(N,) True where stored triangles `a` and `b`, both (N,), belong to one smooth part of a mesh."""
         objects = self._geometry.objects
         out: NDArray[np.bool_] = objects.take(a) == objects.take(b)
         # Neighbours, which most pairs are, need no search for parts.
@@ -55,12 +55,12 @@ class SmoothParts:
         return components(first, second, int(corner.max(initial=-1)) + 1).take(corner[:, 0])
 
     def _corner_points(self) -> NDArray[np.int32]:
-        """(T, 3) a number for the object, position and normal of each corner; equal corners share it."""
-        # Pairs of a vertex and a normal; those of equal object, position and rounded normal share a number.
+        """(T, 3) a number for the mesh, position and normal of each corner; equal corners share it."""
+        # Pairs of a vertex and a normal; those of equal mesh, position and rounded normal share a number.
         geometry = self._geometry
         pair, vertex, row = self._pairs()
-        of_vertex = np.zeros(len(geometry.vertices), np.int64)
-        of_vertex[geometry.triangles] = geometry.objects[:, None]
+        first = [placed.first_vertex for placed in geometry.placed]
+        of_vertex = np.searchsorted(first, np.arange(len(geometry.vertices)), side="right") - 1
         # Adding 0 gives zeros of both signs the same bits.
         x, y, z = (
             (column.take(vertex) + F(0)).view(np.uint32).astype(np.int64) for column in geometry.vertices.T

@@ -22,7 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, take_rows
+from illumcli.arrays import F, Floats, Ids, Vectors, take_rows
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, PolygonCentres, SceneGeometry
 from illumcli.records import Record
@@ -39,6 +39,7 @@ class Corners(Record):
     """Hits on polygons of one kind, and the weight of each corner there."""
 
     index: Ids | None  # (m,) indices among the M hits, ascending; None: all of them
+    objects: Ids  # (m,) object of each hit
 
     @property
     def count(self) -> int:
@@ -54,12 +55,21 @@ class Corners(Record):
         return self.weight(k)
 
     def corner(self, geometry: SceneGeometry, k: int) -> Ids:
-        """(m,) number of corner k in the scene geometry."""
+        """(m,) number of corner k among those that are stored."""
         raise NotImplementedError
 
     def vertex(self, geometry: SceneGeometry, k: int) -> Ids:
         """(m,) number of its vertex."""
         raise NotImplementedError
+
+    def position(self, geometry: SceneGeometry, k: int) -> Vectors:
+        """(m, 3) position of corner k [radii]."""
+        return geometry.positions(self.objects, take_rows(geometry.vertices, self.vertex(geometry, k)))
+
+    def normal(self, geometry: SceneGeometry, normals: CornerVectors, k: int) -> Vectors:
+        """(m, 3) unit shading normal at corner k."""
+        n = take_rows(normals.values, normals.index.take(self.corner(geometry, k)))
+        return geometry.unit_normals(self.objects, n)
 
     @property
     def shape(self) -> Ids:
@@ -120,7 +130,12 @@ class TriangleCorners(Corners):
     def take(self, hits: NDArray[Any], new_index: Ids) -> TriangleCorners:
         kept = hits if self.index is None else np.flatnonzero(new_index.take(self.index) >= 0)
         index = None if self.index is None else new_index.take(self.index.take(kept))
-        return TriangleCorners(index, self.triangle.take(kept), self.u.take(kept), self.v.take(kept))
+        return self.at(kept, index)
+
+    def at(self, which: NDArray[Any], index: Ids | None) -> TriangleCorners:
+        """Some of the hits, with new indices."""
+        objects, triangle = self.objects.take(which), self.triangle.take(which)
+        return TriangleCorners(index, objects, triangle, self.u.take(which), self.v.take(which))
 
 
 class PolygonCorners(Corners):
@@ -168,6 +183,7 @@ class PolygonCorners(Corners):
         kept = np.flatnonzero(new_index.take(self.index) >= 0)
         return PolygonCorners(
             new_index.take(self.index.take(kept)),
+            self.objects.take(kept),
             self.planar,
             self.polygon.take(kept),
             self.last.take(kept),
@@ -214,13 +230,13 @@ class MeanCorners(Corners):
     def take(self, hits: NDArray[Any], new_index: Ids) -> MeanCorners:
         kept = hits if self.index is None else np.flatnonzero(new_index.take(self.index) >= 0)
         index = None if self.index is None else new_index.take(self.index.take(kept))
-        return MeanCorners(index, self.centres, self.polygon.take(kept))
+        return MeanCorners(index, self.objects.take(kept), self.centres, self.polygon.take(kept))
 
 
 class CornerWeights(Record):
     """The weights of the corners of the polygon at each of M hits, computed by `corner_weights`.
 
-    Every interpolation goes through here: `interpolate` for vectors at corners (normals),
+    Every interpolation goes through here: `interpolate` for vectors at corners, `interpolate_normals`,
     `interpolate_vertices` for values at vertices (colours, baked obscurance), `weighted_mean` for any
     function of a group and a corner k.
     """
@@ -234,10 +250,14 @@ class CornerWeights(Record):
         return len(self.hits.triangle)
 
     def interpolate(self, geometry: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
-        """(M, j) the vectors that `table` has at corners, interpolated; not normalized."""
+        """(M, j) the vectors that `table` has at corners, interpolated as they are stored; not normalized."""
         return self.weighted_mean(
             lambda group, k: take_rows(table.values, table.index.take(group.corner(geometry, k)))
         )
+
+    def interpolate_normals(self, geometry: SceneGeometry, normals: CornerVectors) -> Vectors:
+        """(M, 3) shading normals at corners, in render space, interpolated; not normalized."""
+        return self.weighted_mean(lambda group, k: group.normal(geometry, normals, k))
 
     def interpolate_vertices(self, geometry: SceneGeometry, values: NDArray[Any]) -> NDArray[Any]:
         """(M, j) interpolated values; `values` holds those at the vertices of the scene, (V, j)."""
@@ -272,17 +292,23 @@ def concatenated(parts: Sequence[CornerWeights]) -> CornerWeights:
             index = np.arange(len(part), dtype=np.int32) if group.index is None else group.index
             groups.append(replace(group, index=index + np.int32(count)))
         count += len(part)
-    triangle = np.concatenate([part.hits.triangle for part in parts])
-    u, v = (np.concatenate([getattr(part.hits, name) for part in parts]) for name in ("u", "v"))
-    return CornerWeights(TriangleCorners(None, triangle, u, v), tuple(groups))
+    objects, triangle, u, v = (
+        np.concatenate([getattr(part.hits, name) for part in parts])
+        for name in ("objects", "triangle", "u", "v")
+    )
+    return CornerWeights(TriangleCorners(None, objects, triangle, u, v), tuple(groups))
 
 
 class OnTriangles(Protocol):
     """Points on triangles by barycentric weights: hits, shading points."""
 
     @property
+    def objects(self) -> Ids:
+        """(M,) int32 object numbers."""
+
+    @property
     def triangle(self) -> Ids:
-        """(M,) int32."""
+        """(M,) int32 stored triangles."""
 
     @property
     def u(self) -> Floats:
@@ -297,8 +323,8 @@ def corner_weights(
     geometry: SceneGeometry, hits: OnTriangles, planar_polygons: PlanarPolygons | None = None
 ) -> CornerWeights:
     """The weights at M hits: over planar polygons if these are given, otherwise over triangles."""
-    triangle, u, v = hits.triangle, hits.u, hits.v
-    by_triangle = TriangleCorners(None, triangle, u, v)
+    objects, triangle, u, v = hits.objects, hits.triangle, hits.u, hits.v
+    by_triangle = TriangleCorners(None, objects, triangle, u, v)
     planar = planar_polygons
     if planar is None:
         return CornerWeights(by_triangle, (by_triangle,))
@@ -306,7 +332,7 @@ def corner_weights(
     # Hits on polygons that are not planar keep barycentric weights.
     row = planar.row.take(triangle)
     uneven = np.flatnonzero(row < 0).astype(np.int32)
-    groups: list[Corners] = [TriangleCorners(uneven, triangle.take(uneven), u.take(uneven), v.take(uneven))]
+    groups: list[Corners] = [by_triangle.at(uneven, uneven)]
 
     # The others are grouped by the number of corners: quads (0) by bilinear, larger polygons by mean value
     # coordinates.
@@ -323,7 +349,7 @@ def corner_weights(
         else:
             weights = _bilinear([take_rows(planar.flat, start + k) for k in range(4)], x, y)
         outside = np.any(weights < BELOW, axis=0)
-        groups.append(PolygonCorners(index, planar, polygon, last, weights, outside))
+        groups.append(PolygonCorners(index, objects.take(index), planar, polygon, last, weights, outside))
     not_empty = tuple(group for group in groups if group.index is not None and group.index.size)
     return CornerWeights(by_triangle, not_empty or tuple(groups[:1]))
 

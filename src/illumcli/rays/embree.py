@@ -16,7 +16,7 @@ from illumcli.arrays import F, Floats, Vectors
 from illumcli.errors import IllumError
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.pattern_rays import PatternRays, PatternResults
-from illumcli.rays.ray_loop import NO_LIMIT, Closest, ray_loop
+from illumcli.rays.ray_loop import NO_LIMIT, Closest, InstancedMeshes, ray_loop
 
 RETRY_TURN = F(2.0**-19)
 """Angle [rad] by which a ray that missed is turned for its retry. Embree's robust mode can miss at an exact
@@ -28,14 +28,20 @@ class Interrupted(Exception):
 
 
 class Tracer:
-    """Closest-hit and occlusion queries for arrays of rays on a set of triangles; safe in many threads.
+    """Closest-hit and occlusion queries for arrays of rays on triangles and instances; safe in many threads.
 
     There may be fewer origins than directions: each origin is then shared by equally many consecutive rays.
     """
 
-    def __init__(self, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
-        self._loop = ray_loop(vertices, triangles)
-        self.triangle_count = len(triangles)
+    def __init__(
+        self,
+        vertices: NDArray[np.float32],
+        triangles: NDArray[np.int32],
+        instanced: InstancedMeshes | None = None,
+    ) -> None:
+        self._loop = ray_loop(vertices, triangles, instanced)
+        self._instanced = instanced
+        self.is_empty = not len(triangles) and instanced is None
         self.rays = 0
         self._stop: threading.Event | None = None
 
@@ -53,7 +59,7 @@ class Tracer:
         self._admit(origins, directions)
         hits = self._closest(origins, directions)
         missed = np.flatnonzero(hits.triangle < 0)
-        if missed.size and self.triangle_count:
+        if missed.size and not self.is_empty:
             d, origin = directions[missed], missed // (len(directions) // len(origins))
             self.rays += len(missed)
             retried = self._closest(origins[origin], d + RETRY_TURN * np.abs(d[:, [1, 2, 0]]))
@@ -64,6 +70,9 @@ class Tracer:
     def _closest(self, origins: Vectors, directions: Vectors) -> Closest:
         hits = self._loop.closest(origins, directions)
         hits.distance[hits.triangle < 0] = np.inf
+        if self._instanced is not None:
+            within = np.flatnonzero(hits.instance >= 0)
+            hits.triangle[within] += self._instanced.first_triangle.take(hits.instance[within])
         return hits
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:
@@ -136,5 +145,28 @@ def _check_finite(name: str, array: Vectors) -> None:
 
 
 def tracer(geometry: SceneGeometry) -> Tracer:
-    """Embree's tree over the triangles of a scene, ready for queries."""
-    return Tracer(geometry.vertices, geometry.triangles)
+    """Embree's tree over the triangles and instances of a scene, ready for queries."""
+    shared = geometry.instances
+    if shared is None:
+        return Tracer(geometry.vertices, geometry.triangles)
+
+    # The shared meshes come last.
+    first = int(shared.placed.min())
+    meshes = geometry.placed[first:]
+    ends = [*meshes[1:], None]
+    parts = [
+        (
+            slice(each.first_vertex, None if end is None else end.first_vertex),
+            slice(each.first_triangle, None if end is None else end.first_triangle),
+        )
+        for each, end in zip(meshes, ends, strict=True)
+    ]
+    instanced = InstancedMeshes(
+        tuple(geometry.vertices[vertices] for vertices, _ in parts),
+        tuple(geometry.triangles[triangles] - np.int32(vertices.start) for vertices, triangles in parts),
+        shared.placed - np.int32(first),
+        shared.matrix,
+        np.array([placed.first_triangle for placed in meshes], np.int32).take(shared.placed - first),
+    )
+    own = geometry.vertices[: meshes[0].first_vertex], geometry.triangles[: meshes[0].first_triangle]
+    return Tracer(*own, instanced)

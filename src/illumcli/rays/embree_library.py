@@ -25,10 +25,12 @@ Handle: TypeAlias = int
 ROBUST = 4  # RTC_SCENE_FLAG_ROBUST
 INDEX, VERTEX = 0, 1  # RTC_BUFFER_TYPE_*
 UINT3, FLOAT3 = 0x5003, 0x9003  # RTC_FORMAT_*
-TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
+MATRIX_BY_COLUMNS = 0x9234  # RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR
+TRIANGLES, INSTANCE = 0, 121  # RTC_GEOMETRY_TYPE_*
 OUT_OF_MEMORY = 4  # RTC_ERROR_OUT_OF_MEMORY
 NATIVE_PACKETS = ((16, 34), (8, 33), (4, 32))
 """Widths of packets, with RTC_DEVICE_PROPERTY_NATIVE_RAY*_SUPPORTED, which says whether they are native."""
+PACKET_QUERIES = ("rtcIntersect", "rtcOccluded")
 
 PLACES = ("embreex.libs/libembree4*", "embreex/.dylibs/libembree4*", "embreex.libs/embree4*.dll")
 """Where wheels of embreex keep the library, on Linux, macOS and Windows. `importlib.metadata` knows it too,
@@ -82,6 +84,13 @@ def _declare(library: ctypes.CDLL) -> None:
         "rtcCommitGeometry": (None, [pointer]),
         "rtcAttachGeometry": (number, [pointer, pointer]),
         "rtcReleaseGeometry": (None, [pointer]),
+        "rtcSetGeometryInstancedScene": (None, [pointer, pointer]),
+        "rtcSetGeometryTransform": (None, [pointer, number, number, pointer]),
+        **{
+            f"{query}{width}": (None, 4 * [pointer])
+            for query in PACKET_QUERIES
+            for width, _ in NATIVE_PACKETS
+        },
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)
@@ -89,9 +98,13 @@ def _declare(library: ctypes.CDLL) -> None:
 
 
 def build_tree(
-    device: Handle, scene: Handle, vertices: NDArray[np.float32], triangles: NDArray[np.int32]
+    device: Handle,
+    scene: Handle,
+    vertices: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    commit: bool = True,
 ) -> None:
-    """Attach (V, 3) vertices and (T, 3) triangles to a scene and build its tree.
+    """Attach (V, 3) vertices and (T, 3) triangles to a scene and, if `commit`, build its tree.
 
     The interpreter lock is not held meanwhile.
 
@@ -106,7 +119,8 @@ def build_tree(
     library.rtcGetDeviceError(device)  # the device forgets errors of earlier trees
     if len(triangles):
         _attach(device, scene, vertices, triangles)
-    library.rtcCommitScene(scene)
+    if commit:
+        library.rtcCommitScene(scene)
     check(library.rtcGetDeviceError(device))
 
 

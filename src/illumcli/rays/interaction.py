@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
+from illumcli.errors import LimitError
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.transforms import cofactors
@@ -24,16 +25,20 @@ class Hits(Record):
     """The M samples of a tile whose rays hit a surface; every surface buffer has a row for each."""
 
     sample: Ids  # (M,) index of the sample in the tile, ascending
-    triangle: Ids  # (M,)
+    objects: Ids  # (M,) object number
+    triangle: Ids  # (M,) stored triangle
     u: Floats  # (M,) float32 weight of corner 1
     v: Floats  # (M,) float32 weight of corner 2
 
 
-def hits(tracer: Tracer, rays: Rays) -> Hits:
+def hits(tracer: Tracer, geometry: SceneGeometry, rays: Rays) -> Hits:
     """The samples whose rays hit a triangle, and where."""
     closest = tracer.closest(rays.origins, rays.directions)
     sample = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
-    return Hits(sample, *(getattr(closest, name).take(sample) for name in ("triangle", "u", "v")))
+    triangle, instance, u, v = (
+        getattr(closest, name).take(sample) for name in ("triangle", "instance", "u", "v")
+    )
+    return Hits(sample, geometry.objects_of(triangle, instance), triangle, u, v)
 
 
 class SurfaceInteraction(Record):
@@ -41,25 +46,23 @@ class SurfaceInteraction(Record):
 
     position: NDArray[np.float64]  # (M, 3) in radii, on the float32 triangle that Embree has
     ng: Vectors  # (M, 3) float32 unit normal of the triangle, on the eye's side
-    edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii
+    edge: Floats  # (M,) float32 longest edge, for slivers more (`offsets.effective_edge`), in radii;
+    # of instances at least `Instances.reach`
     back_facing: NDArray[np.bool_]  # (M,) the ray hit the back: normals are flipped
 
 
 def interaction(geometry: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
     """Surface interactions of the hits of camera rays."""
     towards_eye = -take_rows(rays.directions, hits.sample)
-    return interact(geometry, hits.triangle, hits.u, hits.v, towards_eye)
+    return interact(geometry, hits.objects, hits.triangle, hits.u, hits.v, towards_eye)
 
 
 def interact(
-    geometry: SceneGeometry, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
+    geometry: SceneGeometry, objects: Ids, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
 ) -> SurfaceInteraction:
     """Surface interactions of hits, computed in float64 from the float32 vertices that Embree has."""
     # The triangles' first vertices and edges.
-    v0, e1, e2 = (
-        column_major(take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)), np.float64)
-        for k in range(3)
-    )
+    v0, e1, e2 = (geometry.corner_positions(objects, triangle, k) for k in range(3))
     e1 -= v0
     e2 -= v0
 
@@ -76,7 +79,8 @@ def interact(
     position = v0
     position += np.multiply(e1, u[:, None], out=e1)
     position += np.multiply(e2, v[:, None], out=e2)
-    return SurfaceInteraction(position, column_major(normal, F), effective_edge(edge, area), back_facing)
+    offset_edge = geometry.offset_edges(objects, effective_edge(edge, area))
+    return SurfaceInteraction(position, column_major(normal, F), offset_edge, back_facing)
 
 
 class ShadingContext(Record):
@@ -110,7 +114,10 @@ def corner_rows(geometry: SceneGeometry, triangle: Ids, table: CornerVectors) ->
 
 
 def geometric_normal(
-    hits: Hits, interaction: SurfaceInteraction, planar_polygons: PlanarPolygons | None = None
+    geometry: SceneGeometry,
+    hits: Hits,
+    interaction: SurfaceInteraction,
+    planar_polygons: PlanarPolygons | None = None,
 ) -> Vectors:
     """(M, 3) float32 unit normal of each hit's polygon, on the eye's side.
 
@@ -121,7 +128,10 @@ def geometric_normal(
     planar = np.flatnonzero(row >= 0)
     if planar_polygons is None or not planar.size:
         return interaction.ng
-    normal, ng = take_rows(planar_polygons.normal, row.take(planar)), take_rows(interaction.ng, planar)
+    normal = geometry.unit_normals(
+        hits.objects.take(planar), take_rows(planar_polygons.normal, row.take(planar))
+    )
+    ng = take_rows(interaction.ng, planar)
     out = interaction.ng.copy(order="F")
     out[planar] = facing(normal, dot(normal, ng) < 0)
     return out
@@ -135,7 +145,7 @@ def interpolated(context: ShadingContext) -> Vectors:
     interaction = context.interaction
     if context.normals is None:
         return interaction.ng
-    n = unit(context.weights.interpolate(context.geometry, context.normals))
+    n = unit(context.weights.interpolate_normals(context.geometry, context.normals))
     return or_geometric(facing(n, interaction.back_facing), interaction.ng)
 
 
@@ -164,12 +174,11 @@ def quadratic(context: ShadingContext) -> Vectors:
     normals = context.normals
     if normals is None:
         return interaction.ng
-    n = column_major(weights.interpolate(geometry, normals))
+    n = column_major(weights.interpolate_normals(geometry, normals))
     for group in weights.groups:
 
         def corner(k: int, group: Corners = group) -> Corner:
-            end = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
-            return take_rows(geometry.vertices, group.vertex(geometry, k)), end, group.end_weight(k)
+            return group.position(geometry, k), group.normal(geometry, normals, k), group.end_weight(k)
 
         share = np.multiply if isinstance(group, TriangleCorners) else between
         if group.index is None:
@@ -220,7 +229,7 @@ def subtract_edge_terms(
 
 def uv(geometry: SceneGeometry, uvs: CornerVectors, hits: Hits) -> NDArray[np.float32]:
     """(M, 2) texture coordinates of hits, linear on every triangle; 0 where a mesh has none."""
-    return _with_all(geometry, uvs, TriangleCorners(None, hits.triangle, hits.u, hits.v))
+    return _with_all(geometry, uvs, TriangleCorners(None, hits.objects, hits.triangle, hits.u, hits.v))
 
 
 def uv_at(geometry: SceneGeometry, uvs: CornerVectors, weights: CornerWeights) -> NDArray[np.float32]:
@@ -247,7 +256,7 @@ def _with_all(geometry: SceneGeometry, uvs: CornerVectors, corners: Corners) -> 
 
 
 def uv_tangents(geometry: SceneGeometry, uvs: CornerVectors) -> CornerVectors:
-    """Unit tangent at every corner, in the direction of increasing u.
+    """Unit tangent at every stored corner, in the direction of increasing u, in its mesh's space.
 
     The mean, weighted by angle, over the adjacent triangles with the same vertex, uv and handedness of their
     uv, so that the grain of a smooth surface is smooth up to its uv seams. Zero where there are no uv, or
@@ -300,14 +309,25 @@ def world_position(render_space: RenderSpace, interaction: SurfaceInteraction) -
     return column_major(render_space.to_world(interaction.position), F)
 
 
-def object_id(geometry: SceneGeometry, hits: Hits) -> NDArray[np.uint32]:
+def object_id(hits: Hits) -> NDArray[np.uint32]:
     """(M,) number of the object, from 1."""
-    return (geometry.objects.take(hits.triangle) + 1).astype(np.uint32)
+    return (hits.objects + 1).astype(np.uint32)
 
 
-def triangle_id(hits: Hits) -> NDArray[np.uint32]:
-    """(M,) number of the triangle, from 1."""
-    return (hits.triangle + 1).astype(np.uint32)
+def triangle_id(geometry: SceneGeometry, hits: Hits) -> NDArray[np.uint32]:
+    """(M,) number of the triangle among those of all objects, from 1.
+
+    Raises
+    ------
+    LimitError
+        There are more triangles than numbers.
+    """
+    if geometry.triangle_count >= 2**32:
+        raise LimitError(
+            f"triangle_id: numbers end at 2^32, the objects have {geometry.triangle_count:.3g} triangles; "
+            "leave the layer out or objects away"
+        )
+    return (geometry.triangle_numbers(hits.objects, hits.triangle) + 1).astype(np.uint32)
 
 
 def rings(

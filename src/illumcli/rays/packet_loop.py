@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import weakref
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,19 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors
-from illumcli.rays.embree_library import (
-    NATIVE_PACKETS,
-    ROBUST,
-    Handle,
-    build_tree,
-    check,
-    embree_library,
-    loaded_library,
-)
+from illumcli.rays.embree_library import embree_library, loaded_library
+from illumcli.rays.embree_tree import EmbreeTree, native_widths
 from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
-from illumcli.rays.ray_loop import NO_LIMIT, RAYS_PER_CALL, Closest, batches
+from illumcli.rays.ray_loop import NO_LIMIT, RAYS_PER_CALL, Closest, InstancedMeshes, batches
 
-INTERFACE = 2
+INTERFACE = 3
 """Version of the interface of `packets.c`; a library with another one is not used."""
 LIBRARY = Path(__file__).with_name("_packets.dll" if os.name == "nt" else "_packets.so")
 
@@ -47,7 +39,7 @@ class _Arguments(ctypes.Structure):
 
 COHERENT = _Arguments(1 << 16, 0xFFFFFFFF)
 """RTC_RAY_QUERY_FLAG_COHERENT, for occlusion alone. Rays from a picture's points to a light take 40 % less
-time with it, rays in all directions up to twice as long."""
+time with it, rays in all directions up to twice as long. With instances the answers change in some rays."""
 
 
 class _Vectors(ctypes.Structure):
@@ -104,7 +96,7 @@ class _PatternResults(ctypes.Structure):
 
 
 class _Hits(ctypes.Structure):
-    _fields_ = tuple((name, ctypes.c_void_p) for name in ("triangle", "u", "v", "distance"))
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("triangle", "instance", "u", "v", "distance"))
 
 
 @cache
@@ -124,24 +116,6 @@ def packet_library() -> ctypes.CDLL | None:
     return library
 
 
-@cache
-def _device() -> Handle:
-    """The device of all trees of this process, which can make about a thousand devices and no more."""
-    library = loaded_library()
-    device: Handle | None = library.rtcNewDevice(None)
-    if not device:
-        check(library.rtcGetDeviceError(None))
-        raise MemoryError
-    return device
-
-
-@cache
-def native_widths() -> tuple[int, ...]:
-    """Rays per packet that Embree has kernels for on this processor, the widest first."""
-    library, device = loaded_library(), _device()
-    return tuple(w for w, known in NATIVE_PACKETS if library.rtcGetDeviceProperty(device, known))
-
-
 def missing() -> str | None:
     """What packets lack here; None if nothing."""
     if packet_library() is None:
@@ -155,27 +129,24 @@ class PacketLoop:
     """Packets of `width` rays, by default the widest that is native; 1 is a loop over single rays."""
 
     def __init__(
-        self, vertices: NDArray[np.float32], triangles: NDArray[np.int32], width: int | None = None
+        self,
+        vertices: NDArray[np.float32],
+        triangles: NDArray[np.int32],
+        width: int | None = None,
+        instanced: InstancedMeshes | None = None,
     ) -> None:
-        library, loop = loaded_library(), packet_library()
+        loop = packet_library()
         assert loop is not None
         self._loop = loop
         self.width = native_widths()[0] if width is None else width
-        device = _device()
-        scene = library.rtcNewScene(device)
-        if not scene:
-            raise MemoryError
-        weakref.finalize(self, library.rtcReleaseScene, scene)
-        library.rtcSetSceneFlags(scene, ROBUST)
-        build_tree(device, scene, vertices, triangles)
-        self._scene: Handle = scene
+        self._tree = EmbreeTree(vertices, triangles, instanced)
 
     def occluded(
         self, origins: Vectors, directions: Vectors, limits: Floats, coherent: bool = False
     ) -> NDArray[np.bool_]:
         out = np.empty(len(directions), np.bool_)
         rays = self._rays("rtcOccluded", origins, directions, limits)
-        if coherent and self.width > 1:
+        if coherent and self.width > 1 and not self._tree.has_instances:
             rays.query.arguments = ctypes.addressof(COHERENT)
         for part in batches(len(directions)):
             rays.first, rays.end = part.start, part.stop
@@ -186,6 +157,8 @@ class PacketLoop:
         hits = Closest.empty(len(directions))
         places = {name: array.ctypes.data for name, array in vars(hits).items()}
         self._intersect(origins, directions, _Hits(**places))
+        if self._tree.first_instance:
+            np.subtract(hits.instance, hits.instance >= 0, out=hits.instance)  # the triangles are geometry 0
         return hits
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:
@@ -235,7 +208,7 @@ class PacketLoop:
             self._loop.illum_patterns(structure, results)
 
     def _query(self, name: str) -> _Query:
-        return _Query(_address(f"{name}{self.width}"), self._scene, None, self.width)
+        return _Query(_address(f"{name}{self.width}"), self._tree.scene, None, self.width)
 
     def _rays(self, query: str, origins: Vectors, directions: Vectors, limits: Floats) -> _Rays:
         """The rays as the C loop takes them; the arrays must outlive it."""

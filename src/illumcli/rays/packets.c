@@ -17,7 +17,7 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
-enum { INTERFACE = 2 }; /* of packet_loop.py: both change together */
+enum { INTERFACE = 3 }; /* of packet_loop.py: both change together */
 enum { WIDEST = 16, ALIGNMENT = 64 };
 
 /* Rows of a packet, each of as many cells as the packet has rays; the hit begins with its normal. */
@@ -60,6 +60,7 @@ typedef struct {
 
 typedef struct {
   int32_t *triangle; /* -1 if nothing is hit; NULL: only distances are wanted */
+  int32_t *instance; /* number of the geometry that is an instance; -1 if that is none */
   float *u, *v, *distance;
 } Hits;
 
@@ -170,6 +171,7 @@ INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
       if (!out->triangle)
         continue;
       out->triangle[ray + j] = packet[PRIMITIVE * width + j].number;
+      out->instance[ray + j] = packet[INSTANCE * width + j].number;
       out->u[ray + j] = packet[U * width + j].real;
       out->v[ray + j] = packet[V * width + j].real;
     }

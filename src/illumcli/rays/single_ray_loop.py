@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, repeat_rows
+from illumcli.arrays import F, Floats, Vectors
 from illumcli.errors import IllumError
 from illumcli.rays.embree_upload import upload
 from illumcli.rays.pattern_rays import PatternRays, PatternResults
-from illumcli.rays.ray_loop import Closest, batches
-
-PATTERN_RAYS_PER_CALL = 1 << 17
-"""Rays whose directions are formed at once: a tenth faster than 2^14, with two threads a fifth, although the
-arrays of 2^14 rays would fit into the processor's cache. In long batches Embree's own data stay there."""
+from illumcli.rays.ray_loop import Closest, batches, per_ray, trace_as_arrays
 
 
 class SingleRayLoop:
@@ -49,7 +45,7 @@ class SingleRayLoop:
     def occluded(
         self, origins: Vectors, directions: Vectors, limits: Floats, coherent: bool = False
     ) -> NDArray[np.bool_]:
-        origins = _per_ray(origins, directions)
+        origins = per_ray(origins, directions)
         out = np.empty(len(directions), np.bool_)
         for part in batches(len(directions)):
             # embreex writes to the array of lengths that it is given, so it never gets the caller's
@@ -59,8 +55,9 @@ class SingleRayLoop:
         return out
 
     def closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        origins = _per_ray(origins, directions)
+        origins = per_ray(origins, directions)
         hits = Closest.empty(len(directions))
+        hits.instance.fill(-1)
         for part in batches(len(directions)):
             result = self._scene.run(origins[part], directions[part], query="INTERSECT", output=1)
             hits.triangle[part] = result["primID"]
@@ -70,28 +67,14 @@ class SingleRayLoop:
         return hits
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:
-        origins = _per_ray(origins, directions)
+        origins = per_ray(origins, directions)
         out = np.empty(len(directions), F)
         for part in batches(len(directions)):
             out[part] = self._scene.run(origins[part], directions[part], query="DISTANCE")
         return out
 
     def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
-        points, samples = rays.shape
-        per_call = max(1, PATTERN_RAYS_PER_CALL // max(samples, 1))
-        for first in range(0, points, per_call):
-            part = slice(first, min(first + per_call, points))
-            batch = rays.between(part.start, part.stop)
-            starts, d = batch.starts(), batch.directions()
-            if out.directions is not None:
-                out.directions[:, part] = d.T.reshape(3, -1, samples)
-            if out.distance is not None:
-                out.distance[part] = self.distance(starts, d).reshape(-1, samples)
-                continue
-            is_open = ~self.occluded(starts, d, np.asarray(limit, F)).reshape(-1, samples)
-            out.open[part] = is_open.astype(F) @ np.ones(samples, F)  # exact below 2^24
-            if out.is_open is not None:
-                out.is_open[part] = is_open
+        trace_as_arrays(self, rays, limit, out)
 
 
 def _new_scene() -> Any:
@@ -117,9 +100,3 @@ class _Errors(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         self.texts.append(record.getMessage())
-
-
-def _per_ray(origins: Vectors, directions: Vectors) -> Vectors:
-    """An origin for each direction."""
-    each = len(directions) // max(len(origins), 1)
-    return origins if each <= 1 else repeat_rows(origins, each)

@@ -93,7 +93,9 @@ class Graph(Value):
         return replace(self, loaders={})
 
 
-def build(scene: Scene, loaded: SceneFile, files: FileFingerprints | None = None) -> Graph:
+def build(
+    scene: Scene, loaded: SceneFile, files: FileFingerprints | None = None, shares_meshes: bool = True
+) -> Graph:
     """The graph of a scene. Reads no mesh, runs nothing.
 
     A node binds only those parts of the scene that its buffer depends on: they are its key in the cache
@@ -103,10 +105,12 @@ def build(scene: Scene, loaded: SceneFile, files: FileFingerprints | None = None
     ----------
     files : FileFingerprints, optional
         Those that variants of the scene share.
+    shares_meshes : bool
+        False for a geometry with the elements of every object, as a bake needs it.
     """
     files = files or FileFingerprints()
     nodes = [
-        *geometry_nodes(scene, loaded, files),
+        *geometry_nodes(scene, loaded, files, shares_meshes),
         *_surface_nodes(scene),
         *_obscurance_nodes(scene, loaded, files),
         *_data_nodes(),
@@ -180,7 +184,7 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) 
     some_baked = any(file for _, file in values)
     settings = scene.obscurance or Obscurance()
     settings = settings.model_copy(update={"reconstruct": None})  # no ray depends on it
-    by_face = {"triangle_normals": "triangle_normals"} if settings.faces != "count" else {}
+    by_face = {name: name for name in ("triangle_normals", "geometry")} if settings.faces != "count" else {}
     axes = {"obscurance_normals": "obscurance_normals"} if _about_shading(scene) else {}
     partly_baked = {"baked_obscurance": "baked_obscurance"} if some_baked else {}
     if needs.all_baked(scene) or (scene.obscurance is None and some_baked):

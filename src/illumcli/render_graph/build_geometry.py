@@ -17,6 +17,7 @@ from illumcli.geometry.shapes._base import Shape
 from illumcli.graph import Node
 from illumcli.mesh_files import companions
 from illumcli.rays.embree import tracer
+from illumcli.rays.embree_library import embree_library
 from illumcli.render_graph import needs, stages
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
@@ -24,8 +25,14 @@ from illumcli.scene.spec import MeshFile, Normals, Object, Scene
 from illumcli.shading.rates import RATES
 
 
-def geometry_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> list[Node]:
-    """Nodes of meshes, and of everything computed from all of them."""
+def geometry_nodes(
+    scene: Scene, loaded: SceneFile, files: FileFingerprints, shares_meshes: bool
+) -> list[Node]:
+    """Nodes of meshes, and of everything computed from all of them.
+
+    Objects with equal meshes share one if `shares_meshes`, and if Embree's library is there: embreex alone
+    knows no instances.
+    """
     transforms = tuple(thing.transform for thing in scene.objects)
     rates = needs.rates(scene)
     flat = tuple(not RATES[rate].is_smooth or scene.terminator == "none" for rate in rates)
@@ -34,7 +41,7 @@ def geometry_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> 
         Node.of(partial(bounds_of, transforms), "object_bounds"),
         Node.of(partial(implied_widths, flat), "implied_widths"),
         Node.of(stages.render_space),
-        *_normal_nodes(scene),
+        *_normal_nodes(scene, shares_meshes),
         Node.of(tracer),
         *_repair_nodes(scene),
     ]
@@ -54,15 +61,23 @@ def _mesh_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> lis
     return [*meshes, Node("meshes", partial(stages.meshes, which), parts)]
 
 
-def _normal_nodes(scene: Scene) -> list[Node]:
+def _normal_nodes(scene: Scene, shares_meshes: bool) -> list[Node]:
     """Nodes of all triangles and their normals."""
     says = [source.normals if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     by_file = tuple(each is None or each.source == "file" for each in says)
     smooth = [RATES[rate].is_smooth for rate in needs.rates(scene)]
     how = tuple(each if curved else "flat" for curved, each in zip(smooth, says, strict=True))
     methods = tuple("newell" if each is None else each.polygon for each in says)
+    # Objects that have one mesh, with normals computed in one way, may share it at any shading rate.
+    names = [needs.mesh_name(scene, thing.mesh) for thing in scene.objects]
+    number: dict[tuple[str, str], int] = {}
+    kinds = tuple(
+        number.setdefault((name, repr(each)), len(number)) for name, each in zip(names, says, strict=True)
+    )
+    if len(number) == len(kinds) or not shares_meshes or embree_library() is None:
+        kinds = tuple(range(len(kinds)))
     return [
-        Node.of(partial(scene_geometry, by_file), "geometry"),
+        Node.of(partial(scene_geometry, by_file, kinds), "geometry"),
         Node.of(partial(corner_normals, how), "corner_normals"),
         Node.of(partial(polygon_normals, methods), "polygon_normals"),
     ]

@@ -47,20 +47,19 @@ def tangents(
     if uv_tangents is None or point_weights is None:
         direction = np.zeros_like(points.n)
     else:
-        direction = point_weights.interpolate(geometry, uv_tangents)
+        direction = geometry.unit_directions(points.objects, point_weights.interpolate(geometry, uv_tangents))
 
     # Replace it on the objects that have a grain of their own.
-    number = geometry.objects.take(points.triangle)
-    for i, (grain, placed) in enumerate(zip(grains, geometry.placed, strict=True)):
-        if grain is None or not (index := np.flatnonzero(number == i)).size:
+    for i in np.flatnonzero(np.bincount(points.objects)).tolist():
+        grain, matrix = grains[i], geometry.matrices[i]
+        if grain is None:
             continue
-        linear = placed.matrix[:3, :3] / np.abs(placed.matrix[:3, :3]).max()
+        index = np.flatnonzero(points.objects == i)
+        linear = matrix[:3, :3] / np.abs(matrix[:3, :3]).max()
         if isinstance(grain, tuple):
             along = linear @ (np.asarray(grain) / np.abs(grain).max())
             direction[index] = along / (np.linalg.norm(along) or 1.0)
         else:
-            centre = geometry.render_space.from_world(
-                placed.matrix[:3, :3] @ grain.centre + placed.matrix[:3, 3]
-            )
+            centre = geometry.render_space.from_world(matrix[:3, :3] @ grain.centre + matrix[:3, 3])
             direction[index] = rings(linear, grain.axis, centre, take_rows(points.position, index))
     return tangent(points.n, unit(direction))

@@ -30,27 +30,30 @@ DEFAULT: Token = ("default",)
 
 
 class Numbering(Record):
-    """The material number of every object or, if a mesh has several materials, of every triangle."""
+    """The material number of every object or, if its mesh has several materials, of its triangles."""
 
     tokens: tuple[Token, ...]  # by number
-    of_object: NDArray[np.int32]  # (O,) material number
-    of_triangle: NDArray[np.int32] | None = None  # (T,) material number; None if no object has several
+    of_object: NDArray[np.int32]  # (O,) material number, -1 for objects that have several
+    of_triangle: NDArray[np.int32]  # (K,) material numbers of the triangles of such objects
+    first: NDArray[np.int64]  # (O,) row of the object's stored triangle t is `first` + t
 
-    def number(self, geometry: SceneGeometry, triangle: Ids) -> Ids:
-        """(N,) material number of each triangle."""
-        if self.of_triangle is not None:
-            return self.of_triangle.take(triangle)
-        return self.of_object.take(geometry.objects.take(triangle))
+    def number(self, objects: Ids, triangle: Ids) -> Ids:
+        """(N,) material number of each triangle of an object."""
+        out = self.of_object.take(objects)
+        if len(self.of_triangle) and (several := np.flatnonzero(out < 0)).size:
+            row = self.first.take(objects.take(several)) + triangle.take(several)
+            out[several] = self.of_triangle.take(row)
+        return out
 
 
-def material(geometry: SceneGeometry, numbering: Numbering, points: OnTriangles) -> Ids:
+def material(numbering: Numbering, points: OnTriangles) -> Ids:
     """(E,) material number at every point."""
-    return numbering.number(geometry, points.triangle)
+    return numbering.number(points.objects, points.triangle)
 
 
-def material_id(geometry: SceneGeometry, numbering: Numbering, hits: OnTriangles) -> NDArray[np.uint32]:
+def material_id(numbering: Numbering, hits: OnTriangles) -> NDArray[np.uint32]:
     """(M,) number of the material of every hit, from 1."""
-    return (numbering.number(geometry, hits.triangle) + 1).astype(np.uint32)
+    return (numbering.number(hits.objects, hits.triangle) + 1).astype(np.uint32)
 
 
 class Choice(Value):
@@ -92,25 +95,30 @@ def numbering(choices: Sequence[Choice], named: Collection[str], geometry: Scene
     """
     # Number the materials of each object; where a mesh selects several, those of its triangles.
     tokens: dict[Token, int] = {}
-    of_object = np.zeros(len(choices), np.int32)
-    of_triangle = np.zeros(len(geometry.triangles), np.int32)
-    several = False
-    firsts = [placed.first_triangle for placed in geometry.placed]
-    ranges = map(slice, firsts, [*firsts[1:], len(geometry.triangles)])
-    for i, (placed, choice, of_this_object) in enumerate(zip(geometry.placed, choices, ranges, strict=True)):
+    of_object, first = np.full(len(choices), -1, np.int32), np.zeros(len(choices), np.int64)
+    tables: list[NDArray[np.int32]] = []
+    rows: dict[tuple[int, tuple[int, ...]], int] = {}  # objects that share a mesh may share a table
+    count = 0
+    starts = [*(placed.first_triangle for placed in geometry.placed), len(geometry.triangles)]
+    for i, (which, choice) in enumerate(zip(geometry.placed_mesh.tolist(), choices, strict=True)):
+        placed = geometry.placed[which]
         mesh = placed.mesh
         names = (None, *mesh.material_names) if choice.own is None else (None,)
-        numbers = [tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names]
+        numbers = tuple(tokens.setdefault(choice.token(mesh, name, named), len(tokens)) for name in names)
         if len(names) == 1:
-            of_object[i] = of_triangle[of_this_object] = numbers[0]
+            of_object[i] = numbers[0]
             continue
-        several = True
-        selected = (
-            mesh.polygon_materials if mesh.polygon_materials is not None else np.full(mesh.polygon_count, -1)
-        )
-        polygon = geometry.polygons[of_this_object] - placed.first_polygon
-        of_triangle[of_this_object] = np.asarray(numbers, np.int32).take(selected.take(polygon) + 1)
-    return Numbering(tuple(tokens), of_object, of_triangle if several else None)
+        if (which, numbers) not in rows:
+            rows[which, numbers] = count
+            selected = mesh.polygon_materials
+            if selected is None:
+                selected = np.full(mesh.polygon_count, -1, np.int32)
+            polygon = geometry.polygons[starts[which] : starts[which + 1]] - placed.first_polygon
+            tables.append(np.asarray(numbers, np.int32).take(selected.take(polygon) + 1))
+            count += len(polygon)
+        first[i] = rows[which, numbers] - placed.first_triangle
+    of_triangle = np.concatenate([np.zeros(0, np.int32), *tables])
+    return Numbering(tuple(tokens), of_object, of_triangle, first)
 
 
 class Materials(Record):
@@ -131,10 +139,6 @@ class Materials(Record):
         whose textures must be usable."""
         own = self.substitutes[number] if self.substitutes else None
         return None if own is None else own.get(path, Substitute((1.0, 1.0, 1.0)))
-
-    def number(self, geometry: SceneGeometry, triangle: Ids) -> Ids:
-        """(N,) material number of each triangle."""
-        return self.numbering.number(geometry, triangle)
 
 
 def materials(

@@ -86,7 +86,8 @@ ToSamples: TypeAlias = Identity | Gather | Barycentric | Mixed
 class ShadingPoints(Record):
     """Where models are evaluated: E points on triangles, and how the M samples get their values."""
 
-    triangle: Ids  # (E,)
+    objects: Ids  # (E,) object of each
+    triangle: Ids  # (E,) stored triangle
     u: Floats  # (E,)
     v: Floats  # (E,)
     position: Vectors  # (E, 3) float32, in radii
@@ -146,7 +147,7 @@ def points(
     to_samples = Mixed(tuple(groups), tuple(map(len, parts)), tuple(part.to_samples for part in parts))
     joined = {
         name: column_major(np.concatenate([getattr(part, name) for part in parts]))
-        for name in ("triangle", "u", "v", "position", "n")
+        for name in ("objects", "triangle", "u", "v", "position", "n")
     }
     weights = [
         context.weights.take(group) if part.weights is None else part.weights
@@ -181,7 +182,7 @@ def normals_of_points(points: ShadingPoints) -> Vectors:
 def _rate_of_samples(rates: Sequence[Rate], context: ShadingContext) -> NDArray[np.int8]:
     """(M,) row in `RATES` of the rate of each sample's object."""
     number = np.array([list(RATES).index(name) for name in rates], np.int8)
-    return number.take(context.geometry.objects.take(context.weights.hits.triangle))
+    return number.take(context.weights.hits.objects)
 
 
 def _sample_normals(context: ShadingContext, of_sample: NDArray[np.int8]) -> Vectors:
@@ -203,7 +204,7 @@ def _samples(context: ShadingContext, n: Vectors) -> ShadingPoints:
     """The samples as shading points, with normals `n`."""
     hits = context.weights.hits
     position = column_major(context.interaction.position, F)
-    return ShadingPoints(hits.triangle, hits.u, hits.v, position, n, Identity())
+    return ShadingPoints(hits.objects, hits.triangle, hits.u, hits.v, position, n, Identity())
 
 
 def _constant(
@@ -212,18 +213,22 @@ def _constant(
     """One point per visible polygon and side: its centre, its normal, and the mean of its corners' values."""
     assert centres is not None
     assert polygon_normals is not None
-    geometry, back_facing = context.geometry, context.interaction.back_facing
-    visible = geometry.polygons.take(context.weights.hits.triangle)
-    key, first, point = np.unique(visible * 2 + back_facing, return_index=True, return_inverse=True)
-    polygon = key // 2
-    n = facing(take_rows(polygon_normals, polygon), back_facing.take(first))
+    geometry, back_facing, hits = context.geometry, context.interaction.back_facing, context.weights.hits
+    visible = geometry.polygons.take(hits.triangle)
+    _, first, point = np.unique(
+        _keys(hits.objects, visible, back_facing), return_index=True, return_inverse=True
+    )
+    objects, polygon = hits.objects.take(first), visible.take(first)
+    n = geometry.unit_normals(objects, take_rows(polygon_normals, polygon))
+    n = facing(n, back_facing.take(first))
 
     # A point belongs to its polygon's first triangle, but interpolates over all corners of the polygon.
-    third = np.full(len(key), 1 / 3, F)
+    third = np.full(len(first), 1 / 3, F)
     triangle = np.searchsorted(geometry.polygons, polygon).astype(np.int32)
-    first_triangle = TriangleCorners(None, triangle, third, third)
-    mean = CornerWeights(first_triangle, (MeanCorners(None, centres, polygon),))
-    return ShadingPoints(triangle, third, third, take_rows(centres.position, polygon), n, Gather(point), mean)
+    first_triangle = TriangleCorners(None, objects, triangle, third, third)
+    mean = CornerWeights(first_triangle, (MeanCorners(None, objects, centres, polygon),))
+    position = geometry.positions(objects, take_rows(centres.position, polygon))
+    return ShadingPoints(objects, triangle, third, third, position, n, Gather(point), mean)
 
 
 def _gouraud(
@@ -232,7 +237,7 @@ def _gouraud(
     """One point per corner of a visible polygon and side; a vertex's corners may differ in normal and uv."""
     geometry, weights, normals = context.geometry, context.weights, context.normals
     assert normals is not None
-    corners: list[tuple[NDArray[Any], ...]] = []  # triangle, u, v, position, n
+    corners: list[tuple[NDArray[Any], ...]] = []  # objects, triangle, u, v, position, n
     first_point: dict[Corners, NDArray[np.int64]] = {}
     step: dict[Corners, int] = {}
     count = 0
@@ -240,25 +245,36 @@ def _gouraud(
         # The group's visible polygons, each side once.
         back_facing = context.interaction.back_facing
         back_facing = back_facing if group.index is None else back_facing.take(group.index)
-        side = group.shape * np.int64(2) + back_facing
+        side = _keys(group.objects, group.shape, back_facing)
         _, first, number = np.unique(side, return_index=True, return_inverse=True)
         first_point[group], step[group] = number.ravel() + count, len(first)
+        objects = group.objects.take(first)
 
         # A point at each of their corners: corner 0 of all polygons, then corner 1, and so on.
         for k in range(group.count):
             corner, vertex = (
                 take_rows(number(geometry, k), first) for number in (group.corner, group.vertex)
             )
-            n = facing(take_rows(normals.values, normals.index.take(corner)), take_rows(back_facing, first))
+            n = geometry.unit_normals(objects, take_rows(normals.values, normals.index.take(corner)))
+            n = facing(n, take_rows(back_facing, first))
             at = (take_rows(part, first) for part in group.corner_on_triangle(k))
-            corners.append((*at, take_rows(geometry.vertices, vertex), n))
+            position = geometry.positions(objects, take_rows(geometry.vertices, vertex))
+            corners.append((objects, *at, position, n))
             count += len(first)
-    triangle, u, v, position, n = (
-        column_major(np.concatenate([each[part] for each in corners])) for part in range(5)
+    objects, triangle, u, v, position, n = (
+        column_major(np.concatenate([each[part] for each in corners])) for part in range(6)
     )
-    at_corners = TriangleCorners(None, triangle, u, v)
-    to_samples = Barycentric(weights, first_point, step)
-    return ShadingPoints(triangle, u, v, position, n, to_samples, CornerWeights(at_corners, (at_corners,)))
+    at_corners = TriangleCorners(None, objects, triangle, u, v)
+    own_weights = CornerWeights(at_corners, (at_corners,))
+    return ShadingPoints(
+        objects, triangle, u, v, position, n, Barycentric(weights, first_point, step), own_weights
+    )
+
+
+def _keys(objects: Ids, element: NDArray[Any], back_facing: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(N,) a number for each side of a polygon or triangle of an object, equal for equal ones."""
+    of_object = np.int64(int(element.max(initial=0)) + 1)
+    return np.asarray((objects * of_object + element) * 2 + back_facing)
 
 
 def _flat(context: ShadingContext) -> Vectors:

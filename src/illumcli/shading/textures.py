@@ -126,7 +126,7 @@ class Map(Record):
     wrap: str
     within: Range
     factor: Floats | None = None  # (C,)
-    vertex: Floats | None = None  # (V, C) values at the scene's vertices that multiply the texels, too
+    vertex: Floats | None = None  # (V, C) values at all stored vertices that multiply the texels, too
     uv: Floats | None = None  # (V, 2) texture coordinates that replace those of the meshes
 
 
@@ -227,12 +227,17 @@ def _uniform(value: Sequence[float], within: Range) -> Map:
 
 
 def _objects_of(geometry: SceneGeometry, materials: Materials) -> list[list[int]]:
-    """By material number, the numbers of the objects that have it."""
-    material = materials.number(geometry, np.arange(len(geometry.triangles), dtype=np.int32))
-    pairs = np.unique(material.astype(np.int64) * len(geometry.placed) + geometry.objects)
+    """By material number, the numbers of the objects with polygons that have it."""
+    numbering = materials.numbering
+    starts = [*(placed.first_triangle for placed in geometry.placed), len(geometry.triangles)]
     objects: list[list[int]] = [[] for _ in materials.models]
-    for number, i in zip(*divmod(pairs, max(len(geometry.placed), 1)), strict=True):
-        objects[number].append(int(i))
+    for i, which in enumerate(geometry.placed_mesh.tolist()):
+        if starts[which] == starts[which + 1]:
+            continue
+        number = int(numbering.of_object[i])
+        own = slice(*(numbering.first[i] + starts[which : which + 2]))
+        for each in [number] if number >= 0 else np.unique(numbering.of_triangle[own]).tolist():
+            objects[each].append(i)
     return objects
 
 
@@ -241,7 +246,7 @@ def _lacks(
 ) -> str | None:
     """The error message if object number `i` lacks the uv or vertex attribute that `value` needs."""
     # A texture needs uv.
-    mesh = geometry.placed[i].mesh
+    mesh = geometry.placed[geometry.placed_mesh[i]].mesh
     if isinstance(value, Texture) and value.uv is None and (mesh.uvs is None or mesh.corner_uvs is None):
         return (
             f"object {name}: {where} is a texture and the mesh has no uv; export it with uv, or give a value"
@@ -268,10 +273,10 @@ def _lacks(
 
 
 def _table(geometry: SceneGeometry, attribute: str, objects: Sequence[int], width: int) -> Floats:
-    """(V, C) an attribute of these objects at the scene's vertices; 0 at the vertices of others."""
+    """(V, C) an attribute of these objects at all stored vertices; 0 at the vertices of others."""
     out = np.zeros((len(geometry.vertices), width), F)
-    for i in objects:
-        placed = geometry.placed[i]
+    for i in {int(geometry.placed_mesh[i]): i for i in objects}.values():
+        placed = geometry.placed[geometry.placed_mesh[i]]
         values = placed.mesh.attributes[attribute].reshape(len(placed.mesh.vertices), -1)
         out[placed.first_vertex : placed.first_vertex + len(values)] = values[:, :width]
     return out
@@ -399,7 +404,8 @@ def texel_positions(
         if not at.size:
             continue
         largest = max(maps, key=lambda each: each.image.height * each.image.width)
-        corners = TriangleCorners(None, hits.triangle.take(at), hits.u.take(at), hits.v.take(at))
+        all_hits = TriangleCorners(None, hits.objects, hits.triangle, hits.u, hits.v)
+        corners = all_hits.at(at, None)
         if largest.uv is None:
             place = uv_at(geometry, uvs, CornerWeights(corners, (corners,)))
         else:

@@ -117,7 +117,7 @@ def surface_points(
         take_rows(geometry.vertices, geometry.triangles[triangle, k]).astype(np.float64) for k in range(3)
     ]
     outward = unit(column_major(cross(corners[1] - corners[0], corners[2] - corners[0])))
-    interaction = interact(geometry, triangle, u, v, outward)
+    interaction = interact(geometry, np.zeros_like(triangle), triangle, u, v, outward)
     return interaction.position, interaction
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, repeat_rows, take_rows
+from illumcli.geometry.instances import Instances
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.embree import Tracer
 from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.records import Record
@@ -38,6 +40,7 @@ class Method(Record):
     sampler: str = "spiral"
     faces: Faces = "count"
     triangle_normals: Vectors | None = None  # (T, 3) float32; None if every face counts
+    instances: Instances | None = None
 
     @property
     def any_hit(self) -> bool:
@@ -59,9 +62,12 @@ class ObscuranceSettings(Protocol):
 
 
 def obscurance_method(
-    settings: ObscuranceSettings, render_space: RenderSpace, triangle_normals: Vectors | None = None
+    settings: ObscuranceSettings,
+    render_space: RenderSpace,
+    triangle_normals: Vectors | None = None,
+    geometry: SceneGeometry | None = None,
 ) -> Method:
-    """How a render estimates w; `triangle_normals`, (T, 3), are given unless every face counts."""
+    """How a render estimates w; the last two inputs are given unless every face counts."""
     return Method(
         settings.samples,
         settings.falloff,
@@ -69,6 +75,7 @@ def obscurance_method(
         settings.sampler,
         settings.faces,
         triangle_normals,
+        None if geometry is None else geometry.instances,
     )
 
 
@@ -214,6 +221,8 @@ def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) 
         closest = tracer.closest(start, d[ray])
         hit = closest.triangle >= 0
         normal = take_rows(method.triangle_normals, np.maximum(closest.triangle, 0))
+        if method.instances is not None:
+            normal = method.instances.normals(closest.instance, normal)
         is_back = hit & (dot(normal, d[ray]) > 0)
         is_front = hit & ~is_back
         distance[ray[is_front]] = travelled[is_front] + closest.distance[is_front]

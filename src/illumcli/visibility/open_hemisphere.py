@@ -13,7 +13,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, column_major, dot, take_rows
+from illumcli.arrays import F, Ids, Vectors, column_major, dot
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.spatial_order import compact
 from illumcli.rays.interaction import Hits, SurfaceInteraction, facing, interact
@@ -267,7 +267,7 @@ class OpenTriangles:
         """Origins and unit normals of the planes of these groups, (64 K, 3) each."""
         side, triangle = np.divmod(_members(groups), self._groups * GROUP)
         triangle = np.minimum(triangle, len(self._geometry.triangles) - 1).astype(np.int32)
-        return triangle_planes(self._geometry, triangle, side > 0)
+        return triangle_planes(self._geometry, self._geometry.objects.take(triangle), triangle, side > 0)
 
 
 MAX_TREE_VERTICES = 1 << 17
@@ -277,8 +277,11 @@ RAYS_PER_TEST = 1 << 11
 
 
 def open_triangles(geometry: SceneGeometry) -> OpenTriangles | None:
-    """The search for triangles with nothing above them; None if the scene is too large for it to pay off."""
-    return OpenTriangles(geometry) if len(geometry.vertices) <= MAX_TREE_VERTICES else None
+    """The search for triangles with nothing above them; None if the scene is too large for it to pay off, or
+    has instances, whose vertices Embree places less exactly than this test."""
+    if geometry.instances is not None or len(geometry.vertices) > MAX_TREE_VERTICES:
+        return None
+    return OpenTriangles(geometry)
 
 
 def known_open(
@@ -291,17 +294,17 @@ def known_open(
 
 
 def triangle_planes(
-    geometry: SceneGeometry, triangle: Ids, back_facing: NDArray[np.bool_]
+    geometry: SceneGeometry, objects: Ids, triangle: Ids, back_facing: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Origins and unit normals of the planes of N triangles, (N, 3) float64 each; `back_facing` is the side.
 
     A plane's offset from its triangle is at most that of any ray origin on the triangle.
     """
     zero = np.zeros(len(triangle), F)
-    interaction = interact(geometry, triangle, zero, zero, np.zeros((len(triangle), 3), F))
+    interaction = interact(geometry, objects, triangle, zero, zero, np.zeros((len(triangle), 3), F))
     n = facing(interaction.ng, back_facing).astype(np.float64)
     v0 = interaction.position
-    others = (take_rows(geometry.vertices, geometry.triangles[:, k].take(triangle)) for k in (1, 2))
+    others = (geometry.corner_positions(objects, triangle, k) for k in (1, 2))
     lowest = np.minimum.reduce([np.zeros(len(n)), *(dot(n, other - v0) for other in others)])
 
     # |ng|.|p| of `offset_ray_origins` is at least the distance of the plane from the centre, so no ray starts

@@ -92,7 +92,8 @@ def _lit_on_implied_surface(
         smooth, weights, column_major(position, F), interaction.back_facing.take(sample)
     )
     offset = bounded(offset, TERMINATOR_SHARE * width)
-    flat = smooth.flat.take(geometry.objects.take(weights.hits.triangle))
+    objects = weights.hits.objects
+    flat = smooth.flat.take(objects)
     curved = np.flatnonzero((length(offset) > 0) & ~flat)
 
     # Keep the samples whose shadow ray from there is unoccluded, as is the segment to the ray's origin.
@@ -110,9 +111,14 @@ def _lit_on_implied_surface(
     )
     hit = tracer.closest(on_polygon, _above(_at(l, curved), ng))
     near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
-    is_same = smooth.parts.are_joined(_at(weights.hits.triangle, curved), np.maximum(hit.triangle, 0))
+    is_surface = (hit.triangle >= 0) & (
+        geometry.objects_of(hit.triangle, hit.instance) == objects.take(curved)
+    )
+    same = np.flatnonzero(is_surface)
+    own = weights.hits.triangle.take(curved).take(same)
+    is_surface[same] = smooth.parts.are_joined(own, hit.triangle.take(same))
     reached = np.zeros(len(sample), np.bool_)
-    reached[curved[(hit.distance >= near) | is_same]] = True
+    reached[curved[(hit.distance >= near) | is_surface]] = True
     return reached
 
 
@@ -123,8 +129,7 @@ def _terminator_offset(
     geometry, normals = smooth.context.geometry, smooth.normals
 
     def corner_offset(group: Corners, k: int) -> Vectors:
-        normal = take_rows(normals.values, normals.index.take(group.corner(geometry, k)))
-        corner = take_rows(geometry.vertices, group.vertex(geometry, k))
+        normal, corner = group.normal(geometry, normals, k), group.position(geometry, k)
         if group.index is None:
             return to_tangent_plane(position, corner, facing(normal, back_facing))
         return to_tangent_plane(
@@ -138,7 +143,7 @@ def _box_diagonals(geometry: SceneGeometry, weights: CornerWeights) -> Floats:
     """(B,) diagonal of the bounding box of each sample's polygon [radii]."""
     out = np.empty(len(weights), F)
     for group in weights.groups:
-        corners = [take_rows(geometry.vertices, group.vertex(geometry, k)) for k in range(group.count)]
+        corners = [group.position(geometry, k) for k in range(group.count)]
         size = length(np.maximum.reduce(corners) - np.minimum.reduce(corners))
         out[slice(None) if group.index is None else group.index] = size
     return out

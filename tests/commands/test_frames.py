@@ -46,7 +46,7 @@ def test_a_render_has_all_frames_and_those_that_are_asked_for(illum, film):
 
 @pytest.mark.parametrize("packets", ["1", "0"])
 def test_frames_are_bit_for_bit_the_scene_with_their_values(illum, film, packets):
-    done = illum("render", "film.yaml", "--frames", "1:2", "-o", "film{frame}.exr", ILLUM_PACKETS=packets)
+    done = illum("render", "film.yaml", "--frames", "1:2", "-o", "film{frame:d}.exr", ILLUM_PACKETS=packets)
     assert done.returncode == 0, done.stderr
     (film / "still.yaml").write_text(SCENE.replace("frames: {last: 3, fps: 2}\n", ""))
     values = [
@@ -117,9 +117,9 @@ def test_formulas_of_overrides(illum, film):
         in told.stderr
     )
     words = ("-D", "ambient=time*6", "-D", "materials.clay.diffuse=[0.1*frame, 0.2, 0.3]", "--frames", "1:2")
-    done = illum("render", "still.yaml", *words, "-o", "{frame}-{ambient}.png")
+    done = illum("render", "still.yaml", *words, "-o", "{frame:d}-{ambient}.png")
     assert written(done) == ["1-0.25.png", "2-0.5.png"], done.stderr
-    swept = illum("sweep", "still.yaml", *words, "-o", "s{frame}.png")
+    swept = illum("sweep", "still.yaml", *words, "-o", "s{frame:d}.png")
     assert written(swept) == ["s1.png", "s2.png"], swept.stderr
     assert (film / "s2.png").read_bytes() == (film / "2-0.5.png").read_bytes()
 

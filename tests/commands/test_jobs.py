@@ -45,9 +45,9 @@ def units(tmp_path):
 
     names = "{camera}-{frame}.exr", "{camera}-{ambient}.png"
     return [
-        (job(names[0], fields={"frame": 7}), ["left-7.exr", "right-7.exr"]),
-        (job(names[0], cameras=("left",)), ["left-0.exr"]),
-        (job(names[0], cameras=("right",)), ["right-0.exr"]),
+        (job(names[0], fields={"frame": 7}), ["left-0007.exr", "right-0007.exr"]),
+        (job(names[0], cameras=("left",)), ["left-0000.exr"]),
+        (job(names[0], cameras=("right",)), ["right-0000.exr"]),
         (job(names[1], "ambient=0.4"), ["left-0.4.png", "right-0.4.png"]),
         (job(names[1], "ambient=0.5"), ["left-0.5.png", "right-0.5.png"]),
         (BakeJob(mesh, (tmp_path / "b.npz",), BakeSettings(samples=16)), ["b.npz"]),

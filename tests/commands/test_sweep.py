@@ -150,13 +150,13 @@ def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
                  "--report", "r.json")  # fmt: skip
     assert done.returncode == 0, done.stderr
     names = done.stdout.split()
-    assert names[:2] == ["ball-4-0.1.png", "ball-4-0.6.png"]
+    assert names[:2] == ["ball-004-0.1.png", "ball-004-0.6.png"]
     assert len(names) == 6
     for exponent, ambient in ((4, 0.6), (256, 0.1)):
         single = illum("render", scene, "--no-cache", "-D", f"materials.clay.exponent={exponent}",
                        "-D", f"ambient={ambient}", "-o", "one.png", "--force")  # fmt: skip
         assert single.returncode == 0, single.stderr
-        swept = tmp_path / f"ball-{exponent}-{ambient}.png"
+        swept = tmp_path / f"ball-{exponent:03d}-{ambient}.png"
         assert swept.read_bytes() == (tmp_path / "one.png").read_bytes()
     with (tmp_path / "t.csv").open() as file:
         rows = list(csv.DictReader(file))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from illumcli.errors import InputError
-from illumcli.files.names import check_unique, expand
+from illumcli.files.names import check_unique, expand, frame_field, number_form, with_forms
 
 VALUES = {"scene": "teapot", "camera": "front", "layer": "beauty", "frame": 7, "materials.clay.sigma": 0.3}
 
@@ -29,6 +29,40 @@ VALUES = {"scene": "teapot", "camera": "front", "layer": "beauty", "frame": 7, "
 )
 def test_fields_become_values(pattern, name):
     assert expand(pattern, VALUES) == name
+
+
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ([8, 32, 128], ["008", "032", "128"]),
+        ([7], ["7"]),
+        ([0.1, 0.133333333333, 0.2], ["0.1000", "0.1333", "0.2000"]),
+        ([1.5, 10], ["01.5", "10.0"]),
+        ([0, 1 / 3, 12], ["00.0000", "00.3333", "12.0000"]),
+        ([133.3333333, 0.5], ["133.3", "000.5"]),
+        ([-0.5, 0, 0.25], ["-0.50", "00.00", "00.25"]),
+        ([1 / 3, 1 / 3 + 1e-9], ["0.333333333", "0.333333334"]),
+        ([1e-12, 1e12], ["1e-12", "1000000000000.0"]),
+    ],
+)
+def test_numbers_in_names_have_one_width(values, names):
+    form = number_form(values)
+    assert [format(value, form) for value in values] == names
+
+
+@given(st.lists(st.one_of(st.integers(0, 10**6), st.floats(0, 1e6)), min_size=2, unique=True))
+def test_names_with_numbers_sort_and_differ(values):
+    form = number_form(values)
+    if form:
+        names = [format(value, form) for value in sorted(values)]
+        assert names == sorted(set(names))
+        assert len({len(name) for name in names}) == 1
+
+
+def test_a_field_keeps_a_form_of_its_own():
+    pattern = with_forms("{{a}}{a}-{b:.2f}-{b}-{c}.png", {"a": "04d", "b": "05.1f", "d": "d"})
+    assert pattern == "{{a}}{a:04d}-{b:.2f}-{b:05.1f}-{c}.png"
+    assert [frame_field(frames) for frames in ([], [3], [7, 12345])] == ["", ".{frame:04d}", ".{frame:05d}"]
 
 
 @pytest.mark.parametrize(

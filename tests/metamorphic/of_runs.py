@@ -276,6 +276,28 @@ def a_sweep_is_as_many_renders(case: Case, random: Random, studio: Studio) -> No
 
 
 @relation("exact")
+def a_frame_is_an_override(case: Case, random: Random, studio: Studio) -> None:
+    """A scene at a frame of its curves is the scene with the values that the curves have there."""
+    case = one_camera(case)
+    case.scene["outputs"] = {"colour": "float"}
+    folder = studio.folder()
+    path = case.write(folder)
+    values = dict(text.split("=", 1) for text in change(case, random))
+    others = {name: json.dumps(smaller(json.loads(value), random)) for name, value in values.items()}
+    curves = [
+        f"{name}={{curve: step, keys: {{0: {others[name]}, 3: {value}, 7: {others[name]}}}}}"
+        for name, value in values.items()
+    ]
+    made = []
+    for number, (overrides, frame) in enumerate(
+        ((curves, 5), ([f"{k}={v}" for k, v in values.items()], None))
+    ):
+        options = RenderOptions(overrides, str(folder / f"{number}.exr"), ALL, threads=1, cache=False)
+        made.append(render.render_scene(RenderJob(path, options, frame))[0][0])
+    same(*map(file_pictures, made))
+
+
+@relation("exact")
 def a_file_holds_what_is_made(case: Case, random: Random, studio: Studio) -> None:
     """The channels of an EXR file are the layers. Premises: one camera, single precision; no background,
     which the file adds to the beauty."""

@@ -12,7 +12,7 @@ from illumcli.commands.options import RenderOptions
 from illumcli.commands.runner import Here, Runner
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_images import attempt, render_variants
-from illumcli.commands.sweep_names import default_pattern, refuse_equal_names
+from illumcli.commands.sweep_names import pattern_of, refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome, SweepResult
 from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
 from illumcli.commands.work import unused_keys
@@ -45,8 +45,10 @@ def sweep_scene(
     batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
     # Find faults before the first ray.
-    works = SweepWorks(path, replace(options, pattern=options.pattern or default_pattern(variants)))
-    outcomes, warnings = _planned(works, variants, batch, written, files.reference)
+    works = SweepWorks(path, replace(options, pattern=pattern_of(variants, options.pattern)))
+    outcomes, warnings = _planned(
+        works, variants, batch, written, pattern_of(variants, files.reference or "")
+    )
     if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
@@ -76,7 +78,7 @@ def _planned(
     variants: Sequence[Variant],
     batch: Batch,
     written: Callable[[Outcome], None],
-    reference: str | None,
+    reference: str,
 ) -> tuple[list[Outcome], list[str]]:
     """The outcomes with the facts about every variant without a fault, and the warnings about the scene that
     all of them have."""

@@ -5,8 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from illumcli.errors import InputError
-from illumcli.files.names import fields, frame_field
+from illumcli.files.names import fields, frame_field, number_form, with_forms
+from illumcli.scene.curves._keys import number_in
 from illumcli.scene.variants import LABEL, Variant
+
+
+def pattern_of(variants: Sequence[Variant], given: str | None) -> str:
+    """A given pattern, or the default one, in which all numbers of a path have the same width.
+
+    A field with a form of its own keeps it.
+    """
+    forms = {}
+    for path in dict.fromkeys(path for variant in variants for path in variant.values):
+        of_path = [variant for variant in variants if path in variant.values]
+        texts = dict.fromkeys(variant.values[path] for variant in of_path)
+        numbers = [number for text in texts if (number := number_in(text)) is not None]
+        is_named = any(variant.names.get(path, variant.values[path]) not in texts for variant in of_path)
+        if len(numbers) == len(texts) and not is_named:
+            forms[path] = number_form(numbers)
+    return with_forms(default_pattern(variants) if given is None else given, forms)
 
 
 def default_pattern(variants: Sequence[Variant]) -> str:

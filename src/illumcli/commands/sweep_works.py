@@ -43,15 +43,11 @@ class SweepWorks:
         self._held.pop(outcome.number, None)
 
 
-def planned_variant(work: Work, reference: str | None = None) -> PlannedVariant:
+def planned_variant(work: Work, reference: str = "") -> PlannedVariant:
     """The facts about a variant that a sweep keeps of its work; `reference` may be a pattern of names."""
     first = work.targets[0]
     layer = first.layers[0].name
-    image = (
-        reference is not None
-        and fields(reference)
-        and expanded(reference, work.job, work.loaded, first.view, layer)
-    )
+    image = expanded(reference, work.job, work.loaded, first.view, layer) if fields(reference) else None
     return PlannedVariant(
         paths=tuple(target.path for target in work.targets),
         content=work.content,
@@ -60,7 +56,7 @@ def planned_variant(work: Work, reference: str | None = None) -> PlannedVariant:
         width=first.view.width,
         channels=channel_count(work.development.channels(first)),
         exposure=work.scene.film.exposure,
-        reference=image or None,
+        reference=image,
         is_due=bool(work.due()),
         claim=work.claim,
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
-from illumcli.files.names import check_unique, expand, frame_field
+from illumcli.files.names import check_unique, expand, frame_field, with_forms
 from illumcli.film.develop import Target
 from illumcli.film.view import View
 from illumcli.layers import Layer
@@ -58,9 +58,9 @@ def file_patterns(job: RenderJob, scene: Scene) -> tuple[str, ...]:
 
 
 def expanded(pattern: str, job: RenderJob, loaded: SceneFile, view: View, layer: str) -> Path:
-    """The file that a pattern names for a view and layer of a job."""
+    """The file that a pattern names for a view and layer of a job; frames have four digits by default."""
     fields = {"scene": loaded.name, "camera": view.name, "layer": layer, "frame": loaded.frame}
-    return Path(expand(pattern, {**loaded.overrides, **fields, **job.fields}))
+    return Path(expand(with_forms(pattern, {"frame": "04d"}), {**loaded.overrides, **fields, **job.fields}))
 
 
 def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import unicodedata
@@ -12,6 +13,8 @@ from typing import Any
 from illumcli.errors import InputError
 from illumcli.schema.messages import suggestion
 
+LONGEST_NUMBER = 20
+"""Characters of a number in a name."""
 LONGEST = 4096
 """Letters of a path that no system exceeds."""
 _FIELD = re.compile(r"\{\{|\}\}|\{(?P<name>[^{}:]*)(?::(?P<form>[^{}]*))?\}|[{}]")
@@ -63,6 +66,42 @@ def expand(pattern: str, values: Mapping[str, Any]) -> str:
     if problems:
         raise InputError(problems)
     return name
+
+
+def with_forms(pattern: str, forms: Mapping[str, str]) -> str:
+    """`pattern` with a form for each of its fields that has none, if `forms` has one."""
+
+    def formed(field: re.Match[str]) -> str:
+        name = field["name"]
+        is_bare = name is not None and field["form"] is None
+        return f"{{{name}:{forms[name]}}}" if is_bare and forms.get(name) else field[0]
+
+    return _FIELD.sub(formed, pattern)
+
+
+def number_form(values: Sequence[int | float]) -> str:
+    """The form in which all of some numbers have the same width, so that names with those from 0 on sort.
+
+    Whole numbers have all their digits, others as many decimals as they need, but not more than make four
+    digits that count of each: a third is 0.3333. Numbers that would be too long, or equal, have no form.
+    """
+    if all(isinstance(value, int) for value in values):
+        return f"0{max(len(str(value)) for value in values)}d"
+    decimals = max(map(_decimals, values))
+    texts = [f"{value:.{decimals}f}" for value in values]
+    while len(set(texts)) < len(set(values)) and decimals < LONGEST_NUMBER:
+        decimals += 1
+        texts = [f"{value:.{decimals}f}" for value in values]
+    width = max(map(len, texts))
+    return f"0{width}.{decimals}f" if width <= LONGEST_NUMBER else ""
+
+
+def _decimals(value: float) -> int:
+    """The decimals with which a number is exact, or has four digits that count."""
+    if value == 0:
+        return 0
+    most = max(0, 3 - math.floor(math.log10(abs(value))))
+    return next((count for count in range(most) if float(f"{value:.{count}f}") == value), most)
 
 
 def frame_field(frames: Sequence[int]) -> str:

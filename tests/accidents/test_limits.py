@@ -109,6 +109,7 @@ def bombs(folder):
     return [
         ["render", "texture.yaml"], ["render", "spheres.yaml"], ["render", "mesh.obj"],
         ["check", "texture.yaml"], ["check", "spheres.yaml"], ["plan", "texture.yaml"],
+        ["check", "mesh.obj"], ["plan", "mesh.obj"],
         ["plan", "spheres.yaml"], ["sweep", "spheres.yaml", "-D", "seed=1,2"],
         ["ao-bake", "spheres.yaml", "-o", "x.npz"], ["compare", "bomb.png", "bomb.png"],
         ["verify", "bomb.json.xz"], ["converge", "wide.yaml", "--width", "65536"],
@@ -159,6 +160,25 @@ def test_plans_show_what_shapes_and_textures_take(tmp_path):
     assert "shapes " in plan_scene(tmp_path / "spheres.yaml", cache=False)
     assert "textures 4,095.9 MiB" in plan_scene(tmp_path / "texture.yaml", cache=False)
     assert "textures" not in plan_scene(tmp_path / "unused.yaml", cache=False)
+
+
+def test_plans_show_what_images_of_mesh_files_take(tmp_path):
+    from illumcli.commands.plan import plan_scene
+
+    bombs(tmp_path)
+    (tmp_path / "mesh.gltf").write_text('{"asset": {"version": "2.0"}, "images": [{"uri": "bomb.png"}]}')
+    start = "version: 1\nambient: 1\n"
+    for mesh in ("mesh.obj", "mesh.gltf"):
+        for use, is_used in (
+            ("materials: true}", True),
+            ("}", False),
+            ("materials: true}, material: a", False),
+        ):
+            (tmp_path / "s.yaml").write_text(
+                f"{start}materials: {{a: {{model: lambert}}}}\nobjects: [{{mesh: {{file: {mesh}, {use}}}]\n"
+            )
+            shown = plan_scene(tmp_path / "s.yaml", cache=False)
+            assert ("textures 4,095.9 MiB" in shown) == is_used
 
 
 @pytest.fixture

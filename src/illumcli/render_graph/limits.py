@@ -10,10 +10,12 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.shapes._base import TRIANGLE_BYTES, Shape
 from illumcli.layers import Layer
 from illumcli.memory import in_words, refuse_beyond
+from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.explain import expected_rays
+from illumcli.render_graph.needs import imports
 from illumcli.render_graph.schedule import reached
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
@@ -23,6 +25,8 @@ BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
 """Memory of a mesh per byte of its file; a triangle takes 80 bytes of text, or 43 of binary."""
 BYTES_OF_OTHER_FILES = 6
 """The same for glTF, where images are part of the file."""
+NO_IMAGES = (".mtl", ".bin")
+"""Suffixes of files that mesh files name and that are no images."""
 LARGEST_SIDE = 1 << 16
 MOST_RAYS = 10**11
 DENSEST = 20
@@ -32,11 +36,12 @@ DENSEST = 20
 def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
     """Memory of a scene's shapes, mesh files and textures [bytes], from counts, file sizes and image headers.
 
-    Missing files, files that are not images and files that mesh files name count as 0; their readers check
-    each of them.
+    Missing files and files that are not images count as 0; their readers check each of them. Of images that
+    mesh files name, those count that materials may use; images inside a mesh file are part of its size.
     """
     sizes = {"shapes": 0, "meshes": 0, "textures": 0}
     of_file: dict[Path, int] = {}  # each file is looked at once
+    importing: dict[Path, None] = {}
     for thing in scene.objects:
         source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
         if isinstance(source, Shape):
@@ -47,7 +52,11 @@ def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
             factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
             of_file[path] = factor * path.stat().st_size if path.is_file() else 0
         sizes["meshes"] += of_file[path]
+        if imports(scene, thing):
+            importing[path] = None
+    images = dict.fromkeys(image for path in importing for image in _images_of(path))
     sizes["textures"] = sum(_texture_bytes(loaded, texture) for texture in _textures(scene))
+    sizes["textures"] += sum(_image_bytes(image) for image in images)
     return {name: count for name, count in sizes.items() if count}
 
 
@@ -65,12 +74,25 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
     yield from dict.fromkeys((value.texture, value.space) for value in values if isinstance(value, Texture))
 
 
+def _images_of(mesh: Path) -> list[Path]:
+    """The images that a mesh file or its material libraries name."""
+    return [file for file in companions(mesh) if file.suffix.lower() not in NO_IMAGES and file.is_file()]
+
+
 def _texture_bytes(loaded: SceneFile, texture: tuple[str, str | None]) -> int:
     """Memory of a texture, from its header; 0 if it is unreadable, which its reader reports."""
+    try:
+        return _image_bytes(resolve(loaded, texture[0]))
+    except InputError:
+        return 0
+
+
+def _image_bytes(path: Path) -> int:
+    """Memory of an image, from its header; 0 if it is unreadable, which its reader reports."""
     from illumcli.images.reader import texture_bytes
 
     try:
-        return texture_bytes(resolve(loaded, texture[0]))
+        return texture_bytes(path)
     except InputError:
         return 0
 

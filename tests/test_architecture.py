@@ -17,7 +17,7 @@ FOLDERS = (
     "stress",
     "cluster",
     "commands",
-    "accuracy baking brdf verification",
+    "accuracy baking brdf html_report verification",
     "render_graph",
     "cache",
     "scene",
@@ -48,6 +48,7 @@ HOMES = {
     "OpenImageIO": ("images/openimageio.py",),
     "distributed": ("cluster/",),
     "dask": ("cluster/",),
+    "jinja2": ("html_report/",),
     "matplotlib": ("brdf/", "accuracy/", "images/sheet_drawing.py"),
 }
 

@@ -43,8 +43,8 @@ def _files(options: dict[str, Any]) -> SweepFiles:
 
     if options["columns"] is not None and options["sheet"] is None:
         raise click.UsageError("--columns is for --sheet; give --sheet, too")
-    if options["reference"] is not None and options["table"] is None:
-        raise click.UsageError("--reference is for the errors in --table; give --table, too")
+    if options["reference"] is not None and options["table"] is None and options["html"] is None:
+        raise click.UsageError("--reference is for the errors in --table and --html; give one of them, too")
     return taken(SweepFiles, options)
 
 
@@ -81,9 +81,15 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 )
 @click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, errors.")
 @click.option(
+    "--html",
+    type=FILE,
+    metavar="DIR",
+    help="Write a report for a browser: pictures, filters, comparison.",
+)
+@click.option(
     "--reference",
     metavar="N|FILE",
-    help="What the table's errors are relative to: variant N, an image, or a pattern with an image for each.",
+    help="What errors are relative to: variant N, an image, or a pattern with an image for each.",
 )
 @click.option("--flip", "flips", is_flag=True, help="Measure FLIP, too, which takes far longer.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")

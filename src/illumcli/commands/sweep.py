@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.batch import Batch
-from illumcli.commands.options import RenderOptions
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.runner import Here, Runner
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_images import attempt, render_variants
@@ -52,7 +52,7 @@ def sweep_scene(
     if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
         batch.finish()
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
-    planned = plan_files(files, outcomes, options.force)
+    planned = plan_files(files, outcomes, RenderJob(path, works.options))
 
     # Render the images.
     try:

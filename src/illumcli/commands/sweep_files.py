@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from illumcli.cache.fingerprint import digest
+from illumcli.commands.options import RenderJob
+from illumcli.commands.sweep_html import html_contents, is_html_kept, write_html
 from illumcli.commands.sweep_measures import Measurer
 from illumcli.commands.sweep_outcome import Outcome
-from illumcli.commands.sweep_reference import references_of
+from illumcli.commands.sweep_reference import Reference, references_of
 from illumcli.commands.sweep_sheet import refuse_sheet, sheet_contents, write_sheet
 from illumcli.commands.sweep_table import SweepTable
 from illumcli.files.outputs import INCOMPLETE, is_complete, is_kept, refresh, refuse_suffix
 from illumcli.files.reports import report_contents, sealed_json
+from illumcli.html_report.entries import PAGE
 from illumcli.records import Record, Value
 
 
@@ -25,17 +28,22 @@ class SweepFiles(Value):
     """Of the sheet; by default the values of the path that varies fastest, if they make a grid."""
     table: Path | None = None
     report: Path | None = None
+    html: Path | None = None
+    """Folder of a report for a browser."""
     reference: str | None = None
-    """What the table's measures are relative to: a variant's number, a file, or a pattern of files."""
+    """What measures are relative to: a variant's number, a file, or a pattern of files."""
     flips: bool = False
     """True to measure FLIP, too."""
 
 
 class PlannedFiles(Record):
-    """The files to write, with the hashes of their contents; the table unless it is kept."""
+    """The files to write, with the hashes of their contents; the table unless all that shows it is kept."""
 
     files: SweepFiles
+    job: RenderJob
+    """The scene, and the options that all variants have."""
     table: SweepTable | None
+    references: Mapping[int, Reference]
     contents: dict[int, str]
     """Number of a variant -> hash of its content; variants that failed have none."""
     kept: tuple[Path, ...]
@@ -53,6 +61,9 @@ class PlannedFiles(Record):
         contents = [self._content(outcome) for outcome in outcomes]
         if self.table is not None:
             self.table.write(outcomes)
+        if files.html is not None and files.html / PAGE not in self.kept:
+            assert self.table is not None
+            write_html(files.html, html_contents(self.job, outcomes, contents, self.table, self.references))
         if files.sheet is not None and files.sheet not in self.kept:
             content = content_of_all([*contents, str(files.columns)])
             if content == INCOMPLETE and is_complete(files.sheet, sheet_contents):
@@ -69,7 +80,7 @@ class PlannedFiles(Record):
         return INCOMPLETE if outcome.report is None else self.contents[outcome.number]
 
 
-def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> PlannedFiles:
+def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], job: RenderJob) -> PlannedFiles:
     """Plan the files, and refuse those that are certain to fail; nothing is rendered yet.
 
     Raises
@@ -77,7 +88,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
     InputError
         The reference does not exist, is no image or does not fit; a file has an unknown suffix.
     OutputError
-        A file cannot be written; a different one exists and `force` is not given.
+        A file cannot be written; a different one exists and `job` has not `force`.
     LimitError
         The contact sheet does not fit into memory.
     """
@@ -105,6 +116,7 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         for outcome in outcomes
         if outcome.planned is not None
     }
+    force = job.options.force
     each = [contents.get(outcome.number, INCOMPLETE) for outcome in outcomes]
     held = (
         (files.table, each, report_contents),
@@ -112,10 +124,14 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], force: bool) -> P
         (files.report, each, report_contents),
     )
     kept = tuple(path for path, named, read in held if path is not None and is_kept(path, named, read, force))
-    table = None
-    if files.table is not None and files.table not in kept:
+    if files.html is not None and is_html_kept(files.html, each, force):
+        kept += (files.html / PAGE,)
+
+    # The table is measured if it or a report that shows it has to be written.
+    table, shown = None, (files.table, files.html and files.html / PAGE)
+    if any(path is not None and path not in kept for path in shown):
         table = SweepTable(files.table, outcomes, each, Measurer(references, files.flips))
-    return PlannedFiles(files, table, contents, kept)
+    return PlannedFiles(files, job, table, references, contents, kept)
 
 
 def content_of_all(contents: Sequence[str]) -> str:

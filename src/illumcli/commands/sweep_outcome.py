@@ -11,14 +11,23 @@ from illumcli.records import Record, Value
 from illumcli.scene.variants import Variant
 
 
+class PlannedImage(Value):
+    """Facts about an image before it is rendered."""
+
+    name: str
+    """Its camera, and its layer where it has one of its own."""
+    content: str
+    """Hash of everything that its pixels depend on."""
+
+
 class PlannedVariant(Value):
     """Facts about a variant before it is rendered. It holds no scene: a sweep has up to 100,000 variants."""
 
     paths: tuple[Path, ...]
     content: str
     """Hash of everything that the pixels of its images depend on."""
-    image_content: str
-    """Hash for its first image alone."""
+    images: tuple[PlannedImage, ...]
+    """One for each path."""
     height: int
     width: int
     channels: int

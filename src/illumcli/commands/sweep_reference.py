@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TypeAlias
 
 from illumcli.cache.fingerprint import file_digest
-from illumcli.commands.sweep_colors import channel_count
 from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
 from illumcli.errors import InputError
 from illumcli.files.names import fields
+from illumcli.film.channels import channel_count
 from illumcli.records import Value
 
 MAX_DIGITS = 9
@@ -86,7 +86,7 @@ def _reference(path: Path, images: _Images) -> tuple[Reference, _Kind]:
     """The image of a variant, or a file that is there; reads its header and hashes it."""
     if path in images:
         number, variant = images[path]
-        return Reference(path, variant.image_content, number), _kind(variant)
+        return Reference(path, variant.images[0].content, number), _kind(variant)
     return Reference(path, file_digest(path)), _kind_of_file(path)
 
 

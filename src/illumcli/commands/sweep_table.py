@@ -32,6 +32,8 @@ class SweepTable:
 
     Parameters
     ----------
+    path : Path, optional
+        None for a table that no file is written of.
     outcomes : sequence of Outcome
         All variants, planned.
     contents : sequence of str
@@ -39,7 +41,7 @@ class SweepTable:
     """
 
     def __init__(
-        self, path: Path, outcomes: Sequence[Outcome], contents: Sequence[str], measurer: Measurer
+        self, path: Path | None, outcomes: Sequence[Outcome], contents: Sequence[str], measurer: Measurer
     ) -> None:
         self._path, self._contents, self._measurer = path, contents, measurer
         variants = [outcome.variant for outcome in outcomes]
@@ -63,8 +65,9 @@ class SweepTable:
         for outcome in outcomes:
             if outcome.number not in self._rows and self._is_known(outcome, outcomes):
                 self._rows[outcome.number] = self._row(outcome)
-        rows = [self._rows.get(outcome.number) or self._unknown(outcome) for outcome in outcomes]
-        write_text(self._path, sealed_csv(self._columns, rows))
+        if self._path is not None:
+            rows = [self._rows.get(outcome.number) or self._unknown(outcome) for outcome in outcomes]
+            write_text(self._path, sealed_csv(self._columns, rows))
         self._written = time.monotonic()
 
     def extremes(self, outcomes: Sequence[Outcome]) -> str:
@@ -79,7 +82,18 @@ class SweepTable:
             return ""
         best, worst = (choose(errors, key=lambda pair: pair[0]) for choose in (min, max))
         least, largest = (f"{error:.3g} ({each.label})" for error, each in (best, worst))
-        return f"{self._path}: RMSE from {least} to {largest}"
+        return f"{self._path or 'all variants'}: RMSE from {least} to {largest}"
+
+    def state(self, outcome: Outcome) -> str:
+        """`rendered`, `kept`, `failed` or `pending`."""
+        row = self._rows.get(outcome.number) or self._unknown(outcome)
+        return str(row[self._columns.index(OF_RUN[0])])
+
+    def measures(self, outcome: Outcome) -> dict[str, float]:
+        """The numbers in the row of a variant after its state: seconds, rays, what was measured."""
+        first = self._columns.index(OF_RUN[0]) + 1
+        cells = zip(self._columns[first:], self._rows.get(outcome.number, [])[first:], strict=False)
+        return {name: float(str(cell)) for name, cell in cells if cell != ""}
 
     def _is_reference(self, outcome: Outcome) -> bool:
         reference = self._measurer.references.get(outcome.number)
@@ -114,7 +128,7 @@ class SweepTable:
     def _rows_of_earlier_run(self) -> dict[str, list[Cell]]:
         """The complete rows of an existing table with the same columns, by content."""
         try:
-            if not is_sealed(self._path):
+            if self._path is None or not is_sealed(self._path):
                 return {}
             with self._path.open(newline="", encoding="utf-8") as file:
                 head, *lines = csv.reader(file)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.options import RenderJob, RenderOptions
-from illumcli.commands.sweep_colors import channel_count
-from illumcli.commands.sweep_outcome import Outcome, PlannedVariant
+from illumcli.commands.sweep_outcome import Outcome, PlannedImage, PlannedVariant
 from illumcli.commands.targets import expanded
 from illumcli.commands.unit import Worker
 from illumcli.commands.work import Work
 from illumcli.files.names import fields
+from illumcli.film.channels import channel_count
+from illumcli.film.develop import Target
 
 HELD = 256
 """The work of so many variants is held from planning until rendering, some 80 kB each; later variants are
@@ -43,6 +45,11 @@ class SweepWorks:
         self._held.pop(outcome.number, None)
 
 
+def picture_name(target: Target) -> str:
+    """The camera of an image, and its layer if it has only one."""
+    return f"{target.view.name} {target.layers[0].name}" if target.is_png else target.view.name
+
+
 def planned_variant(work: Work, reference: str = "") -> PlannedVariant:
     """The facts about a variant that a sweep keeps of its work; `reference` may be a pattern of names."""
     first = work.targets[0]
@@ -51,7 +58,7 @@ def planned_variant(work: Work, reference: str = "") -> PlannedVariant:
     return PlannedVariant(
         paths=tuple(target.path for target in work.targets),
         content=work.content,
-        image_content=first.content,
+        images=tuple(PlannedImage(sys.intern(picture_name(each)), each.content) for each in work.targets),
         height=first.view.height,
         width=first.view.width,
         channels=channel_count(work.development.channels(first)),

@@ -109,6 +109,13 @@ def frame_field(frames: Sequence[int]) -> str:
     return f".{{frame:0{max(4, len(str(max(frames))))}d}}" if frames else ""
 
 
+def expand_some(pattern: str, values: Mapping[str, Any]) -> str:
+    """`pattern` with those fields replaced that are among `values`; the others stay."""
+    return _FIELD.sub(
+        lambda match: expand(match[0], values) if match["name"] in values else match[0], pattern
+    )
+
+
 def fields(pattern: str) -> set[str]:
     """The names of the fields in `pattern`."""
     return {match["name"] for match in _FIELD.finditer(pattern) if match["name"] is not None}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -35,3 +35,8 @@ def bits_of(numbers: NDArray[np.uint32]) -> NDArray[np.float32]:
 def numbers_of(bits: NDArray[np.float32]) -> NDArray[np.uint32]:
     """The inverse of `bits_of`."""
     return np.ascontiguousarray(bits).view(np.uint32)
+
+
+def channel_count(names: Collection[str]) -> int:
+    """3 where an image with these channels has colours, else 1: its first channel."""
+    return 3 if {"R", "G", "B"} <= set(names) else 1

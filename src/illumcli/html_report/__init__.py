@@ -1,0 +1,1 @@
+"""A report of many pictures for a browser."""

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.audit import Audit, AuditedError, audited_layer, drawn, pixel_chances
+from illumcli.files.seal import is_sealed
+from illumcli.images.png import read_texts
+from illumcli.images.reader import read_metadata
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
 from planned import planned
@@ -134,8 +137,23 @@ def test_the_report_and_the_terminal_state_it(path, illum, tmp_path):
     assert stated["layer"] == "beauty"
     assert 0 < stated["low"] < stated["rmse"] < stated["high"]
     assert report["rays"]["audit"] == stated["rays"]
-    assert f"RMSE of beauty of main: {stated['rmse']:.3g}" in done.stderr
-    assert f"from {stated['draws']} draws of pixels" in done.stderr
+    interval = f"(95 %: {stated['low']:.3g} to {stated['high']:.3g})"
+    assert f"RMSE of beauty of main: {stated['rmse']:.3g} {interval}" in done.stderr
+
+
+@pytest.mark.parametrize("target", [(), ("--target-error", "0.03")])
+def test_the_files_that_hold_the_layer_state_it(path, illum, tmp_path, target):
+    values = ("outputs.files=['{layer}.png', all.exr]", "outputs.layers=[beauty, depth]")
+    words = [*target, *(word for value in values for word in ("-D", value)), "--report", "report.json"]
+    illum("render", path, *words, cwd=tmp_path)
+    stated = json.loads((tmp_path / "report.json").read_text())["audited_error"]["main"]
+    interval = f"(95 %: {stated['low']:.3g} to {stated['high']:.3g})"
+    text = f"RMSE of beauty: {stated['rmse']:.3g} {interval}"
+    found = {name: read_texts(tmp_path / name) for name in ("beauty.png", "depth.png")}
+    found["all.exr"] = read_metadata(tmp_path / "all.exr")
+    texts = {name: data.get("illum:audited_error", "").rstrip() for name, data in found.items()}
+    assert texts == {"beauty.png": text, "depth.png": "", "all.exr": text}
+    assert all(is_sealed(tmp_path / name) for name in found)
 
 
 @pytest.mark.parametrize(

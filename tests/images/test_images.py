@@ -15,8 +15,11 @@ from hypothesis import strategies as st
 
 from illumcli.color import Texels
 from illumcli.errors import IllumError, InputError, OutputError
+from illumcli.files.seal import is_sealed
 from illumcli.film.channels import bits_of, channel_types, group_by_layer
 from illumcli.images import exr, png, reader
+from illumcli.images.format import RESERVED
+from illumcli.images.png import read_texts
 from illumcli.images.reader import read_image, read_metadata, read_texture, texture_bytes
 from illumcli.images.writer import ImageWriter
 
@@ -166,6 +169,20 @@ def test_exr_metadata_survives(tmp_path):
     assert {name: found.get(name) for name in given} == given
     assert found["oiio:ColorSpace"] == "lin_rec709_scene"
     assert read_image(tmp_path / "a.exr").metadata == found
+
+
+@pytest.mark.parametrize(("name", "texts"), [("a.exr", read_metadata), ("a.png", read_texts)])
+def test_a_reserved_text_is_set_behind_the_pixels(tmp_path, name, texts):
+    types = dict.fromkeys("RGB", "half" if name == "a.exr" else "uint8")
+    given = {"illum:first": "x", "illum:later": RESERVED, "illum:last": "y"}
+    with ImageWriter(tmp_path / name, 3, 2, types, given) as writer:
+        writer.write_band(0, np.ones((2, 3, 3), np.float32 if name == "a.exr" else np.uint8))
+        with pytest.raises(ValueError, match="no room"):
+            writer.set_text("illum:later", "a" * (len(RESERVED) + 1))
+        writer.set_text("illum:later", "0.5 (0.4 to 0.6)")
+    found = texts(tmp_path / name)
+    assert [found[key].rstrip() for key in given] == ["x", "0.5 (0.4 to 0.6)", "y"]
+    assert is_sealed(tmp_path / name)
 
 
 def test_whole_numbers_beyond_32_bits_become_text(tmp_path):

@@ -79,6 +79,9 @@ class AuditedError(Value):
         low, high = (math.sqrt(max(mean + sign * 1.96 * error, 0)) for sign in (-1, 1))
         return cls(layer, rmse, error / (2 * rmse) if rmse else 0.0, low, high, len(products))
 
+    def __str__(self) -> str:
+        return f"RMSE of {self.layer}: {self.rmse:.3g} (95 %: {self.low:.3g} to {self.high:.3g})"
+
     def as_data(self) -> dict[str, str | float]:
         """The error as reports hold it."""
         return dict(vars(self))

@@ -131,6 +131,9 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
         say_kept(report.kept)
         for line in repair_lines(report.repairs, verbose):
             say_once(f"{done.scene}: {line}")
+        for camera, error in report.audited_error.items():
+            interval = f"(95 %: {error['low']:.3g} to {error['high']:.3g})"
+            say(f"{done.scene}: RMSE of {error['layer']} of {camera}: {error['rmse']:.3g} {interval}")
     for warning in report.warnings:
         say_once(warning)
     if not verbose:
@@ -140,9 +143,6 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
     if report.clamped:
         fact = f"{report.clamped} values beyond 65504, the largest of half precision, are written as that"
         say(f"{done.scene}: {fact}; outputs.colour: float keeps them")
-    for camera, error in report.audited_error.items():
-        fact = f"{error['rmse']:.3g} +- {error['standard_error']:.2g}, from {error['draws']} draws of pixels"
-        say(f"{done.scene}: RMSE of {error['layer']} of {camera}: {fact}")
     for camera, reused in report.reused.items():
         for name, where in reused.items():
             say(f"reused {name} of {camera}: from the {where}")

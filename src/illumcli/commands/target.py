@@ -30,6 +30,7 @@ def rendered_to_target(work: Work, store: Store | None, progress: Progress) -> t
     choice, memory = _choice(job, options.target_error, store)
     overrides = (*options.overrides, *choice.overrides)
     work = prepared(replace(job, options=replace(options, overrides=overrides, audit=False)))
+    work = replace(work, audited=choice.audited)
     report = replace(
         rendered(work, Cache(store, memory), progress),
         chosen=choice.overrides,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from illumcli.cache.fingerprint import FileFingerprints, digest
 from illumcli.commands.options import RenderJob
@@ -23,6 +25,9 @@ from illumcli.scene.load import load
 from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
 from illumcli.scene.spec import Scene
 
+if TYPE_CHECKING:
+    from illumcli.accuracy.audit import AuditedError
+
 BAND_ROWS = math.isqrt(MAX_TILE_SAMPLES)
 """Greatest height of a band of tiles [pixels]."""
 BYTES = {"half": 2, "float": 4, "uint": 4, "uint8": 1, "uint16": 2}
@@ -36,6 +41,8 @@ class Work(Value):
     graph: Graph
     outputs: tuple[Layer, ...]
     targets: tuple[Target, ...]
+    audited: Mapping[str, AuditedError] = field(default_factory=dict)
+    """Errors of cameras that are known before they are rendered."""
 
     @property
     def scene(self) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from illumcli.commands.work import Work
 from illumcli.film.develop import ErrorSums, Target, how_to_read
 from illumcli.film.tiles import Tile
 from illumcli.graph import Buffers
+from illumcli.images.format import RESERVED
 from illumcli.progress import Progress
 from illumcli.records import Value
 from illumcli.render_graph.execute import Run, bands
@@ -60,7 +61,8 @@ def write_view(
         progress(view.name, done, pixels)
 
     # Called by the threads for each tile: turn layers into values of the files.
-    audit = _audit(work, plan)
+    audit, known = _audit(work, plan), work.audited.get(view.name)
+    stated = audit.layer.name if audit is not None else known.layer if known is not None else None
 
     def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
         if audit is not None:
@@ -69,7 +71,7 @@ def write_view(
         return files | ({"error": layers["error"]} if "error" in layers else {})
 
     # Open all files; each gets its name only when all of it is written.
-    sums = ErrorSums()
+    sums, error = ErrorSums(), known
     with ExitStack() as files:
         writers = [
             files.enter_context(
@@ -78,7 +80,7 @@ def write_view(
                     view.width,
                     view.height,
                     development.channels(target),
-                    metadata(work.scene, target, space),
+                    metadata(work.scene, target, space) | _room(target, stated),
                     srgb=target.layers[0].kind == "light",
                 )
             )
@@ -94,17 +96,21 @@ def write_view(
                 writer.write_band(band.y, band.layers[str(target.path)])
             run.stats.add({"write": time.perf_counter() - start}, {})
 
+        # Measure the error of reconstructed obscurance, and write it beside the layer.
+        if audit is not None:
+            start, auditing = time.perf_counter(), Run(threads=run.threads)
+            error = audit.error(shared, auditing)
+            rays = sum(auditing.stats.rays.values())
+            run.stats.add({"audit": time.perf_counter() - start}, {"audit": rays})
+        if error is not None:
+            for target, writer in zip(targets, writers, strict=True):
+                for name in _room(target, stated):
+                    writer.set_text(name, str(error))
+
         # Finish and verify the files.
         start = time.perf_counter()
         clamped = sum(writer.close().clamped for writer in writers)
         run.stats.add({"write": time.perf_counter() - start}, {})
-
-    # Measure the error of reconstructed obscurance.
-    if audit is None:
-        return ViewOutcome(clamped, sums)
-    start, auditing = time.perf_counter(), Run(threads=run.threads)
-    error = audit.error(shared, auditing)
-    run.stats.add({"audit": time.perf_counter() - start}, {"audit": sum(auditing.stats.rays.values())})
     return ViewOutcome(clamped, sums, error)
 
 
@@ -118,7 +124,12 @@ def _audit(work: Work, plan: Plan) -> Audit | None:
     return Audit.of(plan, layer, work.scene.seed) if layer is not None else None
 
 
-def metadata(scene: Scene, target: Target, space: RenderSpace) -> Mapping[str, Any]:
+def _room(target: Target, stated: str | None) -> dict[str, str]:
+    """Room in the metadata of a file for the error of a layer, where it holds that layer."""
+    return {"illum:audited_error": RESERVED} if stated in {layer.name for layer in target.layers} else {}
+
+
+def metadata(scene: Scene, target: Target, space: RenderSpace) -> dict[str, Any]:
     """The metadata of a file."""
     return {
         "Software": f"illum {__version__}",

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.files.seal import BLANK, seal
 from illumcli.film.channels import Metadata
-from illumcli.images.format import WriteError
+from illumcli.images.format import RESERVED, WriteError
 from illumcli.images.openimageio import oiio
 from illumcli.images.reader import ImageSource
 
@@ -80,6 +80,7 @@ class ExrFile:
             spec.channelformats = tuple(kinds)
         for name, value in {**_HINTS, **metadata, "illum:body": BLANK}.items():
             _set_attribute(spec, name, value)
+        self._texts: dict[str, str] = {}
         self._rows = 0
         self._check(self._output.open(os.fspath(path), spec))
 
@@ -91,11 +92,17 @@ class ExrFile:
         self._check(self._output.write_scanlines(self._rows, self._rows + len(band), 0, band))
         self._rows += len(band)
 
+    def set_text(self, name: str, text: str) -> None:
+        """Set a text of the metadata whose room is `RESERVED`."""
+        self._texts[name] = text
+
     def close(self) -> None:
         """Finish the file."""
         self._check(self._output.close())
         if self._numbers:
             _retype_as_integers(self._path, self._numbers)
+        if self._texts:
+            _fill_reserved(self._path, self._texts)
         seal(self._path)
 
     def is_as_written(self) -> bool:
@@ -139,6 +146,16 @@ def _retype_as_integers(path: Path, names: Sequence[str]) -> None:
                 file.seek(at)
                 file.write(struct.pack("<i", 0))
             at += 16
+
+
+def _fill_reserved(path: Path, texts: Mapping[str, str]) -> None:
+    """Write texts over `RESERVED` in the header of an EXR; blanks remain behind them."""
+    with path.open("r+b") as file:
+        header = file.read(HEADER)
+        for name, text in texts.items():
+            start = name.encode() + b"\0string\0" + struct.pack("<i", len(RESERVED))
+            file.seek(header.index(start + RESERVED.encode()) + len(start))
+            file.write(text.encode("ascii").ljust(len(RESERVED)))
 
 
 def _set_attribute(spec: oiio.ImageSpec, name: str, value: Any) -> None:

@@ -6,6 +6,9 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
+RESERVED = " " * 96
+"""Room for a text of the metadata that is known only after the pixels."""
+
 
 class WriteError(Exception):
     """An image file cannot be written; the text says why."""
@@ -16,6 +19,9 @@ class ImageFile(Protocol):
 
     def write(self, band: NDArray[Any]) -> None:
         """Append rows, (h, W, C) with the values of the file."""
+
+    def set_text(self, name: str, text: str) -> None:
+        """Set a text of the metadata whose room is `RESERVED`; in ASCII, not longer than that."""
 
     def close(self) -> None:
         """Finish the file."""

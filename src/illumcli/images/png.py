@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.files.seal import png_digest, png_end
+from illumcli.images.format import RESERVED
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOUR_TYPES = {("Y",): 0, ("R", "G", "B"): 2, ("Y", "A"): 4, ("R", "G", "B", "A"): 6}
@@ -71,10 +72,13 @@ class PngFile:
         if srgb:
             self._chunk(b"sRGB", b"\0")
             self._chunk(b"gAMA", (45455).to_bytes(4))  # for readers that do not know sRGB
+        self._texts: dict[str, str] = {}
         for name, value in metadata.items():
+            if value == RESERVED:
+                continue
             text = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
             if text.isascii():
-                self._chunk(b"tEXt", name.encode("latin-1") + b"\0" + text.encode())
+                self._text(name, text)
             else:
                 self._chunk(b"iTXt", name.encode("latin-1") + b"\0\0\0\0\0" + text.encode())
 
@@ -91,9 +95,15 @@ class PngFile:
             self._image(self._deflate.compress(self._waiting[at : at + _PIECE]))
         del self._waiting[:ready]
 
+    def set_text(self, name: str, text: str) -> None:
+        """Set a text of the metadata whose room is `RESERVED`; it stands behind the pixels."""
+        self._texts[name] = text
+
     def close(self) -> None:
         """Finish the file."""
         self._image(self._deflate.compress(self._waiting) + self._deflate.flush())
+        for name, text in self._texts.items():
+            self._text(name, text)
         self._put(png_end(self._hash))
         self._file.close()
 
@@ -111,6 +121,9 @@ class PngFile:
     def _image(self, packed: bytes) -> None:
         if packed:
             self._chunk(b"IDAT", packed)
+
+    def _text(self, name: str, text: str) -> None:
+        self._chunk(b"tEXt", name.encode("latin-1") + b"\0" + text.encode())
 
     def _chunk(self, kind: bytes, data: bytes) -> None:
         check = zlib.crc32(data, zlib.crc32(kind))

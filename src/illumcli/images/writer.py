@@ -17,7 +17,7 @@ from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import AtomicFile, os_errors_as_output_errors
 from illumcli.film.channels import ChannelType, Metadata
 from illumcli.film.finite import refuse_nonfinite
-from illumcli.images.format import ImageFile, WriteError
+from illumcli.images.format import RESERVED, ImageFile, WriteError
 from illumcli.images.names import NO_UTF8, no_utf8, printable
 from illumcli.images.png import PngFile
 from illumcli.records import Value
@@ -121,6 +121,18 @@ class ImageWriter:
         with self._all_or_nothing():
             self._open_file.write(self._stored(band))
         self._rows = y1
+
+    def set_text(self, name: str, text: str) -> None:
+        """Set a text of the metadata that was passed as `RESERVED`.
+
+        Parameters
+        ----------
+        text : str
+            In ASCII, of at most `len(RESERVED)` letters.
+        """
+        if not text.isascii() or len(text) > len(RESERVED):
+            raise ValueError(f"{self._name}: {name} has no room for {text!r}")
+        self._open_file.set_text(name, text)
 
     def close(self) -> Written:
         """Finish the file, read it back and give it its name."""

@@ -154,12 +154,17 @@ def test_references_are_numbers_of_variants_or_files(tmp_path, said):
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):
+    from illumcli.commands.options import RenderOptions
     from illumcli.commands.plan import plan_scene
+    from illumcli.commands.plan_table import plan_table
+
+    def shown(name):
+        return plan_table(plan_scene(tmp_path / name, options=RenderOptions(cache=False)))
 
     bombs(tmp_path)
-    assert "shapes " in plan_scene(tmp_path / "spheres.yaml", cache=False)
-    assert "textures 4,095.9 MiB" in plan_scene(tmp_path / "texture.yaml", cache=False)
-    assert "textures" not in plan_scene(tmp_path / "unused.yaml", cache=False)
+    assert "shapes " in shown("spheres.yaml")
+    assert "textures 4,095.9 MiB" in shown("texture.yaml")
+    assert "textures" not in shown("unused.yaml")
 
 
 def test_plans_show_what_images_of_mesh_files_take(tmp_path):

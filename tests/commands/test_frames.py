@@ -79,11 +79,11 @@ def test_what_a_frame_does_not_change_is_not_computed_again(illum, film):
         assert entry["reused"]["main"]["obscurance"] == "memory"
     plan = illum("plan", "film.yaml", "--json")
     (part,) = json.loads(plan.stdout)
-    different = part["frames"]["different"]
-    assert part["frames"]["numbers"] == [0, 1, 2, 3]
+    different = part["variants"]["times"]
+    assert part["variants"]["labels"] == ["frame 0", "frame 1", "frame 2", "frame 3"]
     assert (different["hits"], different["obscurance"], different["shadow:point1"]) == (1, 1, 4)
     table = illum("plan", "film.yaml", "--frames", "0:3:3").stdout
-    assert "frames  2 from 0 to 3, this is the plan of the first" in table
+    assert "all     2 variants from frame 0 to frame 3" in table
 
 
 def test_sweeps_have_every_variant_at_every_frame(illum, film):
@@ -154,7 +154,7 @@ def test_files_of_a_sequence(illum, film):
     assert illum("check", "film.yaml").returncode == 0
     cached = illum("render", "film.yaml", "-o", "c{frame}.exr")
     assert cached.returncode == 0, cached.stderr
-    plan = json.loads(illum("plan", "film.yaml", "--json").stdout)[0]["frames"]["different"]
+    plan = json.loads(illum("plan", "film.yaml", "--json").stdout)[0]["variants"]["times"]
     assert plan["geometry"] == 2
 
 

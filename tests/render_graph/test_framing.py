@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
@@ -81,10 +79,10 @@ def test_an_object_that_nobody_sees_is_left_out_of_the_placed_view(scene):
 
 def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
     words = ["film.width=600", "film.height=400", "film.samples=4"]
-    cold = json.loads(plan_job.plan_scene(scene, words, as_json=True))
+    cold = plan_job.plan_scene(scene, variants_of(words))
     assert "hits" not in cold[0]["reused"]
     render_scene(RenderJob(scene, RenderOptions(words)))
-    warm = json.loads(plan_job.plan_scene(scene, words, as_json=True))
+    warm = plan_job.plan_scene(scene, variants_of(words))
     assert "hits" in warm[0]["reused"]
     assert "camera:main" not in warm[0]["skipped"]
     loaded = load(scene, words)

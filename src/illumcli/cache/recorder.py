@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from illumcli.cache import policy
 from illumcli.cache.codec import codec_of, encode, pack_tile
 from illumcli.cache.memory import MemoryCache
+from illumcli.cache.speeds import SpeedRecorder
 from illumcli.cache.store import Store, Writer
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
@@ -23,6 +24,8 @@ class Cache(Value):
 
     store: Store | None = None
     memory: MemoryCache | None = None
+    speeds: SpeedRecorder | None = None
+    """Where the speeds of runs are noted."""
 
     def accepts(self, name: str) -> bool:
         """True if a buffer of this name may be kept."""

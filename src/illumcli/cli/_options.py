@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from illumcli.commands.runner import Runner
     from illumcli.progress import Progress
     from illumcli.records import Value
+    from illumcli.scene.variants import Variant
 
 RunnerOf: TypeAlias = "Callable[[Progress], Runner]"
 """From what is told about progress to who does the work."""
@@ -127,6 +128,35 @@ frames_option = click.option(
     metavar="FIRST:LAST[:STEP]",
     help="Frames to render, by default the scene's; values of -D may be formulas of frame and time.",
 )
+
+
+def _variants(options: dict[str, Any]) -> list[Variant]:
+    from illumcli.scene.load import read_frames
+    from illumcli.scene.variants import variants_of
+
+    names = ("overrides", "together", "rows", "frames")
+    overrides, together, rows, frames = (options.pop(name) for name in names)
+    return variants_of(overrides, together, rows, frames, read_frames(options["scene"], overrides))
+
+
+def variants_options(command: C) -> C:
+    """Adds `-D`, `--zip`, `--rows`, `--frames` and the options of meshes, as the parameter `variants`."""
+    values = click.option(
+        "-D",
+        "overrides",
+        multiple=True,
+        metavar="PATH=VALUES",
+        help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog; NAME:VALUE names a value.",
+    )
+    together = click.option(
+        "--zip", "together", is_flag=True, help="First values together, then second ones, ..."
+    )
+    rows = click.option(
+        "--rows", type=FILE, metavar="FILE.csv", help="A variant per row: paths in the first line."
+    )
+    taking = gathered("variants", _variants)(command)
+    return values(studio_options(together(rows(frames_option(taking)))))
+
 
 pattern_option = click.option(
     "-o", "--output", "pattern", metavar="PATTERN", help="Name pattern of the images, .exr or .png."

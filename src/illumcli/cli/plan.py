@@ -3,45 +3,55 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from illumcli.cli._options import (
-    frames_option,
+    allow_option,
+    gathered,
     no_cache_option,
-    overrides_option,
+    only_option,
+    pattern_option,
+    render_options,
     scene_argument,
-    studio_options,
+    threads_option,
+    variants_options,
 )
+
+if TYPE_CHECKING:
+    from illumcli.commands.options import RenderOptions
+    from illumcli.scene.variants import Variant
 
 
 @click.command()
 @scene_argument
-@overrides_option
-@studio_options
-@click.option("--only", "only", multiple=True, metavar="LAYER", help="Plan these layers alone.")
+@variants_options
+@allow_option
+@pattern_option
+@only_option
+@threads_option
 @click.option("--json", "as_json", is_flag=True, help="As JSON, a list with each camera's plan.")
-@frames_option
 @no_cache_option
-def plan(
-    scene: Path,
-    overrides: tuple[str, ...],
-    only: tuple[str, ...],
-    as_json: bool,
-    cache: bool,
-    frames: str | None,
-) -> None:
+@gathered("options", render_options)
+def plan(scene: Path, variants: list[Variant], options: RenderOptions, as_json: bool) -> None:
     """Print what will run for SCENE, what is reused, what is skipped and why; parse no mesh, trace nothing.
 
-    Files are hashed to know what is reused; with --no-cache only headers of images are read. Exit status: 4
-    where the memory that is free cannot hold the scene, which the plan shows.
+    With several values, rows or frames: the plan of the first variant, and what all of them take. Files are
+    hashed to know what is reused; with --no-cache only headers of images are read. Exit status: 4 where the
+    memory that is free cannot hold the scene, which the plan shows.
 
     \b
     Examples:
       illum plan scenes/teapot.yaml
       illum plan scenes/teapot.yaml --only depth --json
+      illum plan scenes/teapot.yaml -D ambient=0:1:11 -D materials.glaze.exponent=10:160:5log
     """
-    from illumcli.commands.plan import plan_scene, refuse_too_large
+    import json
 
-    click.echo(plan_scene(scene, overrides, only, as_json, cache, frames))
-    refuse_too_large(scene, overrides, frames)
+    from illumcli.commands.plan import plan_scene, refuse_too_large
+    from illumcli.commands.plan_table import plan_table
+
+    parts = plan_scene(scene, variants, options)
+    click.echo(json.dumps(parts, indent=1) if as_json else plan_table(parts))
+    refuse_too_large(scene, variants, options)

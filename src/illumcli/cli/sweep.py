@@ -13,7 +13,6 @@ from illumcli.cli._options import (
     allow_option,
     cluster_options,
     force_option,
-    frames_option,
     gathered,
     keep_going_option,
     no_cache_option,
@@ -24,9 +23,9 @@ from illumcli.cli._options import (
     scene_argument,
     seed_option,
     strict_option,
-    studio_options,
     taken,
     threads_option,
+    variants_options,
     verbose_option,
 )
 from illumcli.cli._printing import print_paths, say, say_kept
@@ -48,29 +47,9 @@ def _files(options: dict[str, Any]) -> SweepFiles:
     return taken(SweepFiles, options)
 
 
-def _variants(options: dict[str, Any]) -> list[Variant]:
-    from illumcli.scene.load import read_frames
-    from illumcli.scene.variants import variants_of
-
-    names = ("overrides", "together", "rows", "frames")
-    overrides, *others = (options.pop(name) for name in names)
-    together, rows, frames = others
-    return variants_of(overrides, together, rows, frames, read_frames(options["scene"], overrides))
-
-
 @click.command()
 @scene_argument
-@click.option(
-    "-D",
-    "overrides",
-    multiple=True,
-    metavar="PATH=VALUES",
-    help="Values of a path: a,b,c or START:STOP:COUNT or START:STOP:COUNTlog; NAME:VALUE names a value.",
-)
-@studio_options
-@click.option("--zip", "together", is_flag=True, help="First values together, then second ones, ...")
-@click.option("--rows", type=FILE, metavar="FILE.csv", help="A variant per row: paths in the first line.")
-@frames_option
+@variants_options
 @pattern_option
 @only_option
 @click.option("--sheet", type=FILE, metavar="FILE", help="Write a contact sheet, labelled: .png, .svg, .pdf.")
@@ -93,6 +72,7 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 )
 @click.option("--flip", "flips", is_flag=True, help="Measure FLIP, too, which takes far longer.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")
+@click.option("--dry-run", is_flag=True, help="Print what the sweep would take, and render nothing.")
 @seed_option("By default the scene's.")
 @threads_option
 @force_option("Replace files that differ, render those that do not.")
@@ -104,7 +84,6 @@ def _variants(options: dict[str, Any]) -> list[Variant]:
 @quiet_option
 @verbose_option
 @gathered("files", _files)
-@gathered("variants", _variants)
 @gathered("options", render_options)
 def sweep(
     scene: Path,
@@ -112,6 +91,7 @@ def sweep(
     options: RenderOptions,
     files: SweepFiles,
     runner: RunnerOf,
+    dry_run: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -131,6 +111,12 @@ def sweep(
     from illumcli.render_graph.repairs import repair_lines
     from illumcli.scene.problems import without_frame
 
+    if dry_run:
+        from illumcli.commands.plan import plan_scene
+        from illumcli.commands.plan_table import variants_table
+
+        click.echo(variants_table(plan_scene(scene, variants, options)))
+        return
     printed: set[str] = set()
 
     def written(outcome: Outcome) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from illumcli.progress import Progress, no_progress
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import without_objects
 from illumcli.render_graph.execute import Run, run_once
+from illumcli.render_graph.expected_time import units_of
 from illumcli.render_graph.explain import why_not
 from illumcli.render_graph.framing import place_cameras
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
@@ -72,6 +74,7 @@ def rendered(
     audited_error: dict[str, dict[str, str | float]] = {}
     warnings: Sequence[str] = ()
     clamped = 0
+    units: Counter[str] = Counter(dict.fromkeys(run.stats.seconds, 1))  # meshes that were read to cull
     for view in graph.views:
         targets = [replace(target, view=view) for target in due if target.view.name == view.name]
         if not targets:
@@ -81,6 +84,7 @@ def rendered(
         run.stats.add({"artifacts": time.perf_counter() - began}, {})
         reused[view.name] = dict(plan.lookup.reused)
         skipped = why_not(graph, outputs, plan)
+        units.update(units_of(plan))
         shared = run_once(plan, run)
         repaired = {**repaired, **repairs(shared)}
         if "ray_origins" in plan.buffers:
@@ -113,7 +117,10 @@ def rendered(
         standard_error=standard_error,
         audited_error=audited_error,
     )
-    return replace(report.with_counts(run.stats), total_seconds=time.perf_counter() - start)
+    seconds = time.perf_counter() - start
+    if cache.speeds is not None:
+        cache.speeds.add(run.stats.seconds, units, seconds * run.threads)
+    return replace(report.with_counts(run.stats), total_seconds=seconds)
 
 
 def wanted_by(following: Work | None, graph: Graph, run: Run) -> frozenset[str]:

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, TypeAlias, overload
 from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
+from illumcli.cache.speeds import SpeedRecorder
 from illumcli.cache.store import Store, open_store
 from illumcli.commands.options import RenderJob
 from illumcli.commands.work import Work, work_of
@@ -58,6 +59,7 @@ class Worker:
 
     def __init__(self) -> None:
         self._scenes: dict[Path, SharedParts] = {}
+        self._speeds = SpeedRecorder()
 
     @cached_property
     def _store(self) -> Store | None:
@@ -114,7 +116,7 @@ class Worker:
         from illumcli.commands.render import rendered
 
         memory = self._scenes[work.job.scene].memory
-        report = rendered(work, Cache(store, memory), progress, following)
+        report = rendered(work, Cache(store, memory, self._speeds), progress, following)
         memory.retire()
         return [target.path for target in work.targets], report
 
@@ -122,5 +124,6 @@ class Worker:
         """Tidy the cache on disk. Returns its warning, if it has one."""
         if "_store" not in vars(self) or self._store is None:
             return ()
+        self._speeds.keep(self._store)
         self._store.finish()
         return (self._store.warning,) if self._store.warning else ()

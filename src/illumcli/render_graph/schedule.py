@@ -199,7 +199,7 @@ def schedule(
     all_samples : Plan, optional
         For the pixels of an adaptive picture that need all samples; by default from the same graph.
     """
-    once, tile = _split(graph.topological_order(needed_buffers(graph, outputs, [view])))
+    once, tile = once_and_tile(graph.topological_order(needed_buffers(graph, outputs, [view])))
     around = any(SURROUNDINGS in node.inputs.values() for node in tile)
     if view.adaptive is None:
         (before,) = _ordered(graph, tile, [["hits", "object_pixels"] if around else []])
@@ -218,7 +218,7 @@ def schedule(
     if any(layer.per_pixel for layer in outputs):
         scene_loaders = {name: node for name, node in graph.loaders.items() if not node.inputs}
         whole = replace(graph, loaders=scene_loaders)
-        first, rest = _split(whole.topological_order(REPLICATED))
+        first, rest = once_and_tile(whole.topological_order(REPLICATED))
         replicates = Plan(graph, (), view.all_samples(), tuple(first), tuple(rest))
     known = {node.output for node in once}
     for other in (all_samples, replicates):
@@ -263,7 +263,7 @@ def uncached_plans(plan: Plan, cache: Cache) -> tuple[Plan, Plan]:
     return plans[0], plans[1]
 
 
-def _split(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
+def once_and_tile(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
     """Nodes that run once, and those that run for each tile."""
     of_tile = set(GIVEN)
     for node in nodes:

@@ -1,0 +1,57 @@
+"""What `illum plan` and `--dry-run` say about several variants."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+SCENE = """
+version: 1
+film: {width: 16, height: 12, samples: 2}
+ambient: 0.2
+obscurance: {samples: 4}
+objects: [{mesh: {shape: box}}, {mesh: {shape: disc, radius: 9}}]
+lights: [{light: point, name: key, position: [3, 4, 5], intensity: 30}]
+"""
+AXES = ("-D", "ambient=0,1", "-D", "lights.key.position=[1,2,3],[3,2,1],[1,3,2]")
+FIRST = 16 * 12 * 2
+"""Samples of a variant."""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENE)
+    return tmp_path / "s.yaml"
+
+
+def test_buffers_count_where_they_differ(illum, scene):
+    (part,) = json.loads(illum("plan", scene, *AXES, "--json", "--no-cache").stdout)
+    planned = part["variants"]
+    assert planned["labels"][0] == "ambient 0, position [1,2,3]"
+    assert (len(planned["labels"]), len(planned["files"]), planned["due"]) == (6, 6, 6)
+    times = planned["times"]
+    assert (times["hits"], times["tracer"], times["obscurance"]) == (1, 1, 1)
+    assert times["shadow:key"] == 3  # kept: the second ambient loads it
+    assert times["incident:key"] == 6  # not kept
+    assert planned["expected_rays"]["shadow:key"] == 3 * FIRST
+    assert planned["expected_rays"]["obscurance"] == 4 * FIRST  # the first variant has none
+    assert planned["expected_time"]["runs"] == 0
+
+
+def test_a_dry_run_renders_nothing_and_knows_what_exists_and_how_fast_it_was(illum, scene, tmp_path):
+    done = illum("sweep", scene, *AXES, "--dry-run")
+    assert "all     6 variants from ambient 0, position [1,2,3] to ambient 1, position [1,3,2]" in done.stdout
+    assert "files   s-0-_1_2_3_.png to s-1-_1_3_2_.png, 6 images" in done.stdout
+    assert "time    unknown" in done.stdout
+    assert list(tmp_path.glob("*.png")) == []
+    assert illum("sweep", scene, *AXES, "-q").returncode == 0
+    done = illum("sweep", scene, *AXES, "--dry-run")
+    assert ", 6 of which exist" in done.stdout
+    assert "by 6 earlier runs on this machine\n" in done.stdout
+
+
+def test_a_fault_of_any_variant_is_told(illum, scene):
+    done = illum("plan", scene, "-D", "film.samples=4,0")
+    assert done.returncode == 2
+    assert "film.samples" in done.stderr

@@ -32,11 +32,15 @@ def by_all(vertices, origins, n):
     return (n.astype(float) @ vertices.astype(float).T).max(axis=1) <= height
 
 
+def is_open(tree, origins, n):
+    return tree.is_open(len(origins), lambda index: (origins[index], n[index]))
+
+
 @pytest.mark.parametrize("count", [3, 9, 100, 3000, 20001])
 def test_every_point_of_a_ball_is_clear(count):
     p, t = ball(count)
     p = p[: t.size]
-    assert ClusterTree(p, t).is_open(raised(p, p), p).all()
+    assert is_open(ClusterTree(p, t), raised(p, p), p).all()
 
 
 def test_agrees_with_a_look_at_every_vertex():
@@ -45,7 +49,7 @@ def test_agrees_with_a_look_at_every_vertex():
     n = p / np.linalg.norm(p, axis=1, keepdims=True)
     order = compact(p)
     o, n = raised(p, n)[order], n[order]
-    opened, truth = ClusterTree(p, t).is_open(o, n), by_all(p, o, n)
+    opened, truth = is_open(ClusterTree(p, t), o, n), by_all(p, o, n)
     assert 0.02 < truth.mean() < 0.98
     assert np.array_equal(opened, truth)
 
@@ -54,13 +58,13 @@ def test_a_vertex_just_above_is_found_and_one_that_no_triangle_uses_is_not():
     p, t = ball(3000)
     p[-1] = p[0] * F(1.0001)
     n = p[:1] / np.linalg.norm(p[:1])
-    assert not ClusterTree(p, t).is_open(raised(p[:1], n), n)[0]
-    assert ClusterTree(p, t[:-1]).is_open(raised(p[:1], n), n)[0]
+    assert not is_open(ClusterTree(p, t), raised(p[:1], n), n)[0]
+    assert is_open(ClusterTree(p, t[:-1]), raised(p[:1], n), n)[0]
 
 
 def test_nothing_at_all_hides_nothing():
     empty = ClusterTree(np.zeros((0, 3), F), np.zeros((0, 3), np.int32))
-    assert empty.is_open(np.zeros((2, 3), F), np.eye(3, dtype=F)[:2]).all()
+    assert is_open(empty, np.zeros((2, 3), F), np.eye(3, dtype=F)[:2]).all()
 
 
 def test_an_order_holds_every_point_once_and_rows_are_near():
@@ -81,7 +85,7 @@ def test_points_of_a_hollow_settle_each_other_without_the_tree(monkeypatch):
     order = compact(p)
     monkeypatch.setattr(ClusterTree, "_tree", lambda self: pytest.fail("the tree was asked"))
     monkeypatch.setattr("illumcli.visibility.open_hemisphere.extremes", lambda points: points[:1])
-    assert not ClusterTree(p, t).is_open(raised(p, n)[order], n[order]).any()
+    assert not is_open(ClusterTree(p, t), raised(p, n)[order], n[order]).any()
 
 
 @pytest.mark.parametrize(("down", "built"), [(50, True), (2000, False)])
@@ -90,7 +94,7 @@ def test_the_tree_is_built_for_many_points_only(down, built):
     inward = -p[:down] / np.linalg.norm(p[:down], axis=1, keepdims=True)  # all of the ball is above these
     o, n = np.concatenate([raised(p[:1], p[:1]), raised(p[:down], inward)]), np.concatenate([p[:1], inward])
     tree = ClusterTree(p, t)
-    assert tree.is_open(np.asfortranarray(o), n).tolist() == [built] + [False] * down
+    assert is_open(tree, np.asfortranarray(o), n).tolist() == [built] + [False] * down
     assert (tree._levels is not None) == built
 
 

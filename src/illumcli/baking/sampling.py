@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, cross, dot
+from illumcli.arrays import F, Vectors, cross, dot
 from illumcli.baking.occluders import Occluders
 from illumcli.baking.points import Points
 from illumcli.baking.resume import load_unit, store_unit
@@ -95,18 +95,26 @@ class BakeSampler(Record):
         area = cross(b - a, c - a)
         order = compact(a + b + c)
         order = order[dot(area, area)[order] > 0]
+        objects = geometry.objects[order]
+        by_object = np.argsort(objects, kind="stable")
+        begins = np.flatnonzero(np.diff(objects[by_object], prepend=-1))
         units = [
-            WorkUnit(of_object[first : first + UNIT_TRIANGLES], UNIT_RAYS // UNIT_TRIANGLES, index)
-            for index in range(len(geometry.placed))
-            if (of_object := order[geometry.objects[order] == index]).size
-            for first in range(0, len(of_object), UNIT_TRIANGLES)
+            WorkUnit(
+                group[first : first + UNIT_TRIANGLES],
+                UNIT_RAYS // UNIT_TRIANGLES,
+                int(geometry.objects[group[0]]),
+            )
+            for group in (np.split(order[by_object], begins[1:]) if len(order) else ())
+            for first in range(0, len(group), UNIT_TRIANGLES)
         ]
 
         def compute(unit: WorkUnit, stop: threading.Event) -> NDArray[np.bool_]:
-            triangle = unit.points.astype(np.int32)
-            objects = geometry.objects.take(triangle)
-            planes = triangle_planes(geometry, objects, triangle, np.zeros(len(triangle), bool))
-            return self.occluders[unit.object].clusters.is_open(*planes)
+            def planes(index: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
+                triangle = unit.points[index].astype(np.int32)
+                own = geometry.objects.take(triangle)
+                return triangle_planes(geometry, own, triangle, np.zeros(len(triangle), bool))
+
+            return self.occluders[unit.object].clusters.is_open(len(unit.points), planes)
 
         open_triangles = np.zeros(len(geometry.triangles), bool)
         for index, is_open in self._run("horizon", units, compute):

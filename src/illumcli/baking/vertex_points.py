@@ -83,6 +83,9 @@ class VertexPoints(Points):
         turn = (place * total[:, None]).ravel() - begins[holder]
         turn = turn.clip(0, angle[holder]).astype(F)
 
+        # where it starts; of the wedges, only those that are needed if these are few
+        if len(holder) < len(wedge):
+            wedge, holder = wedge[holder], np.arange(len(holder))
         base, ahead, aside, ng = self._insets(wedge)
         starts = take_rows(base, holder)
         starts += np.cos(turn)[:, None] * take_rows(ahead, holder)

@@ -9,6 +9,8 @@ of neighbours, so that on a convex surface a group visits some hundreds of clust
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +42,9 @@ CLEARANCE = 1e-5
 """Height above a plane below which the cheap tests, in single precision, decide nothing [radii]."""
 BOUND_ROUNDING = 1e-12
 """Enlargement of slabs, so that bounds hold in spite of rounding [radii]."""
+
+PlanesAt: TypeAlias = Callable[[NDArray[np.int64]], tuple[Vectors, Vectors]]
+"""Points, (K, 3), and unit normals, (K, 3), of planes by their numbers, (K,)."""
 
 
 class Slabs(Record):
@@ -91,36 +96,36 @@ class ClusterTree:
                 self._levels = levels
         return self._levels
 
-    def is_open(self, origins: Vectors, n: Vectors) -> NDArray[np.bool_]:
-        """(M,) True where no occluder reaches above the plane through an origin with unit normal `n`.
+    def is_open(self, count: int, planes: PlanesAt) -> NDArray[np.bool_]:
+        """(count,) True where no occluder reaches above a plane.
 
-        False may also mean undecided, if the point's group would visit more than `MAX_CLUSTERS`.
+        False may also mean undecided, if the plane's group would visit more than `MAX_CLUSTERS`.
 
         Parameters
         ----------
-        origins : (M, 3)
-            Origins of rays, above the surface by more than the rounding of this test [radii]. Consecutive
-            points should be close together.
+        planes
+            Origins of planes, above the surface by more than the rounding of this test [radii], and unit
+            normals; asked only for those that are tested. Consecutive planes should be close together.
         """
         if not len(self._points):
-            return np.ones(len(origins), bool)
+            return np.ones(count, bool)
 
         # Test a sample of the groups first.
-        group = np.arange(len(origins)) // GROUP
+        group = np.arange(count) // GROUP
         is_trial = group % TRIAL_STEP == 0
-        out = np.zeros(len(origins), bool)
-        self._test(out, np.flatnonzero(is_trial), origins, n)
+        out = np.zeros(count, bool)
+        self._test(out, np.flatnonzero(is_trial), planes)
 
-        # Test the neighbours of groups that have an open point.
+        # Test the neighbours of groups that have an open plane.
         promising = np.bincount(group // TRIAL_STEP, out) > 0
-        self._test(out, np.flatnonzero(~is_trial & promising[group // TRIAL_STEP]), origins, n)
+        self._test(out, np.flatnonzero(~is_trial & promising[group // TRIAL_STEP]), planes)
         return out
 
-    def _test(self, out: NDArray[np.bool_], points: NDArray[np.int64], origins: Vectors, n: Vectors) -> None:
-        """Write the results for these points into `out`, a batch at a time."""
-        for first in range(0, len(points), GROUP * GROUPS_AT_ONCE):
-            batch = points[first : first + GROUP * GROUPS_AT_ONCE]
-            o, up = np.asarray(origins[batch], np.float64), np.asarray(n[batch], np.float64)
+    def _test(self, out: NDArray[np.bool_], index: NDArray[np.int64], planes: PlanesAt) -> None:
+        """Write the results for these planes into `out`, a batch at a time."""
+        for first in range(0, len(index), GROUP * GROUPS_AT_ONCE):
+            batch = index[first : first + GROUP * GROUPS_AT_ONCE]
+            o, up = (np.asarray(each, np.float64) for each in planes(batch))
             out[batch] = self._tested(o, up)
 
     def _tested(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -124,6 +124,15 @@ def test_formulas_of_overrides(illum, film):
     assert (film / "s2.png").read_bytes() == (film / "2-0.5.png").read_bytes()
 
 
+def test_a_turntable_of_a_mesh(illum, film):
+    (film / "m.obj").write_text(MESH.format(0))
+    words = ("-D", "studio.view=[10*frame, 20]", "-D", "film={width: 16, height: 9, samples: 1}")
+    done = illum("render", "m.obj", *words, "--frames", "0:9:9")
+    assert written(done) == ["m.0000.png", "m.0009.png"], done.stderr
+    illum("render", "m.obj", "--view", "90,20", *words[2:], "-o", "side.png")
+    assert (film / "side.png").read_bytes() == (film / "m.0009.png").read_bytes()
+
+
 def test_a_fault_of_frames_is_told_once_and_the_others_are_rendered(illum, film):
     words = ("film.yaml", "-D", "ambient.keys.3=-0.5", "-D", "seed=7")
     done = illum("render", *words)

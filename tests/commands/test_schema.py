@@ -51,6 +51,41 @@ def test_a_scene_that_extends_another_need_not_be_whole(text):
 @pytest.mark.parametrize(
     "text",
     [
+        "ambient: {curve: linear, keys: {0: 0, 24: [1, 0, 1]}}",
+        "ambient: {form: coupled, color: {curve: smooth, over: time, keys: {0.5: '#fff', 1: 0}}}",
+        "seed: {curve: formula, value: frame}",
+        "camera: {position: [{curve: formula, value: 'cos(time)'}, 2, 3], fov: {curve: step, keys: {0: 30}}}",
+        "camera: {curve: step, keys: {0: {fov: 30}}}",
+        "lights: [{light: point, position: {curve: column, file: a.csv, column: [x, y, z]}}]",
+        "objects: [{mesh: {file: {curve: sequence, file: a.#.obj, number: 'mod(frame, 3)'}}}]",
+        "materials: {a: {model: phong, diffuse: {texture: {curve: step, keys: {0: a.png}}}}}",
+        "outputs: {layers: [{curve: step, keys: {0: depth}}]}",
+    ],
+)
+def test_any_value_may_be_a_curve(text):
+    assert faults(f"version: 1\nframes: {{last: 9}}\n{text}") == []
+    assert faults(f"extends: a.yaml\n{text}") == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "version: {curve: step, keys: {0: 1}}",
+        "version: 1\nframes: {last: {curve: step, keys: {0: 1}}}",
+        "version: 1\nframes: {first: 3}",
+        "version: 1\nseed: {curve: formla, value: frame}",
+        "version: 1\nseed: {curve: step, keys: {a: 1}}",
+        "version: 1\nseed: {curve: linear}",
+        "version: 1\nlights: [{light: {curve: step, keys: {0: point}}, position: [0, 0, 0]}]",
+    ],
+)
+def test_what_is_no_curve_is_refused(text):
+    assert faults(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
         "seed: 1",
         "version: 1\nlights: [{light: point}]",
         "version: 1\nmaterials: {a: {exponent: 3}}",

@@ -136,6 +136,8 @@ def test_formulas_compute_and_do_nothing_else():
     assert at_frame("a", "sqrt(frame)", 9) == "3"
     assert at_frame("a", "[1, [frame, max(frame, 4)]]", 3) == "[1, [3, 4]]"
     assert at_frame("a", "framework", 3) == "framework"
+    assert at_frame("a", "'frame.obj'", 3) == "'frame.obj'"
+    assert at_frame("a", "time * 2", 3, fps=12) == "0.5"
     for wrong in ("frame.real", "__import__('os') + frame", "1/(frame-3)", "frame +"):
         with pytest.raises(InputError, match="a="):
             at_frame("a", wrong, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from illumcli.render_graph.keys import content_key
 from illumcli.scene.access import refuse_outside
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
+from illumcli.scene.studio import STUDIO
 
 
 def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[Layer, ...]) -> list[Target]:
@@ -26,7 +28,7 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
     anywhere.
     """
     given = job.options.pattern
-    patterns = (given,) if given else file_patterns(job, graph.scene)
+    patterns = (given,) if given else file_patterns(job, loaded, graph.scene)
     targets = []
     for view in graph.views:
         if job.cameras and view.name not in job.cameras:
@@ -46,15 +48,18 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
     return targets
 
 
-def file_patterns(job: RenderJob, scene: Scene) -> tuple[str, ...]:
-    """Name patterns of the scene; the default one has the number of the frame, if there are frames."""
+def file_patterns(job: RenderJob, loaded: SceneFile, scene: Scene) -> tuple[str, ...]:
+    """Name patterns of the scene; those that its author did not choose have the number of the frame, if there
+    are frames."""
     frames = [
         *([] if job.frame is None else [job.frame]),
         *(scene.frames.numbers[-1:] if scene.frames else ()),
     ]
-    if not frames or "files" in scene.outputs.model_fields_set:
+    written = loaded.tree.find(("outputs", "files"))
+    if not frames or (written is not None and written.place.source != str(STUDIO)):
         return scene.outputs.files
-    return ("{scene}.{camera}" + frame_field(frames) + ".png",)
+    names = [os.path.splitext(pattern) for pattern in scene.outputs.files]
+    return tuple(f"{stem}{frame_field(frames)}{suffix}" for stem, suffix in names)
 
 
 def expanded(pattern: str, job: RenderJob, loaded: SceneFile, view: View, layer: str) -> Path:

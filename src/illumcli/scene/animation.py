@@ -115,7 +115,7 @@ def at_frame(tree: Node, frame: int | None, surroundings: Surroundings) -> AtFra
     if frame is not None:
         moment = Moment(frame, frame / (frames.fps if frames else FRAMES_PER_SECOND))
     evaluation = _Evaluation(moment, surroundings)
-    tree = evaluation.node(tree, ())
+    tree = evaluation.node(tree, ()) if _may_vary(tree) else tree
     if moment is None and "frames" in (tree.value if isinstance(tree.value, dict) else ()):
         evaluation.problems.clear()  # these frames are faulty, which the validation of the scene reports
     return AtFrame(
@@ -130,6 +130,16 @@ def overrides_of_frame(loaded: SceneFile) -> list[str]:
         f"{'.'.join(map(str, path))}={flow(None if node is None else node.plain())}"
         for path, node in values.items()
     ]
+
+
+def _may_vary(node: Node) -> bool:
+    """False if no part of a node is a curve or the path of a sequence."""
+    value = node.value
+    if isinstance(value, dict):
+        return TAG in value or any(map(_may_vary, value.values()))
+    if isinstance(value, list):
+        return any(map(_may_vary, value))
+    return isinstance(value, str) and "#" in value
 
 
 class _Evaluation:

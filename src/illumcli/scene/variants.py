@@ -192,9 +192,9 @@ def split_at_commas(text: str) -> list[str]:
 
 
 def at_frame(path: str, value: str, frame: int, fps: float = FRAMES_PER_SECOND) -> str:
-    """`value` with every formula of `frame` and `time` evaluated."""
+    """`value` with every formula of `frame` and `time` evaluated; text in quotes and mappings have none."""
     text = value.strip()
-    if not re.search(r"\b(frame|time)\b", text) or text.startswith("{"):
+    if not re.search(r"\b(frame|time)\b", text) or text.startswith(("{", '"', "'")):
         return text
     if text.startswith("[" * MAX_DEPTH):
         raise InputError(f"-D {path}={short(value)}: nested deeper than {MAX_DEPTH} levels")

@@ -19,6 +19,7 @@ SCRIPTS = {
     "scaling": "peak [MiB]",
     "growth": "exponent time",
     "memory": "cpu per pixel",
+    "instances": "memory / one",
     "replay": "ratio whole / rays alone",
     "packets": "\n0 of ",
     "adaptive": "to full: RMSE",

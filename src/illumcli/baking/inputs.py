@@ -102,7 +102,7 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     clock = StageClock()
     is_mesh = is_mesh_file(path)
     loaded = mesh_alone(path, options.overrides) if is_mesh else load(path, options.overrides)
-    expected = expected_memory(loaded, loaded.scene)
+    expected = expected_memory(loaded, loaded.scene, shares_meshes=False)
     expected.pop("textures", None)  # no bake reads them
     refuse_memory(0, 0, 0, expected, str(path))
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import row_blocks
+from illumcli.geometry.extent import Extent, box_corners, extents, take_used, used_vertices
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import blocks
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
+
+SQRT3 = 3**0.5
+"""Greatest ratio of the diagonal of a box around points to the distance of two of them."""
 
 
 class ObjectBounds(Record):
@@ -26,15 +31,22 @@ class ObjectBounds(Record):
     render_space: RenderSpace
 
 
-def object_bounds(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> ObjectBounds:
-    """The bounds of mesh i under matrix i.
+def object_bounds(
+    meshes: Sequence[Mesh],
+    matrices: Sequence[NDArray[np.float64]],
+    known: Mapping[int, Extent] | None = None,
+) -> ObjectBounds:
+    """The bounds of mesh i under matrix i; `known` are the meshes' `extents`, if they are.
 
     The render space has the centre of the box around all objects, and half its diagonal as its radius.
     """
     # A box for each object.
+    of_mesh = extents(meshes) if known is None else known
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
     for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
-        if len(mesh.corners):
+        if extent := of_mesh.get(id(mesh)):
+            low[number], high[number] = extent.box(matrix[:3, :3], matrix[:3, 3])
+        elif len(mesh.corners):
             low[number], high[number] = _transformed_box(mesh, matrix)
 
     # The box around all of them; a point at the origin where there are no polygons.
@@ -60,28 +72,6 @@ def _transformed_box(
     ]
     low, high = (np.stack(each) for each in zip(*parts, strict=True))
     return low.min(axis=0), high.max(axis=0)
-
-
-def box_corners(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner, (3,) each, of the box around (N, 3) points; the origin if there are none."""
-    if not len(points):
-        return np.zeros(3), np.zeros(3)
-    # By columns: along the other axis numpy processes three numbers at a time.
-    low, high = ([reach(column) for column in points.T] for reach in (np.min, np.max))
-    return np.array(low), np.array(high)
-
-
-def take_used(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The points, of (V, 3) for all vertices of the mesh, whose vertices polygons use."""
-    mask = used_vertices(mesh)
-    return points if mask.all() else points[mask]
-
-
-def used_vertices(mesh: Mesh) -> NDArray[np.bool_]:
-    """(V,) True for vertices that polygons use."""
-    mask = np.zeros(len(mesh.vertices), np.bool_)
-    mask[mesh.corners] = True
-    return mask
 
 
 def transformed_vertices(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,8 +113,16 @@ def implied_widths(
 ) -> NDArray[np.float64]:
     """(O,) largest polygon diagonal of each object whose normals imply a smooth surface, otherwise 0.
 
-    It is an upper bound on the shadow-ray offset of each object [scene units].
+    It is an upper bound on the shadow-ray offset of each object [scene units]. For a mesh of several objects
+    it is larger than needed: its widest polygon, turned and stretched as if it were the diagonal of a cube.
     """
-    each = zip(flat, meshes, object_bounds.matrices, strict=True)
-    widths = [0.0 if is_flat else widest_polygon(mesh, matrix) for is_flat, mesh, matrix in each]
-    return np.array(widths, np.float64)
+    count = Counter(map(id, meshes))
+    shared = {key: mesh for mesh in meshes if count[key := id(mesh)] > 1}
+    widest = {key: SQRT3 * widest_polygon(mesh, np.eye(4)) for key, mesh in shared.items()}
+    widths = np.zeros(len(meshes))
+    for i, (is_flat, mesh, matrix) in enumerate(zip(flat, meshes, object_bounds.matrices, strict=True)):
+        if not is_flat and id(mesh) in widest:
+            widths[i] = widest[id(mesh)] * np.linalg.norm(matrix[:3, :3], 2)
+        elif not is_flat:
+            widths[i] = widest_polygon(mesh, matrix)
+    return widths

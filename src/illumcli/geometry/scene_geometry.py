@@ -13,6 +13,7 @@ from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, row_bl
 from illumcli.geometry.bounds import ObjectBounds, object_bounds, transformed_blocks
 from illumcli.geometry.corner_normals import CornerNormals
 from illumcli.geometry.corner_normals import corner_normals as mesh_corner_normals
+from illumcli.geometry.extent import extents
 from illumcli.geometry.instances import Instances, instance_matrix, instances, shared_meshes
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import polygon_normals as mesh_polygon_normals
@@ -170,8 +171,12 @@ def without_culled(culled: Collection[int], meshes: Sequence[Mesh]) -> tuple[Mes
 
 def bounds_of(transforms: Sequence[Any], meshes: Sequence[Mesh]) -> ObjectBounds:
     """The bounds of mesh i under transform i (`scene.spec.Transform`)."""
-    each = zip(transforms, meshes, strict=True)
-    return object_bounds(meshes, [transform_matrix(transform, mesh) for transform, mesh in each])
+    of_mesh = extents(meshes)
+    matrices = [
+        transform_matrix(transform, mesh, of_mesh.get(id(mesh)))
+        for transform, mesh in zip(transforms, meshes, strict=True)
+    ]
+    return object_bounds(meshes, matrices, of_mesh)
 
 
 def place_meshes(meshes: Sequence[Mesh], matrices: Sequence[NDArray[np.float64]]) -> SceneGeometry:

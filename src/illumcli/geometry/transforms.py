@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import cross
-from illumcli.geometry.bounds import box_corners, take_used
+from illumcli.geometry.extent import Extent, box_corners, take_used
 from illumcli.geometry.mesh import Mesh
 
 
@@ -27,13 +27,19 @@ class Transform(Protocol):
     def matrix(self) -> tuple[tuple[float, float, float, float], ...] | None: ...  # rows, applied last
 
 
-def transform_matrix(transform: Transform, mesh: Mesh) -> NDArray[np.float64]:
-    """(4, 4) float64, object to scene: scale, rotate about x, y, z, fit, translate, then the matrix."""
+def transform_matrix(transform: Transform, mesh: Mesh, extent: Extent | None = None) -> NDArray[np.float64]:
+    """(4, 4) float64, object to scene: scale, rotate about x, y, z, fit, translate, then the matrix.
+
+    `extent` is that of the mesh, if it is known.
+    """
     matrix = np.diag([*transform.scale, 1.0])
     for axis, degrees in enumerate(transform.rotate):
         matrix = rotation(axis, degrees) @ matrix
     if transform.fit is not None and len(mesh.corners):
-        low, high = box_corners(take_used(mesh, mesh.vertices) @ matrix[:3, :3].T)
+        if extent is None:
+            low, high = box_corners(take_used(mesh, mesh.vertices) @ matrix[:3, :3].T)
+        else:
+            low, high = extent.box(matrix[:3, :3])
         size = transform.fit / (np.linalg.norm((high - low) / 2) or 1.0)
         matrix[:3, :3] *= size
         matrix[:3, 3] = -size * np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major
-from illumcli.geometry.bounds import ObjectBounds, take_used, transformed_vertices
+from illumcli.geometry.bounds import ObjectBounds, transformed_vertices
+from illumcli.geometry.extent import take_used
 from illumcli.geometry.mesh import Mesh
 from illumcli.rays.viewpoints import Camera, PixelFilter, Point
 from illumcli.records import Record

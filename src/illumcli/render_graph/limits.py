@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from illumcli.errors import InputError, LimitError
+from illumcli.geometry.instances import MOST_STRETCH
 from illumcli.geometry.shapes._base import TRIANGLE_BYTES, Shape
 from illumcli.layers import Layer
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.mesh_files import companions
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
+from illumcli.render_graph import needs
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.explain import expected_rays
-from illumcli.render_graph.needs import imports
 from illumcli.render_graph.schedule import reached
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
-from illumcli.scene.spec import MeshFile, Scene
+from illumcli.scene.spec import MeshFile, Object, Scene
 
 BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
 """Memory of a mesh per byte of its file; a triangle takes 80 bytes of text, or 43 of binary."""
@@ -33,31 +37,51 @@ DENSEST = 20
 """Upper bound on the compression ratio of an image."""
 
 
-def expected_memory(loaded: SceneFile, scene: Scene) -> dict[str, int]:
+def expected_memory(loaded: SceneFile, scene: Scene, shares_meshes: bool = True) -> dict[str, int]:
     """Memory of a scene's shapes, mesh files and textures [bytes], from counts, file sizes and image headers.
 
-    Missing files and files that are not images count as 0; their readers check each of them. Of images that
-    mesh files name, those count that materials may use; images inside a mesh file are part of its size.
+    A mesh that objects share counts for two of them, since it may be stored with its mirror image; each
+    counts if not `shares_meshes`. Missing files and files that are not images count as 0; their readers check
+    each of them. Of images that mesh files name, those count that materials may use; images inside a mesh
+    file are part of its size.
     """
     sizes = {"shapes": 0, "meshes": 0, "textures": 0}
     of_file: dict[Path, int] = {}  # each file is looked at once
     importing: dict[Path, None] = {}
+    shared: Counter[str] = Counter()
     for thing in scene.objects:
+        name, is_sharing = (
+            needs.mesh_name(scene, thing.mesh),
+            shares_meshes and _stretch(thing) <= MOST_STRETCH,
+        )
+        shared[name] += is_sharing
+        is_stored = not is_sharing or shared[name] <= 2
         source = scene.meshes.get(thing.mesh, thing.mesh) if isinstance(thing.mesh, str) else thing.mesh
         if isinstance(source, Shape):
-            sizes["shapes"] += TRIANGLE_BYTES * source.triangles()
+            sizes["shapes"] += TRIANGLE_BYTES * source.triangles() if is_stored else 0
             continue
         path = loaded.folder / (source.file if isinstance(source, MeshFile) else str(source))
         if path not in of_file:
             factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
             of_file[path] = factor * path.stat().st_size if path.is_file() else 0
-        sizes["meshes"] += of_file[path]
-        if imports(scene, thing):
+        sizes["meshes"] += of_file[path] if is_stored else 0
+        if needs.imports(scene, thing):
             importing[path] = None
     images = dict.fromkeys(image for path in importing for image in _images_of(path))
     sizes["textures"] = sum(_texture_bytes(loaded, texture) for texture in _textures(scene))
     sizes["textures"] += sum(_image_bytes(image) for image in images)
     return {name: count for name, count in sizes.items() if count}
+
+
+def _stretch(thing: Object) -> float:
+    """Upper bound on the ratio of the axes of an object's transform."""
+    axes = np.abs(thing.transform.scale)
+    if not axes.min():
+        return np.inf
+    of_matrix = 1.0
+    if thing.transform.matrix is not None:
+        of_matrix = float(np.linalg.cond(np.asarray(thing.transform.matrix)[:3, :3]))
+    return float(axes.max() / axes.min()) * of_matrix
 
 
 def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:

@@ -288,6 +288,8 @@ def test_slider(page, tmp_path):
 def test_difference(page):
     page.compare(3, 20, "difference")
     a, b = (from_srgb(painted(number) / 255) / 2 for number in (3, 20))
+    gain = 2 ** float(page.one("#gain").get_attribute("value"))
+    assert 0.5 < gain * np.abs(b - a).max() <= 1
     page.set("#gain", "0")
     expected = 255 * to_srgb(np.abs(b - a)[5, 4])
     np.testing.assert_allclose(pixel(page, "d", 4, 5), expected, atol=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from illumcli.html_report.columns import measures_of, parameters_of, short_labels
+from illumcli.html_report.columns import measures_of, parameters_of, short_labels, short_numbers
 from illumcli.html_report.entries import Contents, Entry
 
 
@@ -22,6 +22,12 @@ def test_numbers_are_in_their_order_and_texts_as_they_come():
     assert numbers.is_numeric
     assert texts.values == ("ward", "phong")
     assert not texts.is_numeric
+
+
+def test_numbers_are_shown_with_as_few_digits_as_tell_them_apart():
+    assert short_numbers(["0.0666666666667", "0.2", "512"]) == ("0.06667", "0.2", "512")
+    assert short_numbers(["0.1234561", "0.1234562"]) == ("0.1234561", "0.1234562")
+    assert short_numbers(["1000000", "100000"]) == ("1e+06", "1e+05")
 
 
 def test_a_path_that_does_not_vary_is_no_parameter():

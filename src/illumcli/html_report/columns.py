@@ -18,6 +18,8 @@ class Parameter(Value):
     """The shortest end of the path that no other parameter shares."""
     values: tuple[str, ...]
     """Every value once: numbers in their order, others as they come first."""
+    texts: tuple[str, ...]
+    """The values as they are shown: numbers with as few digits as tell them apart."""
     at: tuple[int, ...]
     """For each variant the index of its value; -1 if it has none."""
     is_numeric: bool
@@ -70,6 +72,15 @@ def short_labels(paths: Sequence[str]) -> list[str]:
     return [next((end for end in _ends(path) if ends[end] == 1), path) for path in paths]
 
 
+def short_numbers(values: Sequence[str]) -> tuple[str, ...]:
+    """Numbers with as few digits, at least four, as tell them apart; none is longer than it was."""
+    for digits in range(4, 17):
+        texts = tuple(min(value, f"{float(value):.{digits}g}", key=len) for value in values)
+        if len(set(texts)) == len(values):
+            return texts
+    return tuple(values)
+
+
 def _ends(path: str) -> list[str]:
     parts = path.split(".")
     return [".".join(parts[k:]) for k in reversed(range(len(parts)))]
@@ -87,7 +98,8 @@ def _parameter(path: str, label: str, values: tuple[str, ...], entries: Sequence
         values = tuple(sorted(values, key=float))
     index = {value: k for k, value in enumerate(values)}
     at = tuple(index.get(entry.values.get(path, ""), -1) for entry in entries)
-    return Parameter(path, label, values, at, is_numeric)
+    texts = short_numbers(values) if is_numeric else values
+    return Parameter(path, label, values, texts, at, is_numeric)
 
 
 def _number(text: str) -> float | None:

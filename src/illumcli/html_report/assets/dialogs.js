@@ -93,7 +93,10 @@ function openCompare(a, b) {
     slot.replaceChildren(el("b", {}, slot.dataset.slot.toUpperCase()), step(-1, "Previous", "←"),
       el("span", { class: "name", title: label }, label), step(1, "Next", "→"));
   }
-  compareStage.show(a, b).then(setMode);
+  compareStage.show(a, b).then(() => {
+    if (!gainIsChosen) $("#gain").value = suitableGain();
+    setMode();
+  });
 }
 
 // Goes to the next variant in the order of the view that has a picture.
@@ -120,6 +123,14 @@ function setMode() {
   runFlicker(mode() === "flicker" && !calm.matches);
 }
 
+// The exponent of a gain that brings the largest difference near to white, until the user chooses one.
+let gainIsChosen = false;
+
+function suitableGain() {
+  const largest = compareStage.bounds?.largest || 1;
+  return clamp(Math.floor(-Math.log2(largest)), 0, 10);
+}
+
 function setGain() {
   const gain = 2 ** Number($("#gain").value);
   $("output[for=gain]").textContent = `${gain} ×`;
@@ -143,7 +154,7 @@ function flick() {
 
 $("#modes").addEventListener("change", setMode);
 $("#split").addEventListener("input", (event) => compareStage.setSplit(event.target.value / 100));
-$("#gain").addEventListener("input", setGain);
+$("#gain").addEventListener("input", () => { gainIsChosen = true; setGain(); });
 $("#zoom").addEventListener("change", (event) => compareStage.setZoom(Number(event.target.value)));
 $("#swap").addEventListener("click", swap);
 $("#largest").addEventListener("click", () => {

@@ -47,11 +47,11 @@ class Grid {
     Object.assign(this, { drawn, drawnCells: this.cells, drawnSize: x });
 
     const columns = range(left, right);
-    const corner = el("span", { role: "columnheader", class: "corner", "aria-colindex": 1 },
-      this.down ? `${this.down.label} ↓ ` : "", `${this.across.label} →`);
+    const axes = `${this.down ? `${this.down.label} ↓ ` : ""}${this.across.label} →`;
+    const corner = el("span", { role: "columnheader", class: "corner", "aria-colindex": 1, title: axes }, axes);
     const heads = columns.map((c) => el("span", {
       role: "columnheader", class: "head", "aria-colindex": c + 2,
-    }, this.across.values[this.columns[c]]));
+    }, this.across.texts[this.columns[c]]));
     heads.forEach((node, k) => { node.style.left = `${side + columns[k] * x}px`; });
     const rows = range(top, bottom).map((r) => this.#row(r, columns));
     this.table.replaceChildren(el("div", { role: "row", class: "heads", "aria-rowindex": 1 }, corner, ...heads), ...rows);
@@ -60,7 +60,7 @@ class Grid {
 
   #row(r, columns) {
     const { x, y, head, side } = this.size;
-    const name = this.down ? this.down.values[this.rows[r]] : "";
+    const name = this.down ? this.down.texts[this.rows[r]] : "";
     const cells = columns.map((c) => {
       const [index, ...more] = this.cells.get(`${this.columns[c]},${this.rows[r]}`) ?? [];
       const cell = el("span", { role: "gridcell", class: "cell", "aria-colindex": c + 2 },

@@ -34,6 +34,7 @@ const app = {
     $("#sizing").hidden = name === "table";
     app.view = new VIEWS[name](main);
     app.update();
+    main.classList.toggle("small", app.size < 140);
     if (app.active >= 0) app.view.reveal(app.active);
   },
 
@@ -104,7 +105,11 @@ $("#filters-toggle").addEventListener("click", (event) => {
 $("#views").addEventListener("change", (event) => app.setView(event.target.value));
 $("#sort").addEventListener("change", (event) => app.sortBy(event.target.value, app.sort.descending));
 $("#direction").addEventListener("click", () => app.sortBy(app.sort.key, !app.sort.descending));
-$("#size").addEventListener("input", (event) => { app.size = Number(event.target.value); app.view.layout(); });
+$("#size").addEventListener("input", (event) => {
+  app.size = Number(event.target.value);
+  main.classList.toggle("small", app.size < 140);
+  app.view.layout();
+});
 $("#picture")?.addEventListener("change", (event) => { app.picture = Number(event.target.value); app.update(); });
 main.addEventListener("scroll", oncePerFrame(() => app.view.draw()), { passive: true });
 new ResizeObserver(oncePerFrame(() => app.view?.layout())).observe(main);
@@ -117,7 +122,7 @@ function showAxes() {
     const p = Number(group.dataset.held);
     group.hidden = p === x || p === y;
     $("input", group).value = held[p];
-    $("output", group).textContent = held[p] < 0 ? "any" : REPORT.parameters[p].values[held[p]];
+    $("output", group).textContent = held[p] < 0 ? "any" : REPORT.parameters[p].texts[held[p]];
   }
 }
 

@@ -8,7 +8,7 @@ class Table {
       { key: "", name: "#", text: (k) => String(k + 1) },
       ...REPORT.parameters.map((each, p) => ({
         key: `p${p}`, name: each.label, title: each.path, number: each.numeric,
-        text: (k) => (each.at[k] < 0 ? "" : each.values[each.at[k]]),
+        text: (k) => (each.at[k] < 0 ? "" : each.texts[each.at[k]]),
       })),
       { key: null, name: "state", text: (k) => REPORT.states[k] },
       ...REPORT.measures.map((each) => ({

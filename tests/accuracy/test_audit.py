@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.audit import Audit, AuditedError, audited_layer, drawn, pixel_chances
+from illumcli.accuracy.sampled_blocks import SampledBlocks
 from illumcli.files.seal import is_sealed
+from illumcli.film.tiles import tiles
 from illumcli.images.png import read_texts
 from illumcli.images.reader import read_metadata
 from illumcli.render_graph.execute import Run, bands, run_once
@@ -128,6 +130,33 @@ def test_pixels_that_are_drawn_again_get_other_rays(path, samples):
     for seed in range(4):
         _, stated = audited(path, *overrides, f"seed={seed}")
         assert 0 < stated.low < stated.rmse < stated.high
+
+
+def test_large_pictures_are_audited_in_blocks(path, monkeypatch):
+    """The film has columns and rows beyond whole blocks."""
+    film = ("film.width=100", "film.height=77")
+    _, whole = audited(path, *film)
+    monkeypatch.setattr("illumcli.accuracy.sampled_blocks.MOST_PIXELS", 4000)
+    _, sampled = audited(path, *film)
+    _, other = audited(path, *film, threads=2, side=24)
+    assert sampled == other
+    assert sampled != whole
+    assert sampled.rmse == pytest.approx(whole.rmse, rel=0.25)
+
+
+def test_blocks_hold_the_pixels_of_their_places(path, monkeypatch):
+    monkeypatch.setattr("illumcli.accuracy.sampled_blocks.MOST_PIXELS", 2000)
+    view = planned(load(path, ("film.width=61", "film.height=83"))).view
+    blocks = SampledBlocks.of(view, 1, 3)
+    numbers = np.arange(61 * 83, dtype=np.float32).reshape(83, 61, 1)
+    for row in tiles(61, 83, 13, 1):
+        for tile in row:
+            rows, columns = slice(tile.y, tile.y + tile.height), slice(tile.x, tile.x + tile.width)
+            blocks.take(tile, numbers[rows, columns])
+    index = np.flatnonzero(blocks.is_inside)
+    x, y = blocks.pixels(index)
+    assert 1000 < len(index) < 3000
+    np.testing.assert_array_equal(blocks.values.ravel()[index], y * 61 + x)
 
 
 def test_the_report_and_the_terminal_state_it(path, illum, tmp_path):

@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats
+from illumcli.accuracy.sampled_blocks import SampledBlocks
+from illumcli.arrays import Floats
 from illumcli.film.tiles import Samples, Scattered, Tile
 from illumcli.film.view import View
 from illumcli.graph import Node
@@ -39,8 +40,6 @@ from illumcli.visibility.obscurance import obscurance_method
 
 FEWEST_PILOTS, MOST_PILOTS = 1800, 7200
 """Pixels whose errors determine how many more are audited, with how many rays: one in 512, within these."""
-LARGEST = 1 << 24
-"""Pixels of a picture that is audited, at most: its layer is held in memory."""
 PRECISION = 0.04
 """Relative standard error of the stated error that the number of pixels is chosen for."""
 RAYS = 128
@@ -93,7 +92,7 @@ class Audit(Record):
     plan: Plan
     layer: Layer
     seed: int
-    picture: NDArray[np.float32]  # (H, W, channels) filled tile by tile
+    picture: SampledBlocks
     camera_samples: int | None
     """Of each of C and D, over the pixel filter; None: at the places of the picture's own."""
     precision: float = PRECISION
@@ -104,13 +103,12 @@ class Audit(Record):
         view = plan.view
         samples = view.samples * view.stands_for
         camera_samples = max(samples, CAMERA_SAMPLES) if samples > 1 else None
-        picture = np.empty((view.height, view.width, len(layer.channels)), F)
+        picture = SampledBlocks.of(view, len(layer.channels), seed)
         return cls(plan, layer, seed, picture, camera_samples)
 
     def take(self, tile: Tile, layers: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a finished tile; any thread."""
-        rows, columns = slice(tile.y, tile.y + tile.height), slice(tile.x, tile.x + tile.width)
-        self.picture[rows, columns] = layers[self.layer.name]
+        self.picture.take(tile, layers[self.layer.name])
 
     def error(self, shared: Mapping[str, Any], run: Run) -> AuditedError:
         """The error of the picture, of which every tile was taken.
@@ -123,7 +121,8 @@ class Audit(Record):
             The buffers of the whole scene.
         """
         buffers = dict(shared)
-        chances = pixel_chances(self.picture)
+        chances = pixel_chances(self.picture.values) * self.picture.is_inside
+        chances /= chances.sum()
 
         # The pilot: how large the error is, how unevenly it is spread, and how noisy C and D are.
         number = min(max(chances.size // 512, FEWEST_PILOTS), MOST_PILOTS)
@@ -160,10 +159,10 @@ class Audit(Record):
             unit_interval(hashed(stream(self.seed, f"audit pixels:{purpose}"), np.zeros(1, np.uint32)))[0]
         )
         pixel = drawn(chances, number, start)
-        y, x = np.divmod(pixel, self.picture.shape[1])
+        x, y = self.picture.pixels(pixel)
         c, d = (self._fresh(x, y, rays, f"{purpose}:{half}", buffers, run) for half in ("c", "d"))
-        own = self.picture[y, x].astype(np.float64)
-        weights = 1 / (chances[pixel] * chances.size * number)
+        own = self.picture.values.reshape(chances.size, -1)[pixel].astype(np.float64)
+        weights = 1 / (chances[pixel] * np.count_nonzero(self.picture.is_inside) * number)
         return ((own - c) * (own - d)).mean(axis=1), weights, float(np.square(c - d).mean()) / 2
 
     def _fresh(
@@ -220,7 +219,7 @@ def drawn(chances: NDArray[np.float64], number: int, start: float) -> NDArray[np
 def audited_layer(plan: Plan) -> Layer | None:
     """The layer whose error is stated: the beauty, else the first mean of samples that reconstructed
     obscurance is part of; None where there is none."""
-    if "raw_obscurance" not in plan.graph.nodes or plan.view.width * plan.view.height > LARGEST:
+    if "raw_obscurance" not in plan.graph.nodes:
         return None
     graph = plan.graph.without_loaders()
     means = [

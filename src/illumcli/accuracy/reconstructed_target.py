@@ -13,7 +13,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from illumcli.accuracy.audit import CAMERA_SAMPLES, LARGEST, PRECISION, Audit, AuditedError, audited_layer
+from illumcli.accuracy.audit import CAMERA_SAMPLES, PRECISION, Audit, AuditedError, audited_layer
 from illumcli.accuracy.target import ATTEMPTS, MARGIN, SAMPLE_COST, count_overrides
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
@@ -48,6 +48,8 @@ MOST_PIXEL_SAMPLES, MOST_RAYS = 256, 256
 """Samples per pixel, and obscurance rays, that are tried; beyond them fits gain little on rays alone."""
 PRECISIONS = {"choice": 0.06, "fit": 0.15, "statement": PRECISION}
 """Relative standard errors of what audits are for."""
+LARGEST = 1 << 24
+"""Pixels of a picture that is tried, at most: its buffers are held in memory."""
 
 
 class ReconstructedChoice(Record):

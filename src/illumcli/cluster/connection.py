@@ -19,6 +19,8 @@ PATIENCE = 300.0
 """Seconds that a lost scheduler, or the first worker, is waited for."""
 TIMEOUT = 15.0
 """Seconds that one attempt to connect takes at most."""
+IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+"""What local workers run first: an interrupt reaches all processes of a terminal; the client handles it."""
 LONGEST_TASK = "24 hours"
 """Silence after which a local worker counts as dead. Whether its process lives is seen at once."""
 
@@ -61,6 +63,7 @@ class Connection:
             host="127.0.0.1",
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
+            preload=[IGNORE_INTERRUPTS],
         )
 
     def _connected(self, until: float) -> Client:

@@ -57,10 +57,9 @@ class Session:
         if not self._is_mixed and not self._address.local:
             refuse_differences(facts(), client.run(facts))
         token = {} if self._token is None else {self._token: file_digest(self._token)}
-        command = Command(
-            self._name, str(Path.cwd()), token, facts(), self._is_mixed, os.environ.get("ILLUM_ALLOW", "")
-        )
-        client.register_plugin(CommandPlugin(command))
+        allowed = os.environ.get("ILLUM_ALLOW", "")
+        self._command = Command(self._name, str(Path.cwd()), token, facts(), self._is_mixed, allowed)
+        client.register_plugin(CommandPlugin(self._command))
 
     @property
     def is_lost(self) -> bool:
@@ -100,7 +99,7 @@ class Session:
         among = [asker] if asker else [each for each in self.workers() if each not in avoid]
         return self._connection.client.submit(
             do,
-            self._name,
+            self._command,
             threaded,
             digests,
             contents,

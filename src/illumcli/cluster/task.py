@@ -122,7 +122,7 @@ class CommandPlugin(WorkerPlugin):
 
 
 def do(
-    name: str,
+    command: Command,
     units: Sequence[Unit],
     digests: Mapping[Path, str] | None,
     contents: Mapping[Path, bytes] | None,
@@ -131,15 +131,15 @@ def do(
 
     Parameters
     ----------
-    name : str
-        Of the command, whose plugin the worker has.
+    command : Command
+        Workers of a scheduler that was started again do not know it yet.
     digests : mapping, optional
         Every file that the units read, and its hash; not given until a worker lacks files.
     contents : mapping, optional
         Files that this worker said to lack.
     """
     dask_worker = get_worker()
-    plugin = cast(CommandPlugin, dask_worker.plugins[name])
+    plugin = cast(CommandPlugin, dask_worker.plugins.setdefault(command.name, CommandPlugin(command)))
     plugin.start(dask_worker.local_directory)
     mirror, worker = plugin.mirror, plugin.worker
     assert worker is not None

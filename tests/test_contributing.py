@@ -19,7 +19,8 @@ camera: {position: [2, 3, 4], target: [0, 0, 0], fov: 45}
 film: {width: 32, height: 24, samples: 1}
 ambient: 0.5
 obscurance: {samples: 16, sampler: r2, falloff: {falloff: sine, max_distance: 1}}
-materials: {dust: {model: lunar_lambert, diffuse: 0.5}}
+frames: {last: 0}
+materials: {dust: {model: lunar_lambert, diffuse: {curve: pulse, low: 0.5, high: 0.9}}}
 lights: [{light: beam, position: [0, 0, 0], direction: [0, -1, 0], radius: 0.8, irradiance: 3}]
 objects:
   - {mesh: {shape: star, radius: 3}, material: dust}
@@ -73,7 +74,7 @@ def copy(tmp_path_factory) -> Path:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         place(ROOT / name, folder / name)
     examples = EXAMPLE.findall((ROOT / "CONTRIBUTING.md").read_text())
-    assert len(examples) == 14
+    assert len(examples) == 15
     for name, kind, block in examples:
         path = folder / name
         if kind == "diff":

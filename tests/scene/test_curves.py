@@ -22,7 +22,7 @@ def value(made, frame, text="", fps=24.0):
 
 
 def test_the_curves():
-    assert tags(CURVES) == ("column", "formula", "linear", "sequence", "smooth", "step")
+    assert {"column", "formula", "linear", "sequence", "smooth", "step"} <= set(tags(CURVES))
 
 
 @pytest.mark.parametrize("kind", ["linear", "smooth"])

@@ -61,6 +61,14 @@ def test_tables_of_variants_have_limits(tmp_path, monkeypatch):
         variants_of([], rows=table)
 
 
+def test_all_variants_have_the_same_frames(tmp_path):
+    (tmp_path / "rows.csv").write_text("frames.last\n3\n")
+    for words in ({"texts": ["frames.last=1,2"]}, {"texts": [], "rows": tmp_path / "rows.csv"}):
+        with pytest.raises(InputError, match="all variants have the same frames; give it one value with -D"):
+            variants_of(**words)
+    assert len(variants_of(["frames.last=2"])) == 1
+
+
 @pytest.mark.parametrize("text", ["a", "=1", "a=1,,2", "a=0:1:3log", "a=0:1:0", "a=-1:1:4log"])
 def test_an_axis_that_says_nothing_is_refused(text):
     with pytest.raises(InputError):

@@ -9,8 +9,8 @@ from pathlib import Path
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.unit import Worker
 from illumcli.commands.work import Work, unused_keys
-from illumcli.errors import IllumError
-from illumcli.scene.frames import FRAMES_PER_SECOND, frame_numbers
+from illumcli.errors import IllumError, InputError
+from illumcli.scene.frames import FRAMES_PER_SECOND, MAX_FRAMES, frame_numbers
 from illumcli.scene.load import read_frames
 
 HELD = 256
@@ -41,9 +41,13 @@ class RenderJobs:
     def _of_scene(self, scene: Path, options: RenderOptions) -> Iterator[RenderJob]:
         """A scene without frames, or each frame of those of the option, or else of the scene."""
         frames = read_frames(scene, options.overrides, self.worker.shared(scene).text)
-        numbers = frame_numbers(options.frames) if options.frames else frames and frames.numbers
+        numbers = frames.numbers if frames else None
+        if options.frames is not None:
+            numbers = frame_numbers(options.frames)
         if numbers is None:
             yield RenderJob(scene, options)
+        elif len(numbers) > MAX_FRAMES:
+            raise InputError(f"{len(numbers)} frames are more than {MAX_FRAMES}; render them in parts")
         for number in numbers or ():
             overrides = _at_frame(options.overrides, number, frames.fps if frames else FRAMES_PER_SECOND)
             yield RenderJob(scene, replace(options, overrides=overrides), number)

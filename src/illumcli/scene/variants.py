@@ -104,6 +104,9 @@ def variants_of(
     fps = of_scene.fps if of_scene else FRAMES_PER_SECOND
     axes = [axis_of(text) for text in texts]
     table = _rows(rows) if rows else [_Point({}, {})]
+    for path in (*(axis.path for axis in axes if len(axis.values) > 1), *table[0].values):
+        if path.partition(".")[0] == "frames":
+            raise InputError(f"{path}: all variants have the same frames; give it one value with -D")
     lengths = [len(axis.values) for axis in axes]
     count = max(lengths, default=1) if together else math.prod(lengths)
     count *= len(table) * (1 if numbers is None else len(numbers))

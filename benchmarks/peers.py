@@ -161,7 +161,7 @@ def ambient(folder: Path, python: str) -> None:
     print(f"# difference of the references: RMSE {rmse(*truths.values()):.4f}")
 
     counts = [(2, 4), (4, 8)] if SMALL else [(4, 8), (8, 8), (16, 8)]
-    few = [(1, 2), (2, 2)] if SMALL else [(2, 2), (4, 2), (8, 2)]
+    few = [(1, 2), (2, 2)] if SMALL else [(2, 1), (3, 1), (4, 1), (8, 1)]  # adaptive by default
     spps = {
         "llvm_ad_rgb": [4, 16] if SMALL else [16, 64, 256],
         "llvm_ad_rgb + OIDN": [2, 4] if SMALL else [2, 4, 16],

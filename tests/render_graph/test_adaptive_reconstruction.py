@@ -183,6 +183,17 @@ def test_what_a_sweep_keeps_changes_no_bit(path, change):
         assert not {"raw_obscurance", "shadow:key"} & stats.rays.keys()
 
 
+@pytest.mark.usefixtures("everything_kept")
+def test_fits_of_large_pictures_are_not_kept(path, tmp_path, monkeypatch):
+    monkeypatch.setattr("illumcli.render_graph.tile_nodes.LARGEST_FIT", 75 * 61 - 1)
+    cache = Cache(Store(tmp_path / "store"), None)
+    made, _ = rendered(path, only=["beauty"], cache=cache)
+    again, stats = rendered(path, only=["beauty"], cache=cache)
+    assert_same(made, again)
+    assert "raw_obscurance" in stats.rays
+    assert "hits" not in stats.rays
+
+
 def test_decisions_in_memory_go_with_another_fit(path):
     """The attempts for a target error keep what decides about pixels, too."""
     memory = MemoryCache()

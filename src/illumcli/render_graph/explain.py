@@ -13,10 +13,11 @@ from illumcli.film.view import View
 from illumcli.layers import Layer
 from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.render_graph.build import Graph
-from illumcli.render_graph.build_adaptive import OPEN, REFINED
+from illumcli.render_graph.build_adaptive import FITTED, OPEN, REFINED
 from illumcli.render_graph.culling import why_all
 from illumcli.render_graph.replicates import REPLICATE, replicated_count
 from illumcli.render_graph.schedule import Plan, reached
+from illumcli.render_graph.tile_nodes import LARGEST_FIT
 from illumcli.scene.spec import Scene
 
 CULLED = "outside every view; casts no shadow or obscurance onto anything visible"
@@ -106,6 +107,8 @@ def expected_bytes(plan: Plan) -> dict[str, int]:
     samples = min(view.height, plan.tile_side(view)) * view.width * view.samples
     sizes = {"band": samples * 4 * sum(len(layer.channels) for layer in plan.outputs) // view.samples}
     for name in [*plan.lookup.keeps, *plan.lookup.reused]:
+        if name == FITTED:  # column, row, object and value of about one pair of each pixel
+            sizes[name] = 16 * min(view.width * view.height, LARGEST_FIT)
         if codec := codec_of(name):
             shape, dtype = codec.layout(view)
             sizes[name] = math.prod(shape) * np.dtype(dtype).itemsize

@@ -30,6 +30,8 @@ Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> its values as the cache stores them
 Develop: TypeAlias = Callable[[Tile, Planes], Mapping[str, NDArray[Any]]]
 """From a tile and its layers to arrays (rows, columns, channels) by name; called in any thread."""
+LARGEST_FIT = 1 << 23
+"""Pixels of a view whose fitted obscurance is kept, at most: it is held in memory until the last tile."""
 
 
 @dataclass(slots=True)
@@ -173,7 +175,7 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
 
         # Hand it to the cache, and drop the buffers that no later node needs.
         if node.output == FITTED:
-            if FITTED in plan.lookup.keeps:
+            if FITTED in plan.lookup.keeps and plan.view.width * plan.view.height <= LARGEST_FIT:
                 common.fits.append(value)
         elif plan is common.plan and node.output in common.recorder.names:
             tile, own = started.tile, started.own

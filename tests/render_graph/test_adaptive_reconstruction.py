@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -192,6 +194,15 @@ def test_fits_of_large_pictures_are_not_kept(path, tmp_path, monkeypatch):
     assert_same(made, again)
     assert "raw_obscurance" in stats.rays
     assert "hits" not in stats.rays
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (40000, 1000)])
+def test_tiles_are_the_same_with_a_fit_from_the_cache(path, size):
+    """Buffers in memory are those of tiles: another size would not find them."""
+    overrides = [f"film.width={size[0]}", f"film.height={size[1]}"]
+    steps = planned(load(path, overrides), ["beauty"])
+    assert steps.before > 0
+    assert replace(steps, before=0).tile_side(steps.view) == steps.tile_side(steps.view)
 
 
 def test_decisions_in_memory_go_with_another_fit(path):

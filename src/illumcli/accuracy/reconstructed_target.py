@@ -34,7 +34,7 @@ from illumcli.render_graph.tile_nodes import Planes
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
 
-FIRST_FIT, FIRST_EDGES = 0.012, 0.0125
+FIRST_FIT, FIRST_EDGES = 0.0095, 0.0115
 """RMSE of the fit at one ray per pixel, and of antialiasing at one sample, that the first attempt is chosen
 by: those of a mesh that fills half the picture."""
 FIRST_REFINED = 0.05

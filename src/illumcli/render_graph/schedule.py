@@ -101,9 +101,8 @@ class Plan(Value):
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
         min_samples = min_tile_samples(len(self.tile))
         if side is None:
-            shared = view.width * view.height * (2 if self.before else 1)  # half as many tiles with margins
-            side = tile_side(self.samples_per_pixel, shared, min_samples)
-            if self.before:  # some rows of tiles are held at once
+            side = tile_side(self.samples_per_pixel, view.width * view.height, min_samples)
+            if reconstructs(self.graph.scene):  # some rows of tiles are held at once
                 row = view.width * view.samples
                 side = max(min(side, ROW_SAMPLES // row // 8 * 8), min(side, LEAST_FITTED))
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side

@@ -25,12 +25,16 @@ from illumcli.geometry.scene_geometry import CornerVectors, corner_normals
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph.build import build
+from illumcli.render_graph.costs import BYTES
 from illumcli.render_graph.limits import expected_memory, refuse_memory
 from illumcli.render_graph.repairs import refuse_repairs
 from illumcli.scene.load import load
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 from illumcli.visibility.baked import mesh_hash
+
+VERTEX_BYTES = 500
+"""Bytes of expected memory per vertex: 320 to 900 in scanned and modelled meshes."""
 
 
 class BakeWork(Record):
@@ -60,6 +64,11 @@ class BakeWork(Record):
     def settings(self) -> BakeSettings:
         """The settings of the bake."""
         return self.job.settings
+
+    @property
+    def contents(self) -> tuple[str, ...]:
+        """The content of each output."""
+        return (self.content,) * len(self.outputs)
 
     @property
     def claim(self) -> Path | None:
@@ -116,6 +125,24 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     work = BakeWork(job, loaded.scene, surfaces, hashes, content, repairs, clock)
     work.due()
     return work
+
+
+def bake_cost(job: BakeJob) -> int:
+    """The cost of a bake [obscurance rays], from the sizes of its files and the rays per vertex alone.
+
+    A vertex takes about `VERTEX_BYTES` of expected memory; with a target error all inputs count 256 rays.
+
+    Raises
+    ------
+    InputError
+        The scene or mesh cannot be read.
+    """
+    overrides = job.options.overrides
+    is_mesh = is_mesh_file(job.path)
+    loaded = mesh_alone(job.path, overrides) if is_mesh else load(job.path, overrides)
+    expected = expected_memory(loaded, loaded.scene)
+    size = expected.get("meshes", 0) + expected.get("shapes", 0)
+    return size // BYTES + size * job.settings.samples // VERTEX_BYTES
 
 
 def refuse_outputs(outputs: Sequence[Path]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from functools import partial, wraps
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 import click
 
 if TYPE_CHECKING:
-    from illumcli.commands.options import RenderOptions
+    from illumcli.commands.options import RenderOptions, Shard
     from illumcli.commands.runner import Runner
     from illumcli.progress import Progress
     from illumcli.records import Value
@@ -85,6 +86,25 @@ allow_option = click.option(
     type=click.Path(exists=True, file_okay=False),
     metavar="DIR",
     help="Let scenes read files and write images below DIR, too (also: ILLUM_ALLOW).",
+)
+
+
+def _shard(ctx: click.Context, option: click.Parameter, text: str | None) -> Shard | None:
+    from illumcli.commands.options import Shard
+
+    if text is None:
+        return None
+    match = re.fullmatch(r"0*([1-9]\d{0,5})/0*([1-9]\d{0,5})", text)
+    if match is None or int(match[1]) > int(match[2]):
+        raise click.BadParameter(f"'{text}' is not I/N with I from 1 to N; write it as 1/3")
+    return Shard(int(match[1]), int(match[2]))
+
+
+shard_option = click.option(
+    "--shard",
+    metavar="I/N",
+    callback=_shard,
+    help="Do part I of N, from 1, and leave a record; see illum merge.",
 )
 
 

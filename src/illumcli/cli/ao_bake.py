@@ -21,6 +21,7 @@ from illumcli.cli._options import (
     quiet_option,
     report_option,
     seed_option,
+    shard_option,
     strict_option,
     taken,
     threads_option,
@@ -30,7 +31,8 @@ from illumcli.cli._printing import print_paths, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
-    from illumcli.baking.settings import BakeOptions, BakeSettings
+    from illumcli.baking.settings import BakeSettings
+    from illumcli.commands.bake import BakeRequest
 
 _EPILOG = """\b
 Examples:
@@ -98,11 +100,14 @@ def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
             raise click.UsageError(f"--falloff {falloff} needs --{option}{hint}")
 
 
-def _options(options: dict[str, Any]) -> BakeOptions:
-    """The `BakeOptions` among the options of the command."""
+def _request(options: dict[str, Any]) -> BakeRequest:
+    """The `BakeRequest` among the options of the command."""
     from illumcli.baking.settings import BakeOptions
+    from illumcli.commands.bake import BakeRequest
 
-    return taken(BakeOptions, options)
+    options["settings"] = _settings(options)
+    options["options"] = taken(BakeOptions, options)
+    return taken(BakeRequest, options)
 
 
 @click.command(name="ao-bake", epilog=_EPILOG)
@@ -185,17 +190,14 @@ def _options(options: dict[str, Any]) -> BakeOptions:
 @keep_going_option
 @cluster_options
 @strict_option
+@shard_option
 @quiet_option
 @verbose_option
-@gathered("settings", _settings)
-@gathered("options", _options)
+@gathered("request", _request)
 def ao_bake(
     inputs: tuple[Path, ...],
-    patterns: tuple[str, ...],
-    settings: BakeSettings,
-    options: BakeOptions,
+    request: BakeRequest,
     report: Path | None,
-    keep_going: bool,
     runner: RunnerOf,
     quiet: bool,
     verbose: bool,
@@ -207,7 +209,7 @@ def ao_bake(
     bake resumes when the same command is given again.
     """
     from illumcli.cli._progress import reporter
-    from illumcli.commands.bake import BakeRequest, bake_inputs
+    from illumcli.commands.bake import bake_inputs
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
         print_paths(paths)
@@ -219,7 +221,13 @@ def ao_bake(
             for name, seconds in done.seconds.items():
                 say(f"{seconds:8.3f} s  {name}")
 
-    request = BakeRequest(settings, patterns, options, keep_going)
+    if request.shard is not None:
+        from illumcli.commands.bake_shard import bake_shard
+
+        lines = bake_shard(inputs, request, report, runner(reporter(quiet)), written, say)
+        if not quiet:
+            say(lines)
+        return
     is_kept = bake_inputs(inputs, request, report, runner(reporter(quiet)), written, say)
     if is_kept and not quiet:
         say_kept([report])

@@ -25,6 +25,7 @@ from illumcli.cli._options import (
     report_option,
     scenes_argument,
     seed_option,
+    shard_option,
     strict_option,
     studio_options,
     threads_option,
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 @cluster_options
 @strict_option
 @no_cache_option
+@shard_option
 @quiet_option
 @verbose_option
 @gathered("options", render_options)
@@ -83,7 +85,6 @@ def render(
       illum render scene.yaml --frames 0:47 -D 'ambient=frame/47' -o 'film/{frame:04d}.png'
     """
     from illumcli.cli._progress import reporter
-    from illumcli.commands import render_all as job
 
     said: set[str] = set()
 
@@ -105,7 +106,16 @@ def render(
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)
 
-    is_kept = job.render_scenes(scenes, options, report, runner(reporter(quiet)), written, say)
+    if options.shard is not None:
+        from illumcli.commands.render_shard import render_shard
+
+        lines = render_shard(scenes, options, report, runner(reporter(quiet)), written, say)
+        if not quiet:
+            say(lines)
+        return
+    from illumcli.commands.render_all import render_scenes
+
+    is_kept = render_scenes(scenes, options, report, runner(reporter(quiet)), written, say)
     if is_kept and not quiet:
         say_kept([report])
     if not quiet and sys.stderr.isatty():

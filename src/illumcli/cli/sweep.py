@@ -22,6 +22,7 @@ from illumcli.cli._options import (
     render_options,
     scene_argument,
     seed_option,
+    shard_option,
     strict_option,
     taken,
     threads_option,
@@ -80,6 +81,7 @@ def _files(options: dict[str, Any]) -> SweepFiles:
 @cluster_options
 @strict_option
 @no_cache_option
+@shard_option
 @allow_option
 @quiet_option
 @verbose_option

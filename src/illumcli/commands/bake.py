@@ -10,6 +10,7 @@ from illumcli.baking.report import BakeReport
 from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
+from illumcli.commands.options import Shard
 from illumcli.commands.runner import Pieces, Runner
 from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
@@ -24,6 +25,8 @@ class BakeRequest(Value):
     """Patterns of the outputs' names; `{scene}` is the input's name without its suffix."""
     options: BakeOptions = BakeOptions()
     keep_going: bool = True
+    shard: Shard | None = None
+    """The part of the inputs that is baked; by default all."""
 
     def outputs(self, path: Path) -> list[Path]:
         """The files of one input."""

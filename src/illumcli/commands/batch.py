@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,13 @@ class Batch:
     """`count` pieces of work, called `what`, and their failures; `tell` gets the text of each failure.
 
     Without `keep_going` the pieces after one that failed are not done. The error of a single piece is raised.
+    Failures of pieces that are left to others (`leave_all_but`) do not count.
     """
 
     def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
         self.failures: dict[int, IllumError] = {}
         self.count = count
-        self._what = what
+        self._what, self._own = what, set(range(count))
         self._keep_going, self._tell = keep_going, tell
 
     def due(self) -> Iterator[int]:
@@ -35,7 +36,17 @@ class Batch:
     def is_due(self, number: int) -> bool:
         """False for a piece that has failed, or that comes after one whose failure stops the batch."""
         stops = self.failures and not self._keep_going and number > min(self.failures)
-        return not stops and number not in self.failures
+        return not stops and number not in self.failures and number in self._own
+
+    def leave_all_but(self, own: Collection[int]) -> None:
+        """Leave all other pieces to other processes."""
+        self._own = set(own)
+        self.failures = {number: error for number, error in self.failures.items() if number in self._own}
+
+    @property
+    def is_lost(self) -> bool:
+        """True if nothing is left to do because of failures."""
+        return bool(self.failures) and (not self._keep_going or self.failures.keys() >= self._own)
 
     @contextmanager
     def piece(self, number: int, label: str = "") -> Iterator[None]:
@@ -52,7 +63,7 @@ class Batch:
     def finish(self, *also: str) -> None:
         """If pieces failed, raise their number and the lines of `also`, with the exit code of the first."""
         if self.failures:
-            failed = f"{len(self.failures)} of {self.count} {self._what} failed"
+            failed = f"{len(self.failures)} of {len(self._own)} {self._what} failed"
             error = IllumError("\n".join([failed, *also]))
             error.exit_code = self.failures[min(self.failures)].exit_code
             raise error
@@ -84,17 +95,23 @@ class BatchReport:
         self._entries[number] = entry
 
     def finish(self, batch: Batch) -> bool:
-        """Write the report, or refresh the date of the existing one, and end the batch. True if it is kept.
+        """Write the report and end the batch. True if the existing one is kept."""
+        self.write(batch.failures)
+        batch.finish()
+        return self._is_kept
+
+    def write(self, failures: Mapping[int, Exception]) -> bool:
+        """Write the report, or refresh the date of the existing one. True if that is kept.
 
         A report of the same contents is replaced if a piece failed this time.
         """
-        for number, failure in batch.failures.items():
+        for number, failure in failures.items():
             self._contents[number] = INCOMPLETE
             self._entries[number] |= {"content": INCOMPLETE, "error": str(failure)}
-        if self._path is not None and self._is_kept and not batch.failures:
+        if self._path is not None and self._is_kept and not failures:
             refresh(self._path)
-        elif self._path is not None:
+            return True
+        if self._path is not None:
             pairs = zip(self._entries, self._contents, strict=True)
             write_text(self._path, report_text([entry | {"content": content} for entry, content in pairs]))
-        batch.finish()
-        return self._is_kept
+        return False

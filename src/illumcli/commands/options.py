@@ -1,4 +1,4 @@
-"""Options and jobs of `render` and `sweep`."""
+"""Options and jobs of `render`, `sweep` and `ao-bake`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from illumcli.records import Value
+
+
+class Shard(Value):
+    """One of `count` parts of the units of a command."""
+
+    number: int
+    """From 1."""
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
 
 
 class RenderOptions(Value):
@@ -36,6 +47,8 @@ class RenderOptions(Value):
     """RMSE that sample counts are chosen for; by default the scene's counts."""
     frames: str | None = None
     """`FIRST:LAST` or `FIRST:LAST:STEP`, the frames to render; by default those of the scene."""
+    shard: Shard | None = None
+    """The part of all units that is rendered; by default all."""
 
 
 class RenderJob(Value):

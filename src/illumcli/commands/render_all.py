@@ -48,8 +48,8 @@ def render_scenes(
     """
     jobs = RenderJobs(scenes, options)
     what = "frames" if any(job.frame is not None for job in jobs) else "scenes"
-    batch = Batch(what, len(jobs), options.keep_going, _once(tell) if what == "frames" else tell)
-    entries = BatchReport(report, [_entry(job) for job in jobs])
+    batch = Batch(what, len(jobs), options.keep_going, once(tell) if what == "frames" else tell)
+    entries = BatchReport(report, [entry_of(job) for job in jobs])
     claims: dict[int, Path | None] = {}
     kept: set[int] = set()
     files: dict[tuple[Path, str], None] = {}  # every file once, even if a scene is given twice
@@ -81,7 +81,7 @@ def render_scenes(
             work = jobs.work(number)
             done = replace(done, warnings=(*done.warnings, *jobs.unused(work.job.scene)))
             if report is not None:
-                entries.add(number, _entry(work.job) | done.as_data())
+                entries.add(number, entry_of(work.job) | done.as_data())
             frames = work.scene.frames
             fps = frames.fps if frames else FRAMES_PER_SECOND
             written(Rendered(work.job.scene, paths, done, work.job.frame, fps))
@@ -89,7 +89,7 @@ def render_scenes(
     return entries.finish(batch)
 
 
-def _once(tell: Tell) -> Tell:
+def once(tell: Tell) -> Tell:
     """Tells a fault at the first frame that has it, and names the frame once."""
     told: set[str] = set()
 
@@ -102,6 +102,6 @@ def _once(tell: Tell) -> Tell:
     return tell_once
 
 
-def _entry(job: RenderJob) -> dict[str, Any]:
+def entry_of(job: RenderJob) -> dict[str, Any]:
     """What the report says of a job before it is done."""
     return {"scene": str(job.scene)} | ({} if job.frame is None else {"frame": job.frame})

@@ -11,11 +11,12 @@ from illumcli.commands.batch import Batch
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.runner import Here, Runner
 from illumcli.commands.sweep_files import SweepFiles, plan_files
-from illumcli.commands.sweep_images import attempt, render_variants
-from illumcli.commands.sweep_names import pattern_of, refuse_equal_names
+from illumcli.commands.sweep_images import render_variants
+from illumcli.commands.sweep_names import pattern_of
 from illumcli.commands.sweep_outcome import Outcome, SweepResult
-from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
-from illumcli.commands.work import unused_keys
+from illumcli.commands.sweep_planning import plan_variants
+from illumcli.commands.sweep_shard import plan_shard, record_shard
+from illumcli.commands.sweep_works import SweepWorks
 from illumcli.files.names import check_unique
 from illumcli.scene.variants import Variant
 
@@ -46,12 +47,16 @@ def sweep_scene(
 
     # Find faults before the first ray.
     works = SweepWorks(path, replace(options, pattern=pattern_of(variants, options.pattern)))
-    outcomes, warnings = _planned(
-        works, variants, batch, written, pattern_of(variants, files.reference or "")
-    )
-    if len(batch.failures) == len(variants) or (batch.failures and not options.keep_going):
-        batch.finish()
+    plan = plan_variants(works, variants, batch, pattern_of(variants, files.reference or ""))
+    outcomes, warnings = plan.outcomes, plan.warnings
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])
+    sharding = None if batch.is_lost else plan_shard(works, plan, files)
+    if sharding is not None:
+        batch.leave_all_but(sharding.own)
+    for number in sorted(batch.failures):
+        written(outcomes[number])
+    if batch.is_lost and sharding is None:
+        batch.finish()
     planned = plan_files(files, outcomes, RenderJob(path, works.options))
 
     # Render the images.
@@ -62,7 +67,11 @@ def sweep_scene(
         raise
     seconds = time.perf_counter() - start
 
-    # Write the files about all variants.
+    # Write the files about all variants, or the record of a shard of them.
+    if sharding is not None:
+        summary = record_shard(sharding, outcomes, batch)
+        batch.finish(*warnings)
+        return SweepResult(tuple(outcomes), (), tuple(warnings), summary, seconds)
     unchanged: list[str] = []
     has_images = any(outcome.report for outcome in outcomes)
     if has_images:
@@ -71,31 +80,3 @@ def sweep_scene(
     summary = planned.table.extremes(outcomes) if planned.table else ""
     kept = planned.kept if has_images else ()
     return SweepResult(tuple(outcomes), kept, tuple(warnings), summary, seconds)
-
-
-def _planned(
-    works: SweepWorks,
-    variants: Sequence[Variant],
-    batch: Batch,
-    written: Callable[[Outcome], None],
-    reference: str,
-) -> tuple[list[Outcome], list[str]]:
-    """The outcomes with the facts about every variant without a fault, and the warnings about the scene that
-    all of them have."""
-    assert works.options.pattern is not None
-    refuse_equal_names(variants, works.options.pattern)
-    warnings: list[str] | None = None
-
-    def planned(outcome: Outcome) -> Outcome:
-        nonlocal warnings
-        work = works.of(outcome)
-        outcome = replace(outcome, planned=planned_variant(work, reference))
-        lines = unused_keys(work)
-        warnings = lines if warnings is None else [line for line in warnings if line in lines]
-        if outcome.number > HELD:
-            works.drop(outcome)
-        return outcome
-
-    outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
-    outcomes = [attempt(outcome, planned, batch, written) for outcome in outcomes]
-    return outcomes, warnings or []

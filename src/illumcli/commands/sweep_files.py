@@ -127,9 +127,9 @@ def plan_files(files: SweepFiles, outcomes: Sequence[Outcome], job: RenderJob) -
     if files.html is not None and is_html_kept(files.html, each, force):
         kept += (files.html / PAGE,)
 
-    # The table is measured if it or a report that shows it has to be written.
+    # The table is measured if it or a report that shows it has to be written, which no shard does.
     table, shown = None, (files.table, files.html and files.html / PAGE)
-    if any(path is not None and path not in kept for path in shown):
+    if job.options.shard is None and any(path is not None and path not in kept for path in shown):
         table = SweepTable(files.table, outcomes, each, Measurer(references, files.flips))
     return PlannedFiles(files, job, table, references, contents, kept)
 

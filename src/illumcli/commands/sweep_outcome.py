@@ -40,6 +40,11 @@ class PlannedVariant(Value):
     claim: Path | None
     """Held while they are written."""
 
+    @property
+    def image_content(self) -> str:
+        """Hash for its first image alone."""
+        return self.images[0].content
+
 
 class Outcome(Record):
     """The state of one variant."""

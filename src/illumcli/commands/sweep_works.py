@@ -10,10 +10,11 @@ from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep_outcome import Outcome, PlannedImage, PlannedVariant
 from illumcli.commands.targets import expanded
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work
+from illumcli.commands.work import Work, cost_of
 from illumcli.files.names import fields
 from illumcli.film.channels import channel_count
 from illumcli.film.develop import Target
+from illumcli.render_graph.costs import Cost, CostModel
 
 HELD = 256
 """The work of so many variants is held from planning until rendering, some 80 kB each; later variants are
@@ -24,21 +25,26 @@ class SweepWorks:
     """The units of a sweep, one per variant; holds the work of each until it is dropped."""
 
     def __init__(self, path: Path, options: RenderOptions) -> None:
-        self._path = path
+        self.path = path
         self.options = options
-        self.worker = Worker()
+        self.worker, self._costs = Worker(), CostModel()
         self._held: dict[int, Work] = {}
 
     def unit(self, outcome: Outcome) -> RenderJob:
         """The unit of work of a variant."""
-        options = replace(self.options, overrides=tuple(outcome.variant.overrides), audit=False)
-        return RenderJob(self._path, options, outcome.variant.frame, fields=outcome.variant.fields)
+        overrides = tuple(outcome.variant.overrides)
+        options = replace(self.options, overrides=overrides, audit=False, shard=None)
+        return RenderJob(self.path, options, outcome.variant.frame, fields=outcome.variant.fields)
 
     def of(self, outcome: Outcome) -> Work:
         """The work of a variant."""
         if outcome.number not in self._held:
             self._held[outcome.number] = self.worker.prepare(self.unit(outcome))
         return self._held[outcome.number]
+
+    def cost(self, outcome: Outcome) -> Cost:
+        """The cost of a variant, and what it adds to that of the variant before."""
+        return cost_of(self.of(outcome), self._costs)
 
     def drop(self, outcome: Outcome) -> None:
         """Drop the work of a variant; it is prepared again if it is needed again."""

@@ -28,7 +28,7 @@ def turns(batch: Batch, claim_of: Callable[[int], Path | None], progress: Progre
     claim_of
         The path of the claim on a piece; None for a piece that needs none.
     """
-    claims, left, refused, at = Claims(), set(range(batch.count)), set[int](), 0
+    claims, left, refused, at = Claims(), set(batch.due()), set[int](), 0
     while left:
         # The next piece that nobody else is known to do.
         in_order = chain(range(at, batch.count), range(at))

@@ -19,6 +19,7 @@ from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build
+from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory, refuse_rays
 from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
@@ -55,9 +56,14 @@ class Work(Value):
         return Development(film.background, film.exposure, self.scene.outputs.colour)
 
     @property
+    def contents(self) -> tuple[str, ...]:
+        """Hash of everything that the pixels of each file depend on."""
+        return tuple(target.content for target in self.targets)
+
+    @property
     def content(self) -> str:
         """Hash of everything that the pixels of its files depend on."""
-        return digest([target.content for target in self.targets])
+        return digest(self.contents)
 
     @property
     def claim(self) -> Path | None:
@@ -118,3 +124,11 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
         refuse_memory(BAND_ROWS, view.width, values, expected, str(work.loaded.path))
         types = work.development.channels(target).values()
         refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
+
+
+def cost_of(work: Work, model: CostModel) -> Cost:
+    """The cost of rendering the pictures of a work, and what they add to those of the work before."""
+    rendered = {target.view.name for target in work.targets}
+    views = [view for view in work.graph.views if view.name in rendered]
+    meshes = expected_memory(work.loaded, work.scene).get("meshes", 0)
+    return model.of(work.graph, work.outputs, views, meshes)

@@ -1,0 +1,69 @@
+"""Bake a shard of several inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from illumcli.baking.inputs import bake_cost
+from illumcli.baking.report import BakeReport
+from illumcli.baking.settings import BakeJob
+from illumcli.commands.bake import BakeRequest
+from illumcli.commands.batch import Batch, Tell
+from illumcli.commands.batch_shard import BatchUnits, run_shard
+from illumcli.commands.runner import Runner
+from illumcli.commands.sharding import PlannedUnit, Sharding
+from illumcli.commands.unit import Unit, Worker
+from illumcli.errors import known
+from illumcli.files.names import check_unique
+from illumcli.render_graph.costs import Cost
+
+
+def bake_shard(
+    inputs: Sequence[Path],
+    request: BakeRequest,
+    report: Path | None,
+    runner: Runner,
+    written: Callable[[Path, list[Path], BakeReport], None],
+    tell: Tell,
+) -> str:
+    """Bake the inputs in the shard of a request. Returns lines about it.
+
+    `written` is called with each finished input, its files and report; `tell` with the errors of the others.
+
+    Raises
+    ------
+    IllumError
+        At the end if any of them failed; at once if files have equal names.
+    """
+    assert request.shard is not None
+    check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
+    jobs = [request.job(path) for path in inputs]
+    planned = [
+        PlannedUnit(str(job.path), job.outputs, _cost(job), {"entry": k, "of": {"input": str(job.path)}})
+        for k, job in enumerate(jobs)
+    ]
+    settings = {"settings": request.settings.as_data()}
+    sharding = Sharding("ao-bake", request.shard, planned, {"report": report}, settings)
+
+    def done(unit: Unit, paths: list[Path], report: Any) -> BakeReport:
+        assert isinstance(unit, BakeJob)
+        found: BakeReport = report
+        written(unit.path, paths, found)
+        return found
+
+    batch = Batch("inputs", len(jobs), request.keep_going, tell)
+    units = BatchUnits(jobs, sharding, request.options.force)
+    return run_shard(units, batch, Worker(), runner, done)
+
+
+def _cost(job: BakeJob) -> Cost:
+    """The cost of a bake; nothing for an input with a fault, which its shard reports."""
+    try:
+        cost = bake_cost(job)
+    except Exception as error:
+        if known(error) is None:
+            raise
+        cost = 0
+    return Cost(cost, cost)

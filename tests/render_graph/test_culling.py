@@ -209,13 +209,13 @@ def test_the_plan_tells_them_once_their_boxes_are_known(scene, tmp_path, monkeyp
 
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
     monkeypatch.setattr(policy, "worth", lambda seconds, size: True)
-    (cold,) = json.loads(told(scene, as_json=True))
+    (cold,) = told(scene)
     assert "unless their bounds" in cold["objects"]
     render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "a.png"))))
-    (warm,) = json.loads(told(scene, as_json=True))
+    (warm,) = told(scene)
     assert "object:away" in warm["skipped"]
     assert "hits" in warm["reused"]
-    (every,) = json.loads(told(scene, ["obscurance.falloff={falloff: step}"], as_json=True))
+    (every,) = told(scene, variants_of(["obscurance.falloff={falloff: step}"]))
     assert every["objects"] == "all: obscurance rays reach any distance"
 
 

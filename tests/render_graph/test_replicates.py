@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from illumcli.commands.options import RenderJob, RenderOptions
-from illumcli.commands.plan import table
+from illumcli.commands.plan_table import plan_table
 from illumcli.commands.render import render_scene
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.render_graph.explain import expected_rays, plan_data
@@ -120,8 +120,9 @@ def test_nothing_random_is_exact_and_doubles_nothing(scene):
     assert not made["error"].any()
     assert not [name for name in rays if name.startswith("replicate.")]
     loaded = load(scene, ("obscurance=null",))
-    part = plan_data(planned(loaded, ("error",)), {})
-    assert "nothing in the image is random: its error is 0" in table([part])
+    time = {"expected_time": {"seconds": 0.0, "runs": 0, "unknown": []}}
+    part = plan_data(planned(loaded, ("error",)), {}) | time
+    assert "nothing in the image is random: its error is 0" in plan_table([part])
 
 
 def test_the_report_and_the_file_have_it(scene, tmp_path):

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from illumcli.cluster.inputs import Inputs
 from illumcli.commands.film_command import film_command
+from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.images.reader import read_image
 
 SCENE = """version: 1
@@ -191,6 +193,17 @@ def test_files_of_a_sequence(illum, film):
     assert cached.returncode == 0, cached.stderr
     plan = json.loads(illum("plan", "film.yaml", "--json").stdout)[0]["variants"]["times"]
     assert plan["geometry"] == 2
+
+
+def test_workers_elsewhere_get_the_files_of_a_frame(film):
+    for name in ("m.0.obj", "m.1.obj", "t.csv"):
+        (film / name).write_text(MESH.format(0))
+    text = SCENE.replace("{curve: step, keys: {0: {shape: sphere}, 2: {shape: box}}}", "m.#.obj")
+    (film / "film.yaml").write_text(text)
+    (film / "t.csv").write_text("x\n1\n2\n")
+    curve = f"film.exposure={{curve: column, file: {film / 't.csv'}, column: x}}"
+    unit = RenderJob(film / "film.yaml", RenderOptions((curve,)), 1)
+    assert {path.name for path in Inputs().of_all([unit])} == {"film.yaml", "m.1.obj", "t.csv"}
 
 
 def test_several_scenes_of_which_one_is_a_film(illum, film):

@@ -145,6 +145,11 @@ def test_sequences_of_files(scene, tmp_path):
     assert [thing.mesh.file if n else thing.mesh for n, thing in enumerate(loaded.scene.objects)] == [
         "m.01.obj", "m.01.obj"
     ]  # fmt: skip
+    more = "obscurance: w.#.npz}, material: {model: lambert, diffuse: {texture: t.###.png}}}"
+    textured = text.replace("{mesh: {file: m.##.obj}}", "{mesh: {file: m.##.obj, " + more)
+    loaded = load(scene(textured), frame=1)
+    assert loaded.scene.objects[1].mesh.obscurance == "w.1.npz"
+    assert loaded.scene.objects[1].material.diffuse.texture == "t.001.png"
     # Without frames the sign is part of the name.
     assert load(scene(text.replace("frames: {last: 1}\n", ""))).scene.objects[0].mesh == "m.##.obj"
 

@@ -14,6 +14,7 @@ from illumcli.files.atomic import write_bytes
 from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.scene.access import file_inside
 from illumcli.scene.load import SceneText, load, read_text
+from illumcli.scene.override import parse
 
 
 class Inputs:
@@ -42,7 +43,9 @@ class Inputs:
             self._texts[main] = read_text(main)
         text = self._texts[main]
         loaded = load(main, unit.options.overrides, text, getattr(unit, "frame", None))
-        nodes = [node for tree in (text.tree, loaded.tree) if tree is not None for _, node in tree.places()]
+        given = [change.value for each in unit.options.overrides if (change := parse(each, []))]
+        trees = (text.tree, loaded.tree, *given)
+        nodes = [node for tree in trees if tree is not None for _, node in tree.places()]
         words = dict.fromkeys(node.value for node in nodes if isinstance(node.value, str))
         named = [file_inside(word, loaded.folder, loaded.roots) for word in words]
         yield from _absolute([main, *(Path(node.place.source) for node in nodes)])

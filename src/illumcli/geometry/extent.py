@@ -53,23 +53,28 @@ class Extent:
     def __init__(self, vertices: NDArray[np.float64]) -> None:
         order = compact(vertices)
         padded = np.append(order, np.repeat(order[-1:], -len(order) % CLUSTER))
-        self._clusters = vertices[padded].reshape(-1, CLUSTER, 3)
-        low, high = self._clusters.min(axis=1).T, self._clusters.max(axis=1).T
+        self._clusters = np.ascontiguousarray(vertices[padded].T).reshape(3, -1, CLUSTER)
+        low, high = self._clusters.min(axis=2), self._clusters.max(axis=2)
         self._centre, self._half = (low + high) / 2, (high - low) / 2  # (3, K)
+        self._size = np.abs([low.min(axis=1), high.max(axis=1)]).max(axis=0)
 
     def box(self, linear: NDArray[np.float64], translation: NDArray[np.float64] | float = 0.0) -> Box:
         """The box of the vertices under a (3, 3) matrix and a translation."""
         # How far the box of each cluster reaches along the axes, and how far the foremost clusters do.
         middle, reach = linear @ self._centre, np.abs(linear) @ self._half
         low, high = middle - reach, middle + reach
-        foremost = np.concatenate([low.argmin(axis=1), high.argmax(axis=1)])
-        lowest, highest = box_corners(self._clusters[foremost].reshape(-1, 3) @ linear.T)
+        lowest, highest = self._among(linear, np.append(low.argmin(axis=1), high.argmax(axis=1)))
 
         # Those that may reach farther than these.
-        slack = ROUNDING * (np.abs(linear) @ np.abs(self._centre).max(axis=1))
+        slack = ROUNDING * (np.abs(linear) @ self._size)
         candidates = (low <= (lowest + slack)[:, None]) | (high >= (highest - slack)[:, None])
-        which = np.flatnonzero(candidates[0] | candidates[1] | candidates[2])
-        return box_corners(self._clusters[which].reshape(-1, 3) @ linear.T + translation)
+        lowest, highest = self._among(linear, np.flatnonzero(candidates.any(axis=0)))
+        return lowest + translation, highest + translation
+
+    def _among(self, linear: NDArray[np.float64], which: NDArray[np.intp]) -> Box:
+        """The box of the vertices of some clusters under a matrix."""
+        points = linear @ self._clusters[:, which].reshape(3, -1)
+        return points.min(axis=1), points.max(axis=1)
 
 
 def extents(meshes: Sequence[Mesh]) -> Mapping[int, Extent]:

@@ -13,8 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, take_rows, unit
-from illumcli.geometry.transforms import cofactors
+from illumcli.arrays import F, Floats, Ids, Vectors, cross, take_rows, unit
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
 
@@ -109,37 +108,37 @@ def shared_meshes(kinds: Sequence[int], matrices: Sequence[NDArray[np.float64]])
     return [Shared(tuple(objects), mirrored) for (_, mirrored), objects in members.items()]
 
 
-def instance_matrix(
-    matrix: NDArray[np.float64], own: RenderSpace, render_space: RenderSpace
+def instance_matrices(
+    matrices: NDArray[np.float64], own: RenderSpace, render_space: RenderSpace
 ) -> NDArray[np.float64]:
-    """(3, 4) from a mesh's own space to render space, for a matrix from the mesh to the scene."""
-    linear = matrix[:3, :3] * (own.radius / render_space.radius)
-    centre = render_space.from_world(matrix[:3, :3] @ own.centre + matrix[:3, 3])
-    return np.column_stack([linear, centre])
+    """(I, 3, 4) from a mesh's own space to render space; `matrices`, (I, 4, 4), lead to the scene."""
+    linear = matrices[:, :3, :3] * (own.radius / render_space.radius)
+    centre = render_space.from_world(matrices[:, :3, :3] @ own.centre + matrices[:, :3, 3])
+    return np.concatenate([linear, centre[:, :, None]], axis=2)
 
 
 def instances(
-    count: int, objects: Sequence[int], placed: Sequence[int], matrices: Sequence[NDArray[np.float64]]
+    count: int, objects: NDArray[np.int32], placed: NDArray[np.int32], matrices: NDArray[np.float64]
 ) -> Instances | None:
     """The instances among `count` objects; None if there are none.
 
     Parameters
     ----------
-    objects, placed : sequence of int
+    objects, placed : (I,) int32
         The number of each instance's object, and of the placed mesh that it shares.
-    matrices : sequence of (3, 4) float64
+    matrices : (I, 3, 4) float64
         From the mesh's own space to render space.
     """
-    if not objects:
+    if not len(objects):
         return None
     number = np.full(count, -1, np.int32)
-    number[list(objects)] = np.arange(len(objects), dtype=np.int32)
-    exact = np.stack(matrices)
-    radius = np.linalg.svd(exact[:, :, :3], compute_uv=False)[:, 0]
-    normal = np.stack([cofactors(each / size) for each, size in zip(exact[:, :, :3], radius, strict=True)])
-    reach = np.linalg.norm(exact[:, :, 3], axis=1) + REACH * radius
-    of_object, of_mesh = np.array(objects, np.int32), np.array(placed, np.int32)
-    return Instances(number, of_object, of_mesh, exact.astype(F), normal.astype(F), reach.astype(F))
+    number[objects] = np.arange(len(objects), dtype=np.int32)
+    radius = np.linalg.svd(matrices[:, :, :3], compute_uv=False)[:, 0]
+    linear = matrices[:, :, :3] / radius[:, None, None]
+    cofactors = [cross(linear[:, (k + 1) % 3], linear[:, (k + 2) % 3]) for k in range(3)]
+    normal = np.stack(cofactors, axis=1)
+    reach = np.linalg.norm(matrices[:, :, 3], axis=1) + REACH * radius
+    return Instances(number, objects, placed, matrices.astype(F), normal.astype(F), reach.astype(F))
 
 
 def _linear(matrix: NDArray[Any], row: Ids, vectors: Vectors) -> Vectors:

@@ -14,7 +14,7 @@ from illumcli.geometry.bounds import ObjectBounds, object_bounds, transformed_bl
 from illumcli.geometry.corner_normals import CornerNormals
 from illumcli.geometry.corner_normals import corner_normals as mesh_corner_normals
 from illumcli.geometry.extent import extents
-from illumcli.geometry.instances import Instances, instance_matrix, instances, shared_meshes
+from illumcli.geometry.instances import Instances, instance_matrices, instances, shared_meshes
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import polygon_normals as mesh_polygon_normals
 from illumcli.geometry.polygon_normals import reversed_polygons
@@ -224,16 +224,18 @@ def scene_geometry(
     ]
     placed_mesh = np.zeros(len(meshes), np.int32)
     placed_mesh[[each.object for each in stored]] = np.arange(len(stored))
+    every = np.array(matrices).reshape(-1, 4, 4)
     objects: list[int] = []
-    to_render: list[NDArray[np.float64]] = []
+    to_render = [np.zeros((0, 3, 4))]
     for members, mirrored in shares:
         own = _own_space(members[0], meshes[members[0]], mirrored)
         placed_mesh[members] = len(stored)
         stored.append(own)
         objects += members
-        to_render += [instance_matrix(matrices[i] @ own.matrix, own.space, render_space) for i in members]
-    shared = instances(len(meshes), objects, placed_mesh[objects].tolist(), to_render)
-    return _geometry(by_file, stored, render_space, np.array(matrices).reshape(-1, 4, 4), placed_mesh, shared)
+        to_render.append(instance_matrices(every[members] @ own.matrix, own.space, render_space))
+    of_instances = np.array(objects, np.int32)
+    shared = instances(len(meshes), of_instances, placed_mesh[of_instances], np.concatenate(to_render))
+    return _geometry(by_file, stored, render_space, every, placed_mesh, shared)
 
 
 def _own_space(number: int, mesh: Mesh, mirrored: bool) -> _Stored:

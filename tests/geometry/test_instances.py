@@ -13,28 +13,39 @@ from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import place_meshes, scene_geometry, without_culled
 from illumcli.geometry.shapes.box import Box
 from illumcli.geometry.shapes.torus import Torus
+from illumcli.geometry.transforms import rotation
 from illumcli.rays.interaction import uv_tangents
 
 SHEARED = np.array([[1, 0.5, 0, 3], [0, 1, 0, -1], [0.2, 0, 1, 0], [0, 0, 0, 1.0]])
 MIRRORED = np.diag([-2.0, 2, 2, 1])
 
 
+QUADS = np.full(5, 4)
+
+
 def test_objects_of_one_kind_share_a_mesh():
     plain = [np.eye(4)] * 5
-    assert shared_meshes([0, 1, 2, 3, 4], plain) == []
-    (group,) = shared_meshes([0, 1, 0, 2, 0], plain)
+    assert shared_meshes([0, 1, 2, 3, 4], plain, QUADS) == []
+    (group,) = shared_meshes([0, 1, 0, 2, 0], plain, QUADS)
     assert (group.objects, group.mirrored) == ((0, 2, 4), False)
 
 
 def test_mirrored_objects_share_a_mirror_image():
-    one, other = shared_meshes([0] * 4, [np.eye(4), MIRRORED, MIRRORED, SHEARED])
+    one, other = shared_meshes([0] * 4, [np.eye(4), MIRRORED, MIRRORED, SHEARED], QUADS[:4])
     assert (one.objects, one.mirrored, other.objects, other.mirrored) == ((0, 3), False, (1, 2), True)
 
 
 @pytest.mark.parametrize(("axes", "count"), [((1, 1, 3), 1), ((1, 1, 3.01), 0), ((1, 0, 1), 0)])
 def test_matrices_that_stretch_too_far_are_no_instances(axes, count):
-    assert len(shared_meshes([0, 0], [np.diag([*axes, 1.0])] * 2)) == count
-    assert len(shared_meshes([0, 0], [np.eye(4), np.diag([*axes, 1.0])])) == count
+    assert len(shared_meshes([0, 0], [np.diag([*axes, 1.0])] * 2, QUADS[:2])) == count
+    assert len(shared_meshes([0, 0], [np.eye(4), np.diag([*axes, 1.0])], QUADS[:2])) == count
+
+
+@pytest.mark.parametrize(("corners", "count"), [(4, 1), (5, 0)])
+def test_larger_polygons_are_not_stretched(corners, count):
+    turned = rotation(1, 30.0) * 2
+    assert len(shared_meshes([0, 0], [turned, np.eye(4)], np.full(2, corners))) == 1
+    assert len(shared_meshes([0, 0], [turned, np.diag([1, 1, 1.1, 1])], np.full(2, corners))) == count
 
 
 def shared_and_own(mesh: Mesh):

@@ -28,6 +28,7 @@ class ObjectBounds(Record):
     ]  # (O, 3) lowest corner of each box [scene units]; inf for an object without polygons
     high: NDArray[np.float64]  # (O, 3) highest corner; -inf without polygons
     polygons: NDArray[np.int64]  # (O,) number of polygons
+    most_corners: NDArray[np.int64]  # (O,) of any polygon
     render_space: RenderSpace
 
 
@@ -57,7 +58,10 @@ def object_bounds(
     radius = float(np.linalg.norm((highest - lowest) / 2)) or 1.0
     render_space = RenderSpace((float(centre[0]), float(centre[1]), float(centre[2])), radius)
     polygons = np.array([mesh.polygon_count for mesh in meshes], np.int64)
-    return ObjectBounds(tuple(matrices), low, high, polygons, render_space)
+    of_distinct = {id(mesh): mesh for mesh in meshes}
+    most = {key: int(np.diff(mesh.starts).max(initial=0)) for key, mesh in of_distinct.items()}
+    most_corners = np.array([most[id(mesh)] for mesh in meshes], np.int64)
+    return ObjectBounds(tuple(matrices), low, high, polygons, most_corners, render_space)
 
 
 def _transformed_box(

@@ -25,6 +25,9 @@ REACH = 6.0
 """Radii of an instance that its ray offsets are proportional to, beside the distance of its centre from the
 scene's: the error of a ray in the mesh's space grows with both. Of 3 million rays that leave large faces,
 half of them within 0.1 rad of the face, 9 hit it again with 2 radii, none with 6."""
+SIMILAR = 1.0
+"""The same for meshes with polygons of more than four corners: mean value coordinates, by which these are
+interpolated, change where a polygon is stretched; those of triangles and quads do not."""
 ROUNDING = 1e-9
 """Relative rounding of a ratio of axes."""
 
@@ -81,7 +84,9 @@ class Shared(Record):
     mirrored: bool
 
 
-def shared_meshes(kinds: Sequence[int], matrices: Sequence[NDArray[np.float64]]) -> list[Shared]:
+def shared_meshes(
+    kinds: Sequence[int], matrices: Sequence[NDArray[np.float64]], most_corners: NDArray[np.int64]
+) -> list[Shared]:
     """The objects that share a mesh with another; those of other objects are stored one by one.
 
     It depends on the scene's description alone, so that culling an object changes no other.
@@ -92,12 +97,15 @@ def shared_meshes(kinds: Sequence[int], matrices: Sequence[NDArray[np.float64]])
         Equal for objects that have one mesh, and whose normals and uv are computed in one way.
     matrices : sequence of (4, 4) float64
         Object to scene, one for each object.
+    most_corners : (O,) int64
+        Of any polygon of each object.
     """
     if len(set(kinds)) == len(kinds):
         return []
     linear = np.stack(matrices)[:, :3, :3]
     axes = np.linalg.svd(linear, compute_uv=False)
-    is_mild = (axes[:, 0] <= MOST_STRETCH * (1 + ROUNDING) * axes[:, 2]) & (axes[:, 2] > 0)
+    most = np.where(most_corners > 4, SIMILAR, MOST_STRETCH)
+    is_mild = (axes[:, 0] <= most * (1 + ROUNDING) * axes[:, 2]) & (axes[:, 2] > 0)
     is_mirrored = np.linalg.det(linear) < 0
     keys = [*zip(kinds, is_mirrored.tolist(), strict=True)]
     count = Counter(key for key, mild in zip(keys, is_mild, strict=True) if mild)

@@ -213,7 +213,7 @@ def scene_geometry(
     render_space, matrices = object_bounds.render_space, object_bounds.matrices
     groups = [
         ([i for i in group.objects if meshes[i].polygon_count], group.mirrored)
-        for group in shared_meshes(kinds, matrices)
+        for group in shared_meshes(kinds, matrices, object_bounds.most_corners)
     ]
     shares = [(members, mirrored) for members, mirrored in groups if members]
     sharing = {i for members, _ in shares for i in members}

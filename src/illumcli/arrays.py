@@ -63,7 +63,11 @@ def row_blocks(count: int) -> Iterator[slice]:
 
 def dot(a: Vectors, b: Vectors) -> Floats:
     """(N,) a . b per element; summed in a fixed order, so that no result depends on its neighbours."""
-    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    out = a[:, 0] * b[:, 0]
+    product = a[:, 1] * b[:, 1]
+    out += product
+    out += np.multiply(a[:, 2], b[:, 2], out=product)
+    return out
 
 
 def cross(a: Vectors, b: Vectors) -> Vectors:
@@ -82,7 +86,7 @@ def length(a: Vectors) -> Floats:
 def unit(a: Vectors) -> Vectors:
     """(N, 3) `a` scaled to length 1; zero vectors remain zero."""
     size = length(a)
-    return a * np.divide(1, size, out=np.zeros_like(size), where=size > 0)[:, None]
+    return a * (1 / np.maximum(size, np.finfo(size.dtype).tiny))[:, None]
 
 
 def mirror(l: Vectors, n: Vectors, n_l: Floats) -> Vectors:

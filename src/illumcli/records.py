@@ -19,11 +19,15 @@ class Value:
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
+    _known: ClassVar[tuple[Field[Any], ...]]
+    """`dataclasses.fields` of the class."""
+
     def __init_subclass__(cls) -> None:
         dataclass(init=False, repr=False, eq=False)(cls)
+        cls._known = fields(cls)
 
     def __init__(self, *values: Any, **named: Any) -> None:
-        cls, known = type(self), fields(self)
+        cls, known = type(self), self._known
         if len(values) > len(known):
             raise TypeError(f"{cls.__name__} takes {', '.join(part.name for part in known)}")
         values_by_name = vars(self)
@@ -58,7 +62,7 @@ class Value:
         return hash((type(self), *vars(self).values()))
 
     def __repr__(self) -> str:
-        shown = [f"{part.name}={getattr(self, part.name)!r}" for part in fields(self) if part.repr]
+        shown = [f"{part.name}={getattr(self, part.name)!r}" for part in self._known if part.repr]
         return f"{type(self).__name__}({', '.join(shown)})"
 
 

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from illumcli.arrays import F, column_major
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
 from illumcli.geometry.corner_normals import corner_normals
@@ -14,7 +15,10 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import place_meshes, scene_normals
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.images.reader import read_image
+from illumcli.rays.corner_weights import TriangleCorners, corner_weights
+from illumcli.rays.interaction import ShadingContext, interact
 from illumcli.stress.rays import icosphere
+from illumcli.visibility.shadows import SEARCHES, smooth_surface
 
 SUN = np.array([-0.4, 1.0, 0.2]) / np.linalg.norm([-0.4, 1.0, 0.2])
 """Unit vector to the light."""
@@ -129,6 +133,30 @@ def test_without_the_terminator_the_polygons_cast_their_own_shadow(picture):
     away = (vectors(channels, "Ng") @ SUN < -0.02) & (vectors(channels, "N") @ SUN > 1e-3)
     assert away.sum() > 10
     assert (channels["shadow.sun.Y"][away] == 0).all()
+
+
+def test_the_implied_surface_does_not_depend_on_which_samples_were_asked_for_before():
+    """Some samples at a time, in more searches than are for the samples asked for alone; or all at once."""
+    ball, plate = icosphere(1), Mesh(BOX[:4], np.array([0, 1, 3, 2], np.int32), np.array([0, 4], np.int32))
+    geometry = place_meshes([ball, plate], [np.eye(4)] * 2)
+    normals = scene_normals(geometry, [corner_normals(mesh) for mesh in (ball, plate)])
+    triangle = np.repeat(np.arange(len(geometry.triangles), dtype=np.int32), 9)
+    random = np.random.default_rng(0)
+    u, v = (0.5 * random.random((2, len(triangle)))).astype(F)
+    objects = geometry.objects.take(triangle)
+    at = interact(geometry, objects, triangle, u, v, column_major(random.normal(size=(len(triangle), 3)), F))
+    weights = corner_weights(geometry, TriangleCorners(None, objects, triangle, u, v))
+    context, flat = ShadingContext(geometry, weights, at, normals), [False, True]
+
+    once = smooth_surface(flat, context, SmoothParts(geometry, normals))
+    curved = once.curved(np.arange(len(triangle)))
+    assert len(triangle) / 3 < len(curved) < len(triangle)
+    in_parts = smooth_surface(flat, context, SmoothParts(geometry, normals))
+    for part in np.array_split(random.permutation(len(triangle)), 3 * SEARCHES):
+        found = part[in_parts.curved(part)]
+        assert (np.sort(found) == np.intersect1d(part, curved)).all()
+        for name in ("offset", "start", "width"):
+            assert (getattr(in_parts, name)[found] == getattr(once, name)[found]).all()
 
 
 def parts_of(*meshes: Mesh) -> SmoothParts:

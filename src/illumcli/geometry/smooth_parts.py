@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids
+from illumcli.arrays import F, Ids, take_rows
 from illumcli.geometry.components import components
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 
@@ -39,13 +39,12 @@ class SmoothParts:
         return out
 
     def _share_corner(self, a: Ids, b: Ids) -> NDArray[np.bool_]:
-        geometry, out = self._geometry, np.zeros(len(a), np.bool_)
-        for i in range(3):
-            for j in range(3):
-                first, second = geometry.corners[:, i].take(a), geometry.corners[:, j].take(b)
-                same_vertex = geometry.triangles[:, i].take(a) == geometry.triangles[:, j].take(b)
-                out |= same_vertex & (self._normals.index.take(first) == self._normals.index.take(second))
-        return out
+        """(N,) True where a corner of `a` and one of `b` have the same vertex and normal."""
+        vertex, normal = self._geometry.triangles, self._normals.index
+        first, second = take_rows(self._geometry.corners, a), take_rows(self._geometry.corners, b)
+        is_same = take_rows(vertex, a)[:, :, None] == take_rows(vertex, b)[:, None, :]
+        is_same &= normal.take(first)[:, :, None] == normal.take(second)[:, None, :]
+        return is_same.any(axis=(1, 2))
 
     @cached_property
     def _part(self) -> NDArray[np.integer[Any]]:

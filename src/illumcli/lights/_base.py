@@ -56,11 +56,12 @@ def towards(light: np.ndarray, position: Vectors) -> tuple[Vectors, Floats]:
     """
     far = np.abs(light).max() > 1e4
     offset = column_major(light.astype(np.float64 if far else position.dtype) - position)
-    if not far and np.abs(offset).max(initial=0) < 1e-15:
-        far, offset = True, column_major(offset, np.float64)
     norm = length(offset)
+    if not far and norm.max(initial=0) < 1e-15:
+        far, offset = True, column_major(offset, np.float64)
+        norm = length(offset)
     distance = np.maximum(norm, NEAREST)
-    l = offset * np.divide(1, norm, out=np.zeros_like(norm), where=norm > 0)[:, None]
+    offset *= (1 / np.maximum(norm, np.finfo(norm.dtype).tiny))[:, None]  # a unit vector; 0 stays 0
     if far:
-        return column_major(l, position.dtype), distance.astype(position.dtype)
-    return l, distance
+        return column_major(offset, position.dtype), distance.astype(position.dtype)
+    return offset, distance

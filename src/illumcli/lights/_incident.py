@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, take_or_all
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, take_or_all
 from illumcli.lights._base import Light, LightSample
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
@@ -16,7 +16,7 @@ from illumcli.render_space import RenderSpace
 class LitPoints(Record):
     """The points that a light reaches if nothing occludes it, with the incident light there."""
 
-    index: Ids  # (K,) indices of the points, ascending: those with n.l > 0 and some light
+    index: NDArray[np.intp]  # (K,) indices of the points, ascending: those with n.l > 0 and some light
     count: int  # of all points
     l: Vectors  # (K, 3) unit, to the light
     distance: Floats  # (K,) to the light, in radii
@@ -61,9 +61,9 @@ def unshadowed(light: Light, render_space: RenderSpace, points: Oriented, shadow
     index = np.flatnonzero(shadow != 0)
     sample = light.sample_at(take_or_all(points.position, index), render_space)
     parts = sample.l, sample.distance, sample.irradiance_scale
-    return LitPoints(index.astype(np.int32), len(points.position), *parts)
+    return LitPoints(index, len(points.position), *parts)
 
 
 def _lit(sample: LightSample, index: NDArray[np.intp]) -> LitPoints:
     parts = (take_or_all(part, index) for part in (sample.l, sample.distance, sample.irradiance_scale))
-    return LitPoints(index.astype(np.int32), len(sample.l), *parts)
+    return LitPoints(index, len(sample.l), *parts)

@@ -160,7 +160,7 @@ def bands(
                     submit()
                 recorder.write(kept)
                 yield Band(row[0].y, band)
-            recorder.finish({name: _cost(plan, name, run.stats) for name in keeps})
+            recorder.finish({name: _cost(plan, name, run.stats) for name in recorder.names})
             if common.fits:
                 whole = FittedPixels.joined(common.fits)
                 run.cache.keep(FITTED, keeps[FITTED], whole, _cost(plan, FITTED, run.stats))

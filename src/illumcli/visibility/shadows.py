@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, column_major, dot, length, take_rows, unit
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, length, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._incident import LitPoints
@@ -23,28 +23,95 @@ from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import ShadingContext, SurfaceInteraction, facing
 from illumcli.rays.offsets import bounded, offset_ray_origins, to_tangent_plane
-from illumcli.records import Record
 
 TERMINATOR_SHARE = 1 / 3
 """Upper bound on the terminator offset, in diagonals of the polygon's bounding box, against arbitrary
 normals. A sphere from a cube's faces needs up to 0.24, from an octahedron's 0.27, finer spheres less."""
 NEARBY = 2.0
 """Distance, in such diagonals, within which anything but the same smooth surface shadows a sample."""
+SEARCHES = 4
+"""So many lights compute the implied surface at samples of their own; the next one at all of the tile."""
 
 
-class SmoothSurface(Record):
-    """The samples of a tile, with the normals that imply a smooth surface at each."""
+class SmoothSurface:
+    """The smooth surface that normals imply at the samples of a tile, where shadow rays may start.
 
-    context: ShadingContext
-    normals: CornerVectors
-    parts: SmoothParts
-    flat: NDArray[np.bool_]  # (O,) True for objects whose shadow rays start on their polygons
+    It depends on no light. It is computed at the samples that a light asks for and kept for the lights that
+    follow; a tile has one thread.
+    """
+
+    def __init__(
+        self,
+        context: ShadingContext,
+        normals: CornerVectors,
+        parts: SmoothParts,
+        flat: NDArray[np.bool_],
+    ) -> None:
+        """`flat` is True for objects whose shadow rays start on their polygons, (O,)."""
+        count = len(context.weights)
+        self.interaction, self.parts = context.interaction, parts
+        self.geometry, self.hits = context.geometry, context.weights.hits
+        self._context, self._normals, self._flat = context, normals, flat
+        self._searches = 0
+        self._is_known, self._is_curved = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        self.offset = np.empty((count, 3), F, order="F")
+        """(M, 3) from the samples of `curved` to the implied surface."""
+        self.start = np.empty((count, 3), F, order="F")
+        """(M, 3) origins of rays from there."""
+        self.width = np.empty(count, F)
+        """(M,) diagonal of the bounding box of each of their polygons [radii]."""
+
+    def curved(self, sample: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Indices into `sample` of the samples that lie below the implied surface."""
+        unknown = sample.compress(~self._is_known.take(sample))
+        if unknown.size:
+            self._searches += 1
+            self._compute(unknown if self._searches <= SEARCHES else np.flatnonzero(~self._is_known))
+        return np.flatnonzero(self._is_curved.take(sample))
+
+    def _compute(self, sample: NDArray[Any]) -> None:
+        """The offset from each sample to the implied surface; it is 0 on flat polygons and objects."""
+        interaction, geometry = self.interaction, self.geometry
+        weights = self._context.weights.take(sample)
+        position = take_rows(interaction.position, sample)
+        width = _box_diagonals(geometry, weights)
+        offset = self._terminator_offset(
+            weights, column_major(position, F), interaction.back_facing.take(sample)
+        )
+        offset = bounded(offset, TERMINATOR_SHARE * width)
+        is_flat = self._flat.take(weights.hits.objects)
+        curved = np.flatnonzero((length(offset) > 0) & ~is_flat)
+
+        # Keep it where it is not 0, with the origins of rays from there.
+        self._is_known[sample] = True
+        sample, offset = sample.take(curved), _at(offset, curved)
+        ng, edge = take_rows(interaction.ng, sample), interaction.edge.take(sample)
+        self._is_curved[sample] = True
+        self.offset[sample] = offset
+        self.start[sample] = offset_ray_origins(_at(position, curved) + offset, ng, edge)
+        self.width[sample] = width.take(curved)
+
+    def _terminator_offset(
+        self, weights: CornerWeights, position: Vectors, back_facing: NDArray[np.bool_]
+    ) -> Vectors:
+        """(B, 3) offset of samples on polygons to the surface that the normals at the corners imply."""
+        geometry, normals = self.geometry, self._normals
+
+        def corner_offset(group: Corners, k: int) -> Vectors:
+            normal, corner = group.normal(geometry, normals, k), group.position(geometry, k)
+            if group.index is None:
+                return to_tangent_plane(position, corner, facing(normal, back_facing))
+            return to_tangent_plane(
+                take_rows(position, group.index), corner, facing(normal, back_facing.take(group.index))
+            )
+
+        return weights.weighted_mean(corner_offset)
 
 
 def smooth_surface(
     flat: Sequence[bool], shading_context: ShadingContext, smooth_parts: SmoothParts
 ) -> SmoothSurface:
-    """The samples with the smooth surface that their normals imply; `flat` objects have none."""
+    """The smooth surface that the normals of the samples imply; `flat` objects have none."""
     assert shading_context.normals is not None
     return SmoothSurface(shading_context, shading_context.normals, smooth_parts, np.array(flat, np.bool_))
 
@@ -72,71 +139,44 @@ def shadow(
 
     # A second one, from the implied surface, where it is blocked.
     if smooth is not None and (blocked := np.flatnonzero(hidden)).size:
-        sample = lit.index.take(blocked)
-        l, distance = column_major(take_rows(lit.l, blocked)), lit.distance.take(blocked)
-        hidden[blocked] = ~_lit_on_implied_surface(tracer, smooth, ray_origins, sample, l, distance)
+        hidden[_lit_on_implied_surface(tracer, smooth, ray_origins, lit, blocked)] = False
     delta[lit.index] = ~hidden
     return delta
 
 
 def _lit_on_implied_surface(
-    tracer: Tracer, smooth: SmoothSurface, origins: Vectors, sample: Ids, l: Vectors, distance: Floats
-) -> NDArray[np.bool_]:
-    """(B,) True for samples whose own ray is blocked, but which the light reaches on the implied surface."""
-    # The offset from each sample to the implied surface; it is 0 on flat polygons and objects.
-    interaction, geometry = smooth.context.interaction, smooth.context.geometry
-    weights = smooth.context.weights.take(sample)
-    position = take_rows(interaction.position, sample)
-    width = _box_diagonals(geometry, weights)
-    offset = _terminator_offset(
-        smooth, weights, column_major(position, F), interaction.back_facing.take(sample)
+    tracer: Tracer, smooth: SmoothSurface, origins: Vectors, lit: LitPoints, blocked: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Those of the `blocked` lit points that the light reaches on the implied surface."""
+    # Keep the points whose shadow ray from there is unoccluded, as is the segment to the ray's origin.
+    sample = lit.index.take(blocked)
+    curved = smooth.curved(sample)
+    blocked, sample = blocked.take(curved), sample.take(curved)
+    if not len(sample):
+        return blocked
+    l, distance = take_rows(lit.l, blocked), lit.distance.take(blocked)
+    reached = np.flatnonzero(
+        ~tracer.occluded(take_rows(smooth.start, sample), column_major(l), distance, coherent=True)
     )
-    offset = bounded(offset, TERMINATOR_SHARE * width)
-    objects = weights.hits.objects
-    flat = smooth.flat.take(objects)
-    curved = np.flatnonzero((length(offset) > 0) & ~flat)
+    if not reached.size:
+        return reached
+    offset = take_rows(smooth.offset, sample.take(reached))
+    height = length(offset)
+    starts = take_rows(origins, sample.take(reached))
+    is_free = ~tracer.occluded(starts, column_major(offset / height[:, None]), height)
 
-    # Keep the samples whose shadow ray from there is unoccluded, as is the segment to the ray's origin.
-    ng, edge = take_rows(interaction.ng, sample.take(curved)), interaction.edge.take(sample.take(curved))
-    starts = offset_ray_origins(_at(position, curved) + _at(offset, curved), ng, edge)
-    curved = curved[~tracer.occluded(starts, _at(l, curved), _at(distance, curved), coherent=True)]
-    height = length(_at(offset, curved))
-    on_polygon = column_major(take_rows(origins, sample.take(curved)))
-    curved = curved[~tracer.occluded(on_polygon, column_major(_at(offset, curved) / height[:, None]), height)]
-
-    # Anything nearby in the light's direction shadows the sample, except the surface itself.
-    on_polygon, ng = (
-        column_major(take_rows(origins, sample.take(curved))),
-        take_rows(interaction.ng, sample.take(curved)),
-    )
-    hit = tracer.closest(on_polygon, _above(_at(l, curved), ng))
-    near = np.minimum(NEARBY * _at(width, curved), _at(distance, curved))
+    # Anything nearby in the light's direction shadows the point, except the surface itself.
+    starts, reached = column_major(starts[is_free]), reached[is_free]
+    sample, distance = sample.take(reached), distance.take(reached)
+    hit = tracer.closest(starts, _above(take_rows(l, reached), take_rows(smooth.interaction.ng, sample)))
+    near = np.minimum(NEARBY * smooth.width.take(sample), distance)
     is_surface = (hit.triangle >= 0) & (
-        geometry.objects_of(hit.triangle, hit.instance) == objects.take(curved)
+        smooth.geometry.objects_of(hit.triangle, hit.instance) == smooth.hits.objects.take(sample)
     )
     same = np.flatnonzero(is_surface)
-    own = weights.hits.triangle.take(curved).take(same)
+    own = smooth.hits.triangle.take(sample.take(same))
     is_surface[same] = smooth.parts.are_joined(own, hit.triangle.take(same))
-    reached = np.zeros(len(sample), np.bool_)
-    reached[curved[(hit.distance >= near) | is_surface]] = True
-    return reached
-
-
-def _terminator_offset(
-    smooth: SmoothSurface, weights: CornerWeights, position: Vectors, back_facing: NDArray[np.bool_]
-) -> Vectors:
-    """(B, 3) offset of samples on polygons to the smooth surface that the normals at the corners imply."""
-    geometry, normals = smooth.context.geometry, smooth.normals
-
-    def corner_offset(group: Corners, k: int) -> Vectors:
-        normal, corner = group.normal(geometry, normals, k), group.position(geometry, k)
-        if group.index is None:
-            return to_tangent_plane(position, corner, facing(normal, back_facing))
-        return to_tangent_plane(
-            take_rows(position, group.index), corner, facing(normal, back_facing.take(group.index))
-        )
-
-    return weights.weighted_mean(corner_offset)
+    return blocked[reached[(hit.distance >= near) | is_surface]]
 
 
 def _box_diagonals(geometry: SceneGeometry, weights: CornerWeights) -> Floats:

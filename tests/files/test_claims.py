@@ -141,6 +141,31 @@ def test_where_no_claim_can_be_made_the_work_is_done(path, monkeypatch, code, ca
     assert not path.exists()
 
 
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder", "another user"])
+def test_what_is_no_claim_of_this_user_is_neither_waited_for_nor_changed(path, tmp_path, kind):
+    path.parent.mkdir()
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    match kind:
+        case "link":
+            path.symlink_to(victim)
+        case "pipe":
+            os.mkfifo(path)
+        case "folder":
+            path.mkdir()
+        case _:
+            if os.geteuid():
+                pytest.skip("needs root to make a file of another user")
+            other_machines(path)
+            os.chown(path, 12345, 12345)
+    before = os.lstat(path)
+    with Claims().take(path) as claim:
+        assert claim is not None
+    tidy(path.parent)
+    assert (os.lstat(path).st_ino, os.lstat(path).st_mtime) == (before.st_ino, before.st_mtime)
+    assert victim.read_text() == "precious"
+
+
 def test_claims_of_killed_processes_are_tidied_and_others_not(path, holder):
     held, killed, elsewhere, old = (path.with_name(f".{k * 12}.{k * 32}.claim") for k in "1234")
     with Claims().take(held):

@@ -20,6 +20,7 @@ from illumcli.commands.shard_files import (
     write_record,
 )
 from illumcli.commands.shards import shard_of_each
+from illumcli.errors import OutputError
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh
 from illumcli.files.reports import report_contents
 from illumcli.records import Value
@@ -85,7 +86,13 @@ class Sharding:
             if number in contents:
                 names = self._record.units[number].files
                 self._contents[number] = dict(zip(names, contents[number], strict=True))
-        self._is_kept = is_kept(self._path, [self._content], report_contents, force)
+        try:
+            self._is_kept = is_kept(self._path, [self._content], report_contents, force)
+        except OutputError as error:
+            if error.__cause__ is not None or not self._path.is_file():
+                raise
+            fact = "is the record of another command"
+            raise OutputError(f"{self._path}: {fact}; remove it, or write to another folder") from None
 
     def add(self, number: int, report: Mapping[str, Any]) -> None:
         """Note the report of a unit that was done."""

@@ -7,7 +7,8 @@ it was not touched for `STALE` seconds by the clock of the process that waits. T
 machines, whose locks not all file systems show.
 
 A claim saves work and protects nothing: outputs are written whole and are the same bytes whoever writes them.
-Where no claim can be made, because the disk is full or the folder is read-only, the work is done without.
+Where no claim can be made, because the disk is full or the folder is read-only, and where another user or a
+link has its name, the work is done without.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import stat
 import threading
 import time
 from collections.abc import Sequence
@@ -66,6 +68,9 @@ class Claims:
         try:
             handle = created(path, 0o644)
         except FileExistsError:
+            about = os.lstat(path)
+            if not stat.S_ISREG(about.st_mode) or about.st_uid != os.geteuid():
+                raise  # no claim of this user's processes: nobody waits for it
             taken_over = _stale(path) or self._of_silent(path)
             if taken_over is None:
                 return None
@@ -81,7 +86,7 @@ class Claims:
         this process looked at it; None if there is none."""
         now = time.monotonic()
         try:
-            touched = path.stat().st_mtime
+            touched = os.lstat(path).st_mtime
             seen, since = self._seen.setdefault(path, (touched, now))
             if seen != touched:
                 self._seen[path] = touched, now
@@ -164,7 +169,7 @@ def _stale(path: Path) -> int | None:
     """The locked descriptor of a claim whose process on this machine has died; None if there is none."""
     try:
         handle = claim(path, create=False)
-    except OSError:  # removed just now, or another user's
+    except OSError:  # removed just now
         return None
     if handle is None:
         return None

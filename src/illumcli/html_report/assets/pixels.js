@@ -32,7 +32,9 @@ function scriptOf(identity) {
 }
 
 async function unpacked(data) {
-  const bytes = Uint8Array.from(atob(data.data), (letter) => letter.charCodeAt(0));
+  const letters = atob(data.data);
+  const bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < bytes.length; k++) bytes[k] = letters.charCodeAt(k);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer());
   const stored = values(planes, data);
@@ -55,9 +57,18 @@ function values(planes, { width, height, channels, type }) {
     }
   }
   const view = new DataView(joined.buffer);
-  const read = size === 2 ? (k) => half(view.getUint16(2 * k, true)) : (k) => view.getFloat32(4 * k, true);
-  return Float32Array.from({ length: count * channels }, (_, k) => read(k));
+  const numbers = new Float32Array(count * channels);
+  for (let k = 0; k < numbers.length; k++) {
+    numbers[k] = size === 2 ? halves()[view.getUint16(2 * k, true)] : view.getFloat32(4 * k, true);
+  }
+  return numbers;
 }
+
+// Every number of 16 bits, made when it is first needed.
+const halves = (() => {
+  let table = null;
+  return () => (table ??= Float32Array.from({ length: 65536 }, (_, bits) => half(bits)));
+})();
 
 // The number that 16 bits stand for (IEEE 754 binary16).
 function half(bits) {

@@ -4,7 +4,7 @@
 class Gallery {
   constructor(root) {
     this.root = root;
-    this.list = el("ul", { class: "gallery" });
+    this.list = el("ul", { class: "gallery", role: "list" }); // Safari takes a list without bullets for none
     this.items = new Map(); // place -> list item
     this.indices = [];
     root.append(this.list);

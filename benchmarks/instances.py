@@ -37,7 +37,7 @@ def crowd(folder: Path, count: int) -> Path:
         "\n".join(
             [
                 "version: 1",
-                "camera: {position: [0, 2.6, 2.6], target: [0, 0.1, 0.1], fov: 42}",
+                "camera: {position: [0, 2.6, 2.6], target: [0, 0.1, 0.1], fov: 24}",
                 f"film: {{width: {SIZE[0]}, height: {SIZE[1]}, samples: 1}}",
                 "ambient: 0.5",
                 "obscurance: {samples: 16}",

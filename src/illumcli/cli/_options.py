@@ -196,6 +196,10 @@ report_option = click.option(
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 
+json_results_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print a list of what was done as JSON, instead of paths."
+)
+
 
 def seed_option(text: str, default: int | None = None) -> Callable[[C], C]:
     """Adds `--seed` with a help text of its own."""

@@ -17,6 +17,8 @@ def reporter(quiet: bool) -> Progress:
     def report(what: str, done: int, total: int) -> None:
         nonlocal start, last
         now = time.monotonic()
+        if done == 0:
+            start = now
         if done >= total:
             if terminal:
                 rewrite("\r\x1b[K")
@@ -27,7 +29,7 @@ def reporter(quiet: bool) -> Progress:
             return
         last = now
         left = (now - start) * (total - done) / max(done, 1)
-        text = f"{what}: {100 * done / total:.0f} %, {clock(left)} left"
+        text = f"{what}: {100 * done / total:.0f} %" + (f", {clock(left)} left" if done else "")
         if terminal:
             rewrite("\r\x1b[K")
         print(text, end="" if terminal else "\n", file=sys.stderr, flush=True)

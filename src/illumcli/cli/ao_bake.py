@@ -16,6 +16,7 @@ from illumcli.cli._options import (
     cluster_options,
     force_option,
     gathered,
+    json_results_option,
     keep_going_option,
     overrides_option,
     quiet_option,
@@ -27,7 +28,7 @@ from illumcli.cli._options import (
     threads_option,
     verbose_option,
 )
-from illumcli.cli._printing import print_paths, say, say_kept
+from illumcli.cli._printing import Results, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
@@ -186,6 +187,7 @@ def _request(options: dict[str, Any]) -> BakeRequest:
 @threads_option
 @overrides_option
 @report_option
+@json_results_option
 @force_option()
 @keep_going_option
 @cluster_options
@@ -199,6 +201,7 @@ def ao_bake(
     request: BakeRequest,
     report: Path | None,
     runner: RunnerOf,
+    as_json: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -212,7 +215,7 @@ def ao_bake(
     from illumcli.commands.bake import bake_inputs
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
-        print_paths(paths)
+        found.add(paths, {"input": str(source), **done.as_data()})
         if not quiet:
             _say_report(source, done, verbose)
         if verbose:
@@ -221,14 +224,17 @@ def ao_bake(
             for name, seconds in done.seconds.items():
                 say(f"{seconds:8.3f} s  {name}")
 
+    found = Results(as_json)
     if request.shard is not None:
         from illumcli.commands.bake_shard import bake_shard
 
-        lines = bake_shard(inputs, request, report, runner(reporter(quiet)), written, say)
+        with found:
+            lines = bake_shard(inputs, request, report, runner(reporter(quiet)), written, found.fail)
         if not quiet:
             say(lines)
         return
-    is_kept = bake_inputs(inputs, request, report, runner(reporter(quiet)), written, say)
+    with found:
+        is_kept = bake_inputs(inputs, request, report, runner(reporter(quiet)), written, found.fail)
     if is_kept and not quiet:
         say_kept([report])
 

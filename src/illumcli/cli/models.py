@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import click
 
+from illumcli.cli._options import json_option
+
 
 @click.command()
 @click.argument("name", required=False)
-def models(name: str | None) -> None:
+@json_option
+def models(name: str | None, as_json: bool) -> None:
     """Print the illumination models, or all about the model NAME.
 
     \b
@@ -15,6 +18,11 @@ def models(name: str | None) -> None:
       illum models
       illum models cook_torrance
     """
-    from illumcli.commands.models import page, table
+    from illumcli.commands.models import data, page, table
 
-    click.echo(page(name) if name else table())
+    if as_json:
+        import json
+
+        click.echo(json.dumps(data(name), indent=1))
+    else:
+        click.echo(page(name) if name else table())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,7 @@ from illumcli.cli._options import (
     force_option,
     frames_option,
     gathered,
+    json_results_option,
     keep_going_option,
     no_cache_option,
     only_option,
@@ -31,7 +32,7 @@ from illumcli.cli._options import (
     threads_option,
     verbose_option,
 )
-from illumcli.cli._printing import print_paths, say, say_kept
+from illumcli.cli._printing import Results, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.commands.options import RenderOptions
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 @seed_option("Random seed; by default the scene's.")
 @threads_option
 @report_option
+@json_results_option
 @force_option()
 @keep_going_option
 @cluster_options
@@ -68,6 +70,7 @@ def render(
     options: RenderOptions,
     report: Path | None,
     runner: RunnerOf,
+    as_json: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -101,25 +104,34 @@ def render(
             error = done.report.error
             reached = f"for an error of {error['target']:g}; reached {error['reached']:.3g}"
             say(f"{done.scene}: {' '.join(done.report.chosen)}, {reached}")
-        print_paths(done.paths)
+        found.add(done.paths, _entry(done))
         _say_report(done, quiet, verbose, say_once)
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)
 
+    found = Results(as_json)
     if options.shard is not None:
         from illumcli.commands.render_shard import render_shard
 
-        lines = render_shard(scenes, options, report, runner(reporter(quiet)), written, say)
+        with found:
+            lines = render_shard(scenes, options, report, runner(reporter(quiet)), written, found.fail)
         if not quiet:
             say(lines)
         return
     from illumcli.commands.render_all import render_scenes
 
-    is_kept = render_scenes(scenes, options, report, runner(reporter(quiet)), written, say)
+    with found:
+        is_kept = render_scenes(scenes, options, report, runner(reporter(quiet)), written, found.fail)
     if is_kept and not quiet:
         say_kept([report])
     if not quiet and sys.stderr.isatty():
         _say_films(films)
+
+
+def _entry(done: Rendered) -> dict[str, Any]:
+    """A rendered scene or frame for JSON."""
+    frame = {} if done.frame is None else {"frame": done.frame}
+    return {**frame, **done.report.as_data()}
 
 
 def _say_films(films: Mapping[Path, Sequence[Rendered]]) -> None:

@@ -14,6 +14,7 @@ from illumcli.cli._options import (
     cluster_options,
     force_option,
     gathered,
+    json_results_option,
     keep_going_option,
     no_cache_option,
     only_option,
@@ -29,7 +30,7 @@ from illumcli.cli._options import (
     variants_options,
     verbose_option,
 )
-from illumcli.cli._printing import print_paths, say, say_kept
+from illumcli.cli._printing import Results, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.commands.options import RenderOptions
@@ -73,6 +74,7 @@ def _files(options: dict[str, Any]) -> SweepFiles:
 )
 @click.option("--flip", "flips", is_flag=True, help="Measure FLIP, too, which takes far longer.")
 @click.option("--report", type=FILE, metavar="FILE.json", help="Write every variant's report.")
+@json_results_option
 @click.option("--dry-run", is_flag=True, help="Print what the sweep would take, and render nothing.")
 @seed_option("By default the scene's.")
 @threads_option
@@ -94,6 +96,7 @@ def sweep(
     files: SweepFiles,
     runner: RunnerOf,
     dry_run: bool,
+    as_json: bool,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -114,10 +117,14 @@ def sweep(
     from illumcli.scene.problems import without_frame
 
     if dry_run:
+        import json
+
         from illumcli.commands.plan import plan_scene
         from illumcli.commands.plan_table import variants_table
 
-        click.echo(variants_table(plan_scene(scene, variants, options)))
+        parts = plan_scene(scene, variants, options)
+        shown = [part["variants"] for part in parts if "variants" in part]
+        click.echo(json.dumps(shown, indent=1) if as_json else variants_table(parts))
         return
     printed: set[str] = set()
 
@@ -125,10 +132,10 @@ def sweep(
         # a fault of the scene is the same in all variants: print it once
         if outcome.error is not None and (fault := without_frame(str(outcome.error))) not in printed:
             printed.add(fault)
-            say(f"{outcome.label}: {outcome.error}")
+            found.fail(f"{outcome.label}: {outcome.error}", _about(outcome))
         if outcome.report is None:
             return
-        print_paths(outcome.paths)
+        found.add(outcome.paths, _about(outcome) | outcome.report.as_data())
         if quiet:
             return
         say_kept(outcome.report.kept)
@@ -137,10 +144,19 @@ def sweep(
                 say(f"{scene}: {line}")
             printed.add(line)
 
-    result = sweep_scene(scene, variants, options, files, runner(reporter(quiet)), written)
+    found = Results(as_json)
+    with found:
+        result = sweep_scene(scene, variants, options, files, runner(reporter(quiet)), written)
     for warning in result.warnings:
         say(warning)
     if not quiet:
         say_kept(result.kept)
         if result.summary:
             say(result.summary)
+
+
+def _about(outcome: Outcome) -> dict[str, Any]:
+    """The variant of an outcome for JSON."""
+    variant = outcome.variant
+    frame = {} if variant.frame is None else {"frame": variant.frame}
+    return {"label": outcome.label, "values": dict(variant.values), **frame}

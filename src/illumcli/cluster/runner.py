@@ -20,11 +20,12 @@ from illumcli.cluster.address import Address
 from illumcli.cluster.inputs import scene_of
 from illumcli.cluster.session import Session
 from illumcli.commands.batch import Batch
+from illumcli.commands.batch_progress import BatchProgress
 from illumcli.commands.runner import Pieces
 from illumcli.commands.unit import Unit
 from illumcli.errors import IllumError, InputError
 from illumcli.files.atomic import no_space_left, write_bytes
-from illumcli.progress import Progress
+from illumcli.progress import Progress, no_progress
 from illumcli.records import Value
 
 if TYPE_CHECKING:
@@ -73,19 +74,23 @@ class ClusterRunner:
         self, address: Address, is_mixed: bool, tell: Callable[[str], None], progress: Progress
     ) -> None:
         self._address, self._is_mixed, self._tell = address, is_mixed, tell
-        self.progress = progress
+        self._progress = progress
 
     def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
         """The index of each piece, in the order in which they are done, and a function that returns its
         result or raises its error."""
         due = [number for number in batch.due() if number not in pieces.kept]
         for number in sorted(pieces.kept):
-            yield number, partial(pieces.run, number)
+            yield number, partial(pieces.run, number, no_progress)
         if not due:
             return
         session = Session(self._address, self._is_mixed, self._tell)
         try:
-            yield from _Blocks(session, batch, pieces.unit, due).results()
+            of_batch = BatchProgress(batch, due, self._progress)
+            of_batch.start()
+            for number, result in _Blocks(session, batch, pieces.unit, due).results():
+                yield number, result
+                of_batch.finished(number)
         finally:
             session.close()
 

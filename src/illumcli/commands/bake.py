@@ -14,6 +14,7 @@ from illumcli.commands.options import Shard
 from illumcli.commands.runner import Pieces, Runner
 from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
+from illumcli.progress import Progress
 from illumcli.records import Value
 
 
@@ -74,8 +75,8 @@ def bake_inputs(
     entries.look(request.options.force)
 
     # Bake.
-    def run(index: int) -> tuple[list[Path], BakeReport]:
-        return worker.run(single or worker.prepare(request.job(inputs[index])), runner.progress)
+    def run(index: int, progress: Progress) -> tuple[list[Path], BakeReport]:
+        return worker.run(single or worker.prepare(request.job(inputs[index])), progress)
 
     pieces = Pieces(lambda index: request.job(inputs[index]), claims.__getitem__, run, frozenset(kept))
     for index, result in runner.results(batch, pieces):

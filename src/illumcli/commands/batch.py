@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from illumcli.commands.report import report_text
-from illumcli.errors import IllumError, known
-from illumcli.files.atomic import write_text
+from illumcli.errors import IllumError, OutputError, known
+from illumcli.files.atomic import is_full, write_text
 from illumcli.files.outputs import INCOMPLETE, is_kept, refresh, refuse_suffix
 from illumcli.files.reports import report_contents
 
@@ -19,15 +19,18 @@ Tell = Callable[[str], None]
 class Batch:
     """`count` pieces of work, called `what`, and their failures; `tell` gets the text of each failure.
 
-    Without `keep_going` the pieces after one that failed are not done. The error of a single piece is raised.
+    Without `keep_going` the pieces after one that failed are not done, and none after one that found the disk
+    full. The error of a single piece is raised.
     Failures of pieces that are left to others (`leave_all_but`) do not count.
     """
 
     def __init__(self, what: str, count: int, keep_going: bool, tell: Tell) -> None:
         self.failures: dict[int, IllumError] = {}
         self.count = count
-        self._what, self._own = what, set(range(count))
+        self.what = what
+        self._own = set(range(count))
         self._keep_going, self._tell = keep_going, tell
+        self._is_full = False
 
     def due(self) -> Iterator[int]:
         """The indices of the pieces that have not failed, until the batch has to stop."""
@@ -35,8 +38,13 @@ class Batch:
 
     def is_due(self, number: int) -> bool:
         """False for a piece that has failed, or that comes after one whose failure stops the batch."""
-        stops = self.failures and not self._keep_going and number > min(self.failures)
+        stops = self._is_full or (self.failures and not self._keep_going and number > min(self.failures))
         return not stops and number not in self.failures and number in self._own
+
+    @property
+    def own_count(self) -> int:
+        """Number of pieces that are not left to others."""
+        return len(self._own)
 
     def leave_all_but(self, own: Collection[int]) -> None:
         """Leave all other pieces to other processes."""
@@ -58,12 +66,15 @@ class Batch:
             if failure is None or self.count == 1:
                 raise
             self.failures[number] = failure
+            self._is_full |= isinstance(failure, OutputError) and is_full(failure)
             self._tell(f"{label}: {failure}" if label else str(failure))
 
     def finish(self, *also: str) -> None:
         """If pieces failed, raise their number and the lines of `also`, with the exit code of the first."""
         if self.failures:
-            failed = f"{len(self.failures)} of {len(self._own)} {self._what} failed"
+            failed = f"{len(self.failures)} of {len(self._own)} {self.what} failed"
+            if self._is_full:
+                failed = f"{failed}; no space is left, so no others were started"
             error = IllumError("\n".join([failed, *also]))
             error.exit_code = self.failures[min(self.failures)].exit_code
             raise error

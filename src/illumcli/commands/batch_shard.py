@@ -19,6 +19,7 @@ from illumcli.commands.sharding import Sharding
 from illumcli.commands.unit import Unit, Worker
 from illumcli.commands.work import Work
 from illumcli.errors import IllumError
+from illumcli.progress import Progress
 from illumcli.records import Value
 
 Done: TypeAlias = Callable[[Unit, list[Path], Any], Report | BakeReport]
@@ -61,13 +62,13 @@ def run_shard(of: BatchUnits, batch: Batch, worker: Worker, runner: Runner, done
     # Do the units; buffers that the next one of the same scene reads stay in memory.
     upcoming: dict[int, Work] = {}
 
-    def run(number: int) -> tuple[list[Path], Report | BakeReport]:
+    def run(number: int, progress: Progress) -> tuple[list[Path], Report | BakeReport]:
         nonlocal upcoming
         work = upcoming.pop(number, None) or worker.prepare(of.units[number])
         if not isinstance(work, Work):
-            return worker.run(work, runner.progress)
+            return worker.run(work, progress)
         upcoming = _following(of, number, worker)
-        return worker.run(work, runner.progress, next(iter(upcoming.values()), None))
+        return worker.run(work, progress, next(iter(upcoming.values()), None))
 
     pieces = Pieces(of.units.__getitem__, claims.__getitem__, run, frozenset(kept))
     for number, result in runner.results(batch, pieces):

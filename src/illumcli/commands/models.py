@@ -41,10 +41,7 @@ def page(tag: str) -> str:
     InputError
         No such model.
     """
-    try:
-        Model = member(PACKAGE, tag)
-    except LookupError as error:
-        raise InputError(f"no model '{tag}'; {error}") from None
+    Model = _model(tag)
     lines = [inspect.cleandoc(sys.modules[Model.__module__].__doc__ or ""), "", "Parameters", "----------"]
     schema = schema_of(Model)
     lines += _parameters(schema, schema.get("$defs", {}))
@@ -53,6 +50,33 @@ def page(tag: str) -> str:
         f"{'yes' if getattr(Model, claim) else 'no':4}{claim}: {text}" for claim, text in CLAIMS.items()
     ]
     return "\n".join(lines)
+
+
+def data(tag: str | None = None) -> list[dict[str, Any]]:
+    """All models, or one, for JSON: tag, description, claims, and the schema of the parameters.
+
+    Raises
+    ------
+    InputError
+        No such model.
+    """
+    return [
+        {
+            "model": tag_of(Model),
+            "description": inspect.cleandoc(sys.modules[Model.__module__].__doc__ or ""),
+            "claims": {claim: bool(getattr(Model, claim)) for claim in CLAIMS},
+            "schema": schema_of(Model),
+        }
+        for Model in ([_model(tag)] if tag else members(PACKAGE))
+    ]
+
+
+def _model(tag: str) -> Any:
+    """The class of a model."""
+    try:
+        return member(PACKAGE, tag)
+    except LookupError as error:
+        raise InputError(f"no model '{tag}'; {error}") from None
 
 
 def _parameters(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
 from illumcli.commands.runner import Pieces, Runner
 from illumcli.files.names import check_unique
+from illumcli.progress import Progress
 from illumcli.records import Value
 from illumcli.scene.frames import FRAMES_PER_SECOND
 from illumcli.scene.problems import without_value
@@ -68,9 +69,9 @@ def render_scenes(
     entries.look(options.force)
 
     # Render; buffers that the next frame reads stay in memory.
-    def run(number: int) -> tuple[list[Path], Report]:
+    def run(number: int, progress: Progress) -> tuple[list[Path], Report]:
         following = jobs.following(number)
-        paths, done = jobs.worker.run(jobs.work(number), runner.progress, following)
+        paths, done = jobs.worker.run(jobs.work(number), progress, following)
         ending = jobs.worker.finish() if following is None else ()
         return paths, replace(done, warnings=(*done.warnings, *ending))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from illumcli.commands.batch import Batch
+from illumcli.commands.batch_progress import BatchProgress
 from illumcli.commands.turns import turns
 from illumcli.progress import Progress, no_progress
 from illumcli.records import Value
@@ -25,18 +26,14 @@ class Pieces(Value, Generic[R]):
     """The unit of work of a piece."""
     claim_of: Callable[[int], Path | None]
     """The path of the claim on a piece; None for a piece that needs none."""
-    run: Callable[[int], R]
-    """Does a piece in this process."""
+    run: Callable[[int, Progress], R]
+    """Does a piece in this process, and tells how far it is."""
     kept: frozenset[int]
     """Those of which all files exist already: nothing is computed."""
 
 
 class Runner(Protocol):
     """Does the pieces of a batch that have not failed."""
-
-    @property
-    def progress(self) -> Progress:
-        """What is told how far pieces are that this process does."""
 
     def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
         """The index of each piece, and a function that returns its result or raises its error."""
@@ -49,5 +46,8 @@ class Here(Value):
 
     def results(self, batch: Batch, pieces: Pieces[R]) -> Iterator[tuple[int, Callable[[], R]]]:
         """The index of each piece, and a function that does it."""
+        of_batch = BatchProgress(batch, set(batch.due()) - pieces.kept, self.progress)
+        of_batch.start()
         for number in turns(batch, pieces.claim_of, self.progress):
-            yield number, partial(pieces.run, number)
+            yield number, partial(pieces.run, number, of_batch.of_piece)
+            of_batch.finished(number)

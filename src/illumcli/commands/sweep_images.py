@@ -15,6 +15,7 @@ from illumcli.commands.sweep_files import PlannedFiles
 from illumcli.commands.sweep_outcome import Outcome, following_due
 from illumcli.commands.sweep_works import SweepWorks
 from illumcli.errors import IllumError
+from illumcli.progress import Progress
 
 
 def render_variants(
@@ -29,13 +30,13 @@ def render_variants(
     following = following_due(done)
     last: Report | None = None
 
-    def run(index: int) -> tuple[list[Path], Report]:
+    def run(index: int, progress: Progress) -> tuple[list[Path], Report]:
         """Render a variant here; buffers that the next one reads stay in memory."""
         number, upcoming = following[index], None
         if number is not None:
             with suppress(IllumError):  # reported when it is its turn
                 upcoming = works.of(done[number])
-        return works.worker.run(works.of(done[index]), runner.progress, upcoming)
+        return works.worker.run(works.of(done[index]), progress, upcoming)
 
     def rendered(result: Callable[[], tuple[list[Path], Report]], outcome: Outcome) -> Outcome:
         outcome = replace(outcome, report=result()[1].sharing(last))

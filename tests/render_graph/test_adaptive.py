@@ -13,6 +13,7 @@ from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
+from illumcli.film.tiles import tiles
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
@@ -287,6 +288,19 @@ def test_the_error_changes_no_other_layer_and_comes_alone(scene, whole):
     expected = expected_rays(loaded.scene, [plan.view], plan.computed)
     assert expected["replicate.primary"] == replicated
     assert {"replicate.samples", "replicate.luminance"} <= {*reached(plan.graph, plan.outputs)}
+
+
+def test_no_probe_is_traced_twice(scene):
+    _, stats = rendered(scene, ["beauty"], side=16)
+    plan = planned(load(scene), ["beauty"])
+    view = plan.view
+    bordered = [
+        tile.grown(view.border, view.width, view.height)
+        for row in tiles(view.width, view.height, 16, 1)
+        for tile in row
+    ]
+    pixels = sum(tile.width * tile.height for tile in bordered)
+    assert stats.rays["probes"] == view.probing().samples * pixels
 
 
 def test_threads_share_a_small_picture_of_many_samples(scene):

@@ -205,6 +205,15 @@ def test_tiles_are_the_same_with_a_fit_from_the_cache(path, size):
     assert replace(steps, before=0).tile_side(steps.view) == steps.tile_side(steps.view)
 
 
+def test_tiles_with_margins_are_larger(path):
+    size = ["film.width=1280", "film.height=720"]
+    steps, raw = (
+        planned(load(path, [*size, f"obscurance.reconstruct={said}"]), ["beauty"])
+        for said in ("true", "false")
+    )
+    assert steps.tile_side(steps.view) ** 2 >= 1.5 * raw.tile_side(raw.view) ** 2
+
+
 def test_decisions_in_memory_go_with_another_fit(path):
     """The attempts for a target error keep what decides about pixels, too."""
     memory = MemoryCache()

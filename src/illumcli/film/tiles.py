@@ -15,6 +15,8 @@ MIN_TILE_SAMPLES, MAX_TILE_SAMPLES = 1 << 12, 1 << 16
 four times as often as arrays of 2^16, which costs more."""
 TILES = 24
 """Tiles of an image, approximately, for threads to share; fewer if they would be too small."""
+TILES_WITH_MARGINS = 12
+"""The same where every tile is computed with a wide margin."""
 MANY_NODES, MIN_SAMPLES_OF_MANY = 128, 1 << 14
 """If at least this many nodes run per tile, the smallest tiles are larger: threads wait for each other after
 each node, at the interpreter lock."""
@@ -25,9 +27,12 @@ def min_tile_samples(nodes: int) -> int:
     return MIN_SAMPLES_OF_MANY if nodes >= MANY_NODES else MIN_TILE_SAMPLES
 
 
-def tile_side(samples: int, pixels: int, min_samples: int = MIN_TILE_SAMPLES) -> int:
-    """Pixels along a square tile's side, a multiple of 8; tiles hold at least `min_samples` if they can."""
-    shared = max(math.isqrt(min_samples // samples), math.isqrt(pixels // TILES))
+def tile_side(samples: int, pixels: int, min_samples: int = MIN_TILE_SAMPLES, count: int = TILES) -> int:
+    """Pixels along a square tile's side, a multiple of 8, of about `count` tiles.
+
+    Tiles hold at least `min_samples` if they can.
+    """
+    shared = max(math.isqrt(min_samples // samples), math.isqrt(pixels // count))
     return max(8, min(shared, math.isqrt(MAX_TILE_SAMPLES // samples)) // 8 * 8)
 
 

@@ -54,12 +54,13 @@ class Tracer:
         tracer.rays, tracer._stop = 0, stop
         return tracer
 
-    def closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        """The closest hit of each ray; a ray that misses is traced again, turned by `RETRY_TURN`."""
+    def closest(self, origins: Vectors, directions: Vectors, retry: bool = True) -> Closest:
+        """The closest hit of each ray; to `retry`, a ray that misses is traced again, turned by
+        `RETRY_TURN`."""
         self._admit(origins, directions)
         hits = self._closest(origins, directions)
         missed = np.flatnonzero(hits.triangle < 0)
-        if missed.size and not self.is_empty:
+        if retry and missed.size and not self.is_empty:
             d, origin = directions[missed], missed // (len(directions) // len(origins))
             self.rays += len(missed)
             retried = self._closest(origins[origin], d + RETRY_TURN * np.abs(d[:, [1, 2, 0]]))

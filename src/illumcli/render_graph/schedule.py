@@ -9,7 +9,7 @@ from functools import cached_property
 from illumcli.cache.codec import codec_of
 from illumcli.cache.recorder import Cache
 from illumcli.errors import InputError
-from illumcli.film.tiles import min_tile_samples, tile_side
+from illumcli.film.tiles import TILES, TILES_WITH_MARGINS, min_tile_samples, tile_side
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import FIXED, Layer
@@ -101,8 +101,10 @@ class Plan(Value):
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
         min_samples = min_tile_samples(len(self.tile))
         if side is None:
-            side = tile_side(self.samples_per_pixel, view.width * view.height, min_samples)
-            if reconstructs(self.graph.scene):  # some rows of tiles are held at once
+            fitted = reconstructs(self.graph.scene)
+            count = TILES_WITH_MARGINS if fitted else TILES
+            side = tile_side(self.samples_per_pixel, view.width * view.height, min_samples, count)
+            if fitted:  # some rows of tiles are held at once
                 row = view.width * view.samples
                 side = max(min(side, ROW_SAMPLES // row // 8 * 8), min(side, LEAST_FITTED))
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side

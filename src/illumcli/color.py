@@ -33,11 +33,11 @@ def from_srgb(display: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 
 
 class Texels(Record):
-    """An image of linear values. Integers of 8 bits are kept, with a table of their linear values."""
+    """An image of linear values. Integers of 8 and 16 bits are kept, with a table of their linear values."""
 
-    stored: NDArray[Any]  # (H, W, S) float32 linear values, or uint8; the first row is the top
+    stored: NDArray[Any]  # (H, W, S) float32 linear values, or integers; the first row is the top
     channels: tuple[int, ...]  # C of the stored channels
-    tables: NDArray[np.float32] | None = None  # (C, 256) linear value of each integer
+    tables: NDArray[np.float32] | None = None  # (C, 256 or 65536) linear value of each integer
 
     @property
     def height(self) -> int:

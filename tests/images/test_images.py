@@ -593,11 +593,15 @@ def test_textures_that_are_not_finite_are_refused(tmp_path):
         linear(tmp_path / "a.exr", "linear")
 
 
-def test_textures_of_8_bits_stay_so_in_memory(tmp_path):
-    texels = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    write(tmp_path / "a.png", texels, dict.fromkeys("RGB", "uint8"))
-    assert read_texture(tmp_path / "a.png").stored.dtype == np.uint8
-    assert texture_bytes(tmp_path / "a.png") == texels.size
+@pytest.mark.parametrize("kind", ["uint8", "uint16"])
+def test_textures_of_integers_stay_so_in_memory(tmp_path, kind):
+    texels = np.arange(24, dtype=kind).reshape(2, 4, 3)
+    texels[0, 0] = np.iinfo(kind).max
+    write(tmp_path / "a.png", texels, dict.fromkeys("RGB", kind))
+    assert (read_texture(tmp_path / "a.png").stored == texels).all()
+    assert read_texture(tmp_path / "a.png").stored.dtype == kind
+    assert texture_bytes(tmp_path / "a.png") == texels.nbytes
+    np.testing.assert_allclose(linear(tmp_path / "a.png", "linear"), texels / np.iinfo(kind).max, rtol=1e-7)
     write(tmp_path / "a.exr", texels.astype(np.float32), dict.fromkeys("RGB", "float"))
     assert texture_bytes(tmp_path / "a.exr") == 4 * texels.size
 

@@ -93,7 +93,7 @@ def _texture_bytes(path: Path, modified: int, length: int) -> int:
 
 
 def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
-    """The image with linear values; values of 8 bits are kept, with a table that decodes them.
+    """The image with linear values; integers of 8 and 16 bits are kept, with a table that decodes them.
 
     Parameters
     ----------
@@ -115,12 +115,12 @@ def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
         texels = np.empty((source.height, source.width, len(source.names)), stored)
         y = invalid = 0
 
-        # Read band by band; decode all but 8-bit values.
+        # Read band by band; decode floats.
         for band in source.bands(stored.type):
             rows = texels[y : y + len(band)]
             rows[:] = band
             y += len(band)
-            if stored == np.uint8:
+            if stored.kind == "u":
                 continue
             for c in source.numbers:
                 rows[..., c] = numbers_of(rows[..., c])
@@ -130,11 +130,12 @@ def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
     if invalid:
         raise InputError(f"{os.fspath(path)}: {invalid} texels are NaN or infinite; mend the texture")
 
-    # Values of 8 bits get a table per channel that decodes them.
+    # Integers get a table per channel that decodes them.
     channels = tuple(range(texels.shape[2]))
-    if stored != np.uint8:
+    if stored.kind != "u":
         return Texels(texels, channels)
-    steps = np.arange(256) / 255
+    largest = np.iinfo(stored).max
+    steps = np.arange(largest + 1) / largest
     tables = np.tile(steps.astype(np.float32), (len(channels), 1))
     if is_curved:
         tables[colours] = from_srgb(steps).astype(np.float32)
@@ -143,7 +144,7 @@ def read_texture(path: str | os.PathLike[str], space: Space = None) -> Texels:
 
 def _stored_type(source: ImageSource) -> np.dtype[Any]:
     """The type that the texels of an image have in memory."""
-    return np.dtype(np.uint8 if source.dtype == np.uint8 else np.float32)
+    return source.dtype if source.dtype in (np.uint8, np.uint16) else np.dtype(np.float32)
 
 
 def read_embedded_texture(data: bytes, name: str, space: Space) -> Texels:

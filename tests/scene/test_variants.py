@@ -99,6 +99,11 @@ def test_labels_hold_what_differs(tmp_path):
     ]  # fmt: skip
     assert variants[0].values == {"m.a": "1", "m.b": "2", "s.c": "4", "s.d": "9"}
     assert variants[0].fields == {"label": "matte", "s.c": "small"}
+    spread = variants_of(["s.c=1:100:4log", "s.d=0.12345678,0.12345679"])
+    assert [variant.label for variant in spread[:3]] == [
+        "c 1, d 0.12345678", "c 1, d 0.12345679", "c 4.642, d 0.12345678"
+    ]  # fmt: skip
+    assert spread[2].values["s.c"] == "4.64158883361"
     moving = variants_of(["s.c=2*frame", "s.d=5,6"], frames="3:4")
     assert [variant.label for variant in moving] == [
         "d 5, frame 3", "d 5, frame 4", "d 6, frame 3", "d 6, frame 4"
@@ -129,6 +134,11 @@ def test_grid_zip_rows_and_frames(tmp_path):
     rows.write_text("a,b\n1\n")
     with pytest.raises(InputError, match="row 2 has 1 cells"):
         variants_of([], rows=rows)
+    spread = variants_of(["s.c=1:100:4log", "s.d=0.12345678,0.12345679"])
+    assert [variant.label for variant in spread[:3]] == [
+        "c 1, d 0.12345678", "c 1, d 0.12345679", "c 4.642, d 0.12345678"
+    ]  # fmt: skip
+    assert spread[2].values["s.c"] == "4.64158883361"
     moving = variants_of(["a=[cos(frame*0), frame/2, 3]"], frames="2:6:2")
     assert [(v.frame, v.values["a"]) for v in moving] == [
         (2, "[1, 1, 3]"),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from illumcli.html_report.entries import Contents, Entry
 from illumcli.records import Value
+from illumcli.scene.variants import number_in, short_numbers
 
 
 class Parameter(Value):
@@ -72,15 +73,6 @@ def short_labels(paths: Sequence[str]) -> list[str]:
     return [next((end for end in _ends(path) if ends[end] == 1), path) for path in paths]
 
 
-def short_numbers(values: Sequence[str]) -> tuple[str, ...]:
-    """Numbers with as few digits, at least four, as tell them apart; none is longer than it was."""
-    for digits in range(4, 17):
-        texts = tuple(min(value, f"{float(value):.{digits}g}", key=len) for value in values)
-        if len(set(texts)) == len(values):
-            return texts
-    return tuple(values)
-
-
 def _ends(path: str) -> list[str]:
     parts = path.split(".")
     return [".".join(parts[k:]) for k in reversed(range(len(parts)))]
@@ -93,21 +85,13 @@ def _distinct(entries: Sequence[Entry], path: str) -> tuple[str, ...]:
 
 def _parameter(path: str, label: str, values: tuple[str, ...], entries: Sequence[Entry]) -> Parameter:
     values = tuple(value for value in values if value)
-    numbers = [_number(value) for value in values]
+    numbers = [number_in(value) for value in values]
     if is_numeric := all(number is not None for number in numbers):
         values = tuple(sorted(values, key=float))
     index = {value: k for k, value in enumerate(values)}
     at = tuple(index.get(entry.values.get(path, ""), -1) for entry in entries)
     texts = short_numbers(values) if is_numeric else values
     return Parameter(path, label, values, texts, at, is_numeric)
-
-
-def _number(text: str) -> float | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None
 
 
 def _finite(number: float | None) -> float | None:

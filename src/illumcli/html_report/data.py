@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from illumcli.files.seal import BLANK, sealed_text
 from illumcli.html_report.columns import measures_of, parameters_of
 from illumcli.html_report.entries import Contents, Entry, Picture
 
-_FRACTION = re.compile(r"(?<![\w.])\d+\.\d{5,}(?![\w.])")
 _BEGIN = "const REPORT = "
 
 
@@ -37,7 +35,7 @@ def data_script(contents: Contents, folder: Path) -> str:
             for each in parameters_of(contents)
         ],
         "measures": [{"name": each.name, "values": each.values} for each in measures_of(contents)],
-        "labels": [_short(entry.label) for entry in entries],
+        "labels": [entry.label for entry in entries],
         "states": [entry.state for entry in entries],
         "errors": [entry.error for entry in entries],
         "commands": [entry.command for entry in entries],
@@ -74,11 +72,6 @@ def _stored(path: Path) -> dict[str, Any]:
     _, _, text = path.read_text(encoding="utf-8").partition(_BEGIN)
     data: dict[str, Any] = json.loads(text.rstrip().removesuffix(";"))
     return data
-
-
-def _short(label: str) -> str:
-    """A label with long decimal fractions shortened; the exact values are shown beside it."""
-    return _FRACTION.sub(lambda number: f"{float(number[0]):.4g}", label)
 
 
 def _identity(picture: Picture | None) -> str | None:

@@ -120,10 +120,13 @@ def variants_of(
         for row, point in itertools.product(table, grid)
     ]
     differ = [path for path in points[0].names if len({point.names[path] for point in points}) > 1]
+    shown = {path: _shown([point.names[path] for point in points]) for path in differ}
     variants = []
     for values, names in ((point.values, point.names) for point in points):
         parts = [
-            f"{path.rpartition('.')[2]} {names[path]}" if names[path] == values.get(path) else names[path]
+            f"{path.rpartition('.')[2]} {shown[path][names[path]]}"
+            if names[path] == values.get(path)
+            else names[path]
             for path in differ
         ]
         if numbers is None:
@@ -135,6 +138,30 @@ def variants_of(
             )
             variants.append(Variant(values_then, n, names_then, (*parts, f"frame {n}")))
     return variants
+
+
+def _shown(names: Sequence[str]) -> dict[str, str]:
+    """Names as labels show them: numbers are short."""
+    numbers = [name for name in dict.fromkeys(names) if number_in(name) is not None]
+    return {**{name: name for name in names}, **dict(zip(numbers, short_numbers(numbers), strict=True))}
+
+
+def short_numbers(values: Sequence[str]) -> tuple[str, ...]:
+    """Numbers with as few digits, at least four, as tell them apart; none is longer than it was."""
+    for digits in range(4, 17):
+        texts = tuple(min(value, f"{float(value):.{digits}g}", key=len) for value in values)
+        if len(set(texts)) == len(values):
+            return texts
+    return tuple(values)
+
+
+def number_in(text: str) -> float | None:
+    """The finite number that a text is; None if it is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
 
 
 def axis_of(text: str) -> Axis:

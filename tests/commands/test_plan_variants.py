@@ -39,7 +39,10 @@ def test_buffers_count_where_they_differ(illum, scene):
     assert planned["expected_time"]["runs"] == 0
 
 
-def test_a_dry_run_renders_nothing_and_knows_what_exists_and_how_fast_it_was(illum, scene, tmp_path):
+def test_a_dry_run_renders_nothing_and_knows_what_exists_and_how_fast_it_was(
+    illum, scene, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "cache"))
     done = illum("sweep", scene, *AXES, "--dry-run")
     assert "all     6 variants from ambient 0, position [1,2,3] to ambient 1, position [1,3,2]" in done.stdout
     assert "files   s-0-_1_2_3_.png to s-1-_1_3_2_.png, 6 images" in done.stdout
@@ -49,6 +52,23 @@ def test_a_dry_run_renders_nothing_and_knows_what_exists_and_how_fast_it_was(ill
     done = illum("sweep", scene, *AXES, "--dry-run")
     assert ", 6 of which exist" in done.stdout
     assert "by 6 earlier runs on this machine\n" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "values", [(), ("-D", "ambient=0:0.4:4"), ("-D", "ambient=0:0.4:4", "-o", "x{ambient}.png")]
+)
+@pytest.mark.parametrize("cameras", ["", "cameras: {left: {}, right: {}}\n"])
+def test_a_dry_run_names_the_files_that_the_sweep_writes(illum, scene, cameras, values):
+    scene.write_text(SCENE + cameras)
+    values = [f"{word[:-4]}.{{camera}}.png" if word[-4:] == ".png" else word for word in values]
+    planned = illum("sweep", scene, *values, "--dry-run").stdout.splitlines()
+    written = illum("sweep", scene, *values).stdout.split()
+    more = f" to {written[-1]}, {len(written)} images" if len(written) > 1 else ""
+    assert planned.count(f"files   {written[0]}{more}") == (2 if cameras else 1)
+    assert ("view    right" in planned) == bool(cameras)
+    assert ("all     1 variant, 1 of which exist" in illum("sweep", scene, "--dry-run").stdout) == (
+        not values
+    )
 
 
 def test_a_fault_of_any_variant_is_told(illum, scene):

@@ -48,6 +48,22 @@ def scene(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("words", "written"),
+    [
+        (["-D", "seed=1,2"], ["ball-1.left", "ball-1.right", "ball-2.left", "ball-2.right"]),
+        (["--only", "depth", "--only", "uv", "-D", "cameras.right=null"], ["ball.depth", "ball.uv"]),
+        (["--frames", "7:7"], ["ball.left.0007", "ball.right.0007"]),
+        (["-D", "cameras=no:null,one:{a: {}},two:{a: {}, b: {}}"],
+         ["ball-no.main", "ball-one.a", "ball-two.a", "ball-two.b"]),
+    ],
+)  # fmt: skip
+def test_default_names_tell_cameras_and_layers_apart(illum, scene, tmp_path, words, written):
+    scene.write_text(SCENE + "cameras: {left: {}, right: {}}\n")
+    done = illum("sweep", scene, *words, "-D", "film.width=8")
+    assert sorted(done.stdout.split()) == [f"{name}.png" for name in written], done.stderr
+
+
+@pytest.mark.parametrize(
     ("words", "pattern", "said"),
     [
         (

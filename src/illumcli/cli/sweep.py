@@ -122,8 +122,8 @@ def sweep(
         from illumcli.commands.plan import plan_scene
         from illumcli.commands.plan_table import variants_table
 
-        parts = plan_scene(scene, variants, options)
-        shown = [part["variants"] for part in parts if "variants" in part]
+        parts = plan_scene(scene, variants, options, is_sweep=True)
+        shown = [part["variants"] for part in parts]
         click.echo(json.dumps(shown, indent=1) if as_json else variants_table(parts))
         return
     printed: set[str] = set()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from illumcli.cache.speeds import by_stage, read_speeds
 from illumcli.cache.store import open_store
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.plan_variants import planned_variants
-from illumcli.commands.sweep_names import default_pattern
+from illumcli.commands.sweep_names import named
 from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_works import SweepWorks
 from illumcli.render_graph.execute import Run
@@ -28,11 +27,15 @@ ONE = (Variant({}),)
 
 
 def plan_scene(
-    path: Path, variants: Sequence[Variant] = ONE, options: RenderOptions | None = None
+    path: Path,
+    variants: Sequence[Variant] = ONE,
+    options: RenderOptions | None = None,
+    is_sweep: bool = False,
 ) -> list[dict[str, Any]]:
     """The plan of each view of a scene; with a cache, of a run that loads what the store holds now.
 
-    Of several variants it is the plan of the first, and what all of them take.
+    Of several variants it is the plan of the first, and what all of them take. Of a sweep it is the latter,
+    too, even if it has one variant, and its images have the names that `illum sweep` gives them.
 
     Raises
     ------
@@ -40,8 +43,8 @@ def plan_scene(
         A variant has a fault.
     """
     options = options or RenderOptions()
-    if options.pattern is None and any(variant.values for variant in variants[1:]):
-        options = replace(options, pattern=default_pattern(variants))
+    if is_sweep or options.pattern is not None or any(variant.values for variant in variants[1:]):
+        options = named(path, variants, options)
     works = SweepWorks(path, options)
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
     first = works.of(outcomes[0])
@@ -58,7 +61,7 @@ def plan_scene(
         parts.append(plan_data(plan, expected) | {"expected_time": time.as_data()})
 
     # What all variants take.
-    if len(variants) > 1:
+    if is_sweep or len(variants) > 1:
         planned = planned_variants(works, outcomes)
         for plan, part in zip(plans, parts, strict=True):
             camera = plan.view.name

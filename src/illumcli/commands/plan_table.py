@@ -17,8 +17,10 @@ def plan_table(parts: Sequence[Mapping[str, Any]]) -> str:
 
 
 def variants_table(parts: Sequence[Mapping[str, Any]]) -> str:
-    """What all variants take, view by view."""
-    return "\n\n".join("\n".join(_lines_of_variants(part["variants"])) for part in parts)
+    """What all variants take, view by view; several views have their names."""
+    heads = [[f"view    {part['views'][0]['camera']}"] if len(parts) > 1 else [] for part in parts]
+    tables = [_lines_of_variants(part["variants"]) for part in parts]
+    return "\n\n".join("\n".join([*head, *table]) for head, table in zip(heads, tables, strict=True))
 
 
 def _lines(part: Mapping[str, Any]) -> list[str]:
@@ -52,13 +54,16 @@ def _lines_of_variants(planned: Mapping[str, Any]) -> list[str]:
     labels, files = planned["labels"], planned["files"]
     kept = len(labels) - planned["due"]
     exist = f", {kept} of which exist" if kept else ""
+    is_one = len(labels) == 1
     times = {
         f"{count:5} x ": [name for name, each in planned["times"].items() if each == count]
         for count in sorted(set(planned["times"].values()))
     }
     return [
-        f"all     {len(labels)} variants from {labels[0]} to {labels[-1]}{exist}",
-        f"files   {files[0]} to {files[-1]}, {len(files)} images",
+        "all     "
+        + ("1 variant" if is_one else f"{len(labels)} variants from {labels[0]} to {labels[-1]}")
+        + exist,
+        f"files   {files[0]}" + (f" to {files[-1]}, {len(files)} images" if len(files) > 1 else ""),
         *(_row(head, names) for head, names in times.items()),
         _row("rays", [f"{name} {count:,}" for name, count in planned["expected_rays"].items()]),
         _time_row(planned["expected_time"]),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.batch import Batch
@@ -12,7 +11,7 @@ from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.runner import Here, Runner
 from illumcli.commands.sweep_files import SweepFiles, plan_files
 from illumcli.commands.sweep_images import render_variants
-from illumcli.commands.sweep_names import pattern_of
+from illumcli.commands.sweep_names import named, pattern_of
 from illumcli.commands.sweep_outcome import Outcome, SweepResult
 from illumcli.commands.sweep_planning import plan_variants
 from illumcli.commands.sweep_shard import plan_shard, record_shard
@@ -46,7 +45,7 @@ def sweep_scene(
     batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
     # Find faults before the first ray.
-    works = SweepWorks(path, replace(options, pattern=pattern_of(variants, options.pattern)))
+    works = SweepWorks(path, named(path, variants, options))
     plan = plan_variants(works, variants, batch, pattern_of(variants, files.reference or ""))
     outcomes, warnings = plan.outcomes, plan.warnings
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
+from illumcli.commands.options import RenderOptions
 from illumcli.errors import InputError
 from illumcli.files.names import fields, frame_field, number_form, with_forms
+from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.curves._keys import number_in
+from illumcli.scene.load import load, read_text
 from illumcli.scene.variants import LABEL, Variant
 
 
-def pattern_of(variants: Sequence[Variant], given: str | None) -> str:
-    """A given pattern, or the default one, in which all numbers of a path have the same width.
+def named(path: Path, variants: Sequence[Variant], options: RenderOptions) -> RenderOptions:
+    """The options with the pattern that the images of a sweep are named by."""
+    given = options.pattern or default_pattern(variants, fields_of_images(path, variants, options))
+    return replace(options, pattern=pattern_of(variants, given))
+
+
+def pattern_of(variants: Sequence[Variant], given: str) -> str:
+    """A pattern in which all numbers of a path have the same width.
 
     A field with a form of its own keeps it.
     """
@@ -23,15 +34,35 @@ def pattern_of(variants: Sequence[Variant], given: str | None) -> str:
         is_named = any(variant.names.get(path, variant.values[path]) not in texts for variant in of_path)
         if len(numbers) == len(texts) and not is_named:
             forms[path] = number_form(numbers)
-    return with_forms(default_pattern(variants) if given is None else given, forms)
+    return with_forms(given, forms)
 
 
-def default_pattern(variants: Sequence[Variant]) -> str:
-    """A pattern that names every variant: by the names that differ, and by the frame."""
+def fields_of_images(path: Path, variants: Sequence[Variant], options: RenderOptions) -> tuple[str, ...]:
+    """The fields in which the PNG images of one variant differ: none, `camera`, `layer` or both.
+
+    One variant without a fault tells, unless cameras or layers vary.
+    """
+    text, found = read_text(path), set[str]()
+    varies = any(each.partition(".")[0] in ("cameras", "outputs") for each in variants[0].values)
+    for variant in variants:
+        try:
+            scene = load(path, variant.overrides, text, variant.frame).scene
+            counts = {"camera": len(scene.named_cameras()), "layer": len(outputs_of(scene, options.only))}
+        except InputError:  # reported when it is planned
+            continue
+        found |= {name for name, count in counts.items() if count > 1}
+        if not varies:
+            break
+    return tuple(sorted(found))
+
+
+def default_pattern(variants: Sequence[Variant], also: Sequence[str] = ()) -> str:
+    """A pattern that names every variant: by the names that differ, further fields and the frame."""
     now = [variant.names for variant in variants if variant.frame == variants[0].frame]
     differ = [path for path in now[0] if len({names.get(path) for names in now}) > 1]
     frames = [variant.frame for variant in variants if variant.frame is not None]
-    return "{scene}" + "".join(f"-{{{name}}}" for name in differ) + frame_field(frames) + ".png"
+    values = "".join(f"-{{{name}}}" for name in differ)
+    return "{scene}" + values + "".join(f".{{{name}}}" for name in also) + frame_field(frames) + ".png"
 
 
 def refuse_equal_names(variants: Sequence[Variant], pattern: str) -> None:

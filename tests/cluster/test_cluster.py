@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import os
+import socket
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -72,7 +74,11 @@ def test_workers_that_differ_are_named_with_what_differs():
 
 
 def test_local_workers_write_the_same_files(scene, expected):
-    done = illum(scene.parent, *SWEEP, "--cluster", "local:2", "--table", "t.csv")
+    with socket.socket() as other:
+        with suppress(OSError):  # Dask's default port is taken, here or already
+            other.bind(("127.0.0.1", 8787))
+            other.listen()
+        done = illum(scene.parent, *SWEEP, "--cluster", "local:2", "--table", "t.csv", "-q")
     assert sorted(done.stdout.split()) == sorted(expected)
     assert pictures(scene.parent) == expected
     rows = list(csv.DictReader((scene.parent / "t.csv").read_text().splitlines()))

@@ -62,6 +62,7 @@ class Connection:
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # no fixed port, which others may have
             silence_logs=logging.CRITICAL,
             preload=[IGNORE_INTERRUPTS],
         )

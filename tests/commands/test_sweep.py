@@ -188,6 +188,14 @@ def test_variants_are_the_bytes_of_single_renders(illum, scene, tmp_path):
     ]
 
 
+def test_a_sheet_replaces_no_picture_of_its_sweep(illum, scene, tmp_path):
+    (tmp_path / "x").mkdir()
+    words = ("-D", "ambient=0.1,0.2", "-D", "film.width=8", "-o", "{ambient}.png")
+    done = illum("sweep", scene, *words, "--sheet", "x/../0.1.png", "--force")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--sheet x/../0.1.png: a picture of the sweep has this name" in done.stderr
+
+
 @pytest.mark.parametrize("reconstruct", ["false", "true"])
 def test_what_is_stored_needs_the_hits_although_its_nodes_do_not_read_them(
     illum, scene, tmp_path, reconstruct

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from illumcli.commands.sweep_colors import written_colors
 from illumcli.commands.sweep_outcome import Outcome
+from illumcli.errors import InputError
 from illumcli.files.outputs import refuse_suffix
 from illumcli.files.reports import report_contents
 from illumcli.images.contents import image_contents
@@ -60,7 +62,7 @@ def refuse_sheet(path: Path, outcomes: Sequence[Outcome], columns: int | None) -
     Raises
     ------
     InputError
-        An unknown suffix, or matplotlib is not installed.
+        An unknown suffix, the name of a picture, or matplotlib is not installed.
     LimitError
         The largest picture and a row of the sheet do not fit into memory.
     """
@@ -68,6 +70,8 @@ def refuse_sheet(path: Path, outcomes: Sequence[Outcome], columns: int | None) -
     from illumcli.images.sheet_drawing import refuse_without_matplotlib
 
     refuse_suffix(path, "a contact sheet", *SUFFIXES)
+    if _file(path) in {_file(picture) for outcome in outcomes for picture in outcome.paths}:
+        raise InputError(f"--sheet {path}: a picture of the sweep has this name; give the sheet another")
     refuse_without_matplotlib(path)
     sizes = _sizes(outcomes)
     layout = laid_out(sheet_of([each.variant for each in outcomes], columns), sizes)
@@ -78,6 +82,11 @@ def refuse_sheet(path: Path, outcomes: Sequence[Outcome], columns: int | None) -
     need = SHEET_BYTES * at_once + PICTURE_BYTES * largest[0] * largest[1]
     what = f"{path}: a sheet of {len(sizes)} pictures, up to {largest[1]} x {largest[0]} pixels"
     refuse_beyond(need, what, "leave --sheet out, or sweep in parts")
+
+
+def _file(path: Path) -> str:
+    """The file that a path names, on file systems that ignore case."""
+    return os.path.abspath(path).casefold()
 
 
 def write_sheet(path: Path, outcomes: Sequence[Outcome], columns: int | None, content: str) -> None:

@@ -175,6 +175,15 @@ def test_a_fault_of_frames_is_told_once_and_the_others_are_rendered(illum, film)
     assert (stopped.returncode, stopped.stdout) == (2, "film.main.0000.png\n")
 
 
+@pytest.mark.parametrize("command", ["render", "sweep"])
+def test_frames_where_a_formula_has_no_value_fail_alone(illum, film, command):
+    done = illum(command, "film.yaml", "-D", "seed=1/abs(frame-1)", "--frames", "0:2", "-o", "{frame:d}.png")
+    assert (done.returncode, written(done)) == (2, ["0.png", "2.png"])
+    fault, summary = done.stderr.splitlines()
+    assert fault.endswith("at frame 1: '1/abs(frame-1)' is not a finite number")
+    assert summary.startswith("1 of 3 ")
+
+
 def test_files_of_a_sequence(illum, film):
     for number in (1, 2):
         (film / f"mesh.{number:03d}.obj").write_text(MESH.format(number / 3))

@@ -156,9 +156,21 @@ def test_formulas_compute_and_do_nothing_else():
     assert at_frame("a", "framework", 3) == "framework"
     assert at_frame("a", "'frame.obj'", 3) == "'frame.obj'"
     assert at_frame("a", "time * 2", 3, fps=12) == "0.5"
-    for wrong in ("frame.real", "__import__('os') + frame", "1/(frame-3)", "frame +"):
+    for wrong in ("frame.real", "__import__('os') + frame", "frame +"):
         with pytest.raises(InputError, match="a="):
             at_frame("a", wrong, 3)
+
+
+def test_a_formula_without_a_value_at_a_frame_is_a_fault_of_this_frame_alone():
+    (first, second) = variants_of(["camera.position=near:[0,1/frame,4]"], frames="0:1")
+    assert second.values == {"camera.position": "[0, 1, 4]"}
+    assert first.values == {"camera.position": '[0, {curve: formula, value: "1/frame"}, 4]'}
+    assert first.names == {"camera.position": "near"}
+
+
+def test_two_values_of_a_path_have_different_names():
+    with pytest.raises(InputError, match="-D a=x:1,2,x:3: two values are called 'x'"):
+        axis_of("a=x:1,2,x:3")
 
 
 def test_commas_inside_brackets_and_quotes_part_nothing():

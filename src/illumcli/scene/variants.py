@@ -16,7 +16,7 @@ import numpy as np
 
 from illumcli.errors import InputError, LimitError
 from illumcli.records import Value
-from illumcli.scene.curves._formula import formula_at
+from illumcli.scene.curves._formula import NotFiniteError, formula_at
 from illumcli.scene.frames import FRAMES_PER_SECOND, Frames, Moment, frame_numbers
 from illumcli.scene.source import MAX_DEPTH
 from illumcli.schema.messages import short
@@ -176,6 +176,9 @@ def axis_of(text: str) -> Axis:
     if not all(parts):
         raise InputError(f"-D {text}: a value is empty; write null to take a part away")
     named = [_NAMED.fullmatch(part) for part in parts]
+    twice = [name for name, count in Counter(match[1] for match in named if match).items() if count > 1]
+    if twice:
+        raise InputError(f"-D {short(text)}: two values are called '{twice[0]}'; give each its own name")
     values = tuple(match[2] if match else part for match, part in zip(named, parts, strict=True))
     return Axis(
         path.strip(),
@@ -222,7 +225,10 @@ def split_at_commas(text: str) -> list[str]:
 
 
 def at_frame(path: str, value: str, frame: int, fps: float = FRAMES_PER_SECOND) -> str:
-    """`value` with every formula of `frame` and `time` evaluated; text in quotes and mappings have none."""
+    """`value` with every formula of `frame` and `time` evaluated; text in quotes and mappings have none.
+
+    A formula without a finite value at this frame is a curve, so that it is a fault of this frame alone.
+    """
     text = value.strip()
     if not re.search(r"\b(frame|time)\b", text) or text.startswith(("{", '"', "'")):
         return text
@@ -232,6 +238,8 @@ def at_frame(path: str, value: str, frame: int, fps: float = FRAMES_PER_SECOND) 
         return f"[{', '.join(at_frame(path, part, frame, fps) for part in split_at_commas(text[1:-1]))}]"
     try:
         return str(formula_at(text, Moment(frame, frame / fps)))
+    except NotFiniteError:
+        return f'{{curve: formula, value: "{text}"}}'
     except ValueError as error:
         raise InputError(f"-D {path}={value}: at frame {frame}: {error}") from None
 

@@ -21,15 +21,21 @@ def _checked(text: str) -> str:
 FrameFormula: TypeAlias = Annotated[str, AfterValidator(_checked)]
 
 
+class NotFiniteError(ValueError):
+    """A formula has no finite value at a frame."""
+
+
 def formula_at(text: str, moment: Moment) -> int | float:
     """The value of a formula.
 
     Raises
     ------
-    ValueError
+    NotFiniteError
         It is no finite number at this frame.
+    ValueError
+        It is no formula.
     """
     value = float(parse(text, VARIABLES).value(moment.frame, moment.time))
     if not math.isfinite(value):
-        raise ValueError(f"'{text}' is not a finite number")
+        raise NotFiniteError(f"'{text}' is not a finite number")
     return rounded(value)

@@ -51,6 +51,16 @@ def test_threads_and_tiles_change_no_bit(path, samples, threads, side):
         assert values.tobytes() == again[name].tobytes(), name
 
 
+def test_only_a_fit_that_is_read_again_is_kept(path):
+    memory = MemoryCache()
+    key = planned(load(path), LAYERS, Cache(None, memory)).lookup.keeps["fitted_obscurance"]
+    picture(path, cache=Cache(None, memory))
+    assert key not in memory.once
+    memory.wanted = frozenset([key])
+    picture(path, cache=Cache(None, memory))
+    assert key in memory.once
+
+
 def test_cached_obscurance_changes_no_bit(path):
     memory = MemoryCache()
     first = picture(path, cache=Cache(None, memory))

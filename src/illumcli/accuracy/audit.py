@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from illumcli.accuracy.sampled_blocks import SampledBlocks
 from illumcli.arrays import Floats
+from illumcli.film.adaptive import around
 from illumcli.film.tiles import Samples, Scattered, Tile
 from illumcli.film.view import View
 from illumcli.graph import Node
@@ -189,24 +190,13 @@ def pixel_chances(picture: NDArray[np.float32]) -> NDArray[np.float64]:
     values = np.zeros(picture.shape[:2])
     for channel in range(picture.shape[2]):  # a mean over the last axis takes ten times as long
         values += picture[..., channel]
-    low = high = values / picture.shape[2]
-    for axis in (0, 1):
-        low, high = (
-            reduced(reduced(_moved(each, -1, axis), _moved(each, 1, axis)), each)
-            for each, reduced in ((low, np.minimum), (high, np.maximum))
-        )
-    contrast = (high - low).ravel()
+    values /= picture.shape[2]
+    contrast = (around(values, np.maximum, 1) - around(values, np.minimum, 1)).ravel()
     chances = np.full(contrast.size, 1 / contrast.size)
     if not contrast.any():
         return chances
     square = np.square(contrast)
     return (chances + contrast / contrast.sum() + square / square.sum()) / 3
-
-
-def _moved(values: NDArray[np.float64], step: int, axis: int) -> NDArray[np.float64]:
-    """The neighbours of values along an axis, at the border the values themselves."""
-    size = values.shape[axis]
-    return values.take(np.clip(np.arange(size) + step, 0, size - 1), axis=axis)
 
 
 def drawn(chances: NDArray[np.float64], number: int, start: float) -> NDArray[np.int64]:

@@ -31,6 +31,11 @@ class Cache(Value):
         """True if a buffer of this name may be kept."""
         return self.memory is not None or (self.store is not None and policy.is_kept(name))
 
+    def is_read_again(self, name: str, key: str) -> bool:
+        """True if a later run may read a buffer from the store, or the next variant from memory."""
+        in_store = self.store is not None and policy.is_kept(name)
+        return in_store or (self.memory is not None and key in self.memory.wanted)
+
     def keep(self, name: str, key: str, value: object, seconds: float) -> None:
         """Keep a buffer of the scene that took `seconds` with all its inputs, if it is worth it."""
         if self.memory is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -39,10 +39,10 @@ class Results:
         self._as_json = as_json
         self._entries: list[dict[str, Any]] = []
 
-    def add(self, paths: Iterable[Path], about: Mapping[str, Any]) -> None:
-        """A piece of work that is done; `about` is for JSON."""
+    def add(self, paths: Iterable[Path], about: Callable[[], Mapping[str, Any]]) -> None:
+        """A piece of work that is done; `about` is called for JSON."""
         if self._as_json:
-            self._entries.append({"files": [str(path) for path in paths], **about})
+            self._entries.append({"files": [str(path) for path in paths], **about()})
         else:
             print_paths(paths)
 

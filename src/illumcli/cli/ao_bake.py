@@ -215,7 +215,7 @@ def ao_bake(
     from illumcli.commands.bake import bake_inputs
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
-        found.add(paths, {"input": str(source), **done.as_data()})
+        found.add(paths, lambda: {"input": str(source), **done.as_data()})
         if not quiet:
             _say_report(source, done, verbose)
         if verbose:

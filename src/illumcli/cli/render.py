@@ -104,7 +104,7 @@ def render(
             error = done.report.error
             reached = f"for an error of {error['target']:g}; reached {error['reached']:.3g}"
             say(f"{done.scene}: {' '.join(done.report.chosen)}, {reached}")
-        found.add(done.paths, _entry(done))
+        found.add(done.paths, lambda: _entry(done))
         _say_report(done, quiet, verbose, say_once)
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)

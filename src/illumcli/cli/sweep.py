@@ -133,13 +133,14 @@ def sweep(
         if outcome.error is not None and (fault := without_frame(str(outcome.error))) not in printed:
             printed.add(fault)
             found.fail(f"{outcome.label}: {outcome.error}", _about(outcome))
-        if outcome.report is None:
+        report = outcome.report
+        if report is None:
             return
-        found.add(outcome.paths, _about(outcome) | outcome.report.as_data())
+        found.add(outcome.paths, lambda: _about(outcome) | report.as_data())
         if quiet:
             return
-        say_kept(outcome.report.kept)
-        for line in repair_lines(outcome.report.repairs, verbose):
+        say_kept(report.kept)
+        for line in repair_lines(report.repairs, verbose):
             if line not in printed:
                 say(f"{scene}: {line}")
             printed.add(line)

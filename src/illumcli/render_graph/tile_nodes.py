@@ -175,7 +175,9 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
 
         # Hand it to the cache, and drop the buffers that no later node needs.
         if node.output == FITTED:
-            if FITTED in plan.lookup.keeps and plan.view.width * plan.view.height <= LARGEST_FIT:
+            key = plan.lookup.keeps.get(FITTED)
+            small = plan.view.width * plan.view.height <= LARGEST_FIT
+            if key is not None and small and common.cache.is_read_again(FITTED, key):
                 common.fits.append(value)
         elif plan is common.plan and node.output in common.recorder.names:
             tile, own = started.tile, started.own

@@ -153,23 +153,23 @@ def test_references_are_numbers_of_variants_or_files(tmp_path, said):
         references_of(said, [])
 
 
-def test_plans_show_what_shapes_and_textures_take(tmp_path):
+def plan_of(path):
+    """The plan of a scene as text."""
     from illumcli.commands.options import RenderOptions
     from illumcli.commands.plan import plan_scene
     from illumcli.commands.plan_table import plan_table
 
-    def shown(name):
-        return plan_table(plan_scene(tmp_path / name, options=RenderOptions(cache=False)))
+    return plan_table(plan_scene(path, options=RenderOptions(cache=False)))
 
+
+def test_plans_show_what_shapes_and_textures_take(tmp_path):
     bombs(tmp_path)
-    assert "shapes " in shown("spheres.yaml")
-    assert "textures 4,095.9 MiB" in shown("texture.yaml")
-    assert "textures" not in shown("unused.yaml")
+    assert "shapes " in plan_of(tmp_path / "spheres.yaml")
+    assert "textures 4,095.9 MiB" in plan_of(tmp_path / "texture.yaml")
+    assert "textures" not in plan_of(tmp_path / "unused.yaml")
 
 
 def test_plans_show_what_images_of_mesh_files_take(tmp_path):
-    from illumcli.commands.plan import plan_scene
-
     bombs(tmp_path)
     (tmp_path / "mesh.gltf").write_text('{"asset": {"version": "2.0"}, "images": [{"uri": "bomb.png"}]}')
     start = "version: 1\nambient: 1\n"
@@ -182,8 +182,7 @@ def test_plans_show_what_images_of_mesh_files_take(tmp_path):
             (tmp_path / "s.yaml").write_text(
                 f"{start}materials: {{a: {{model: lambert}}}}\nobjects: [{{mesh: {{file: {mesh}, {use}}}]\n"
             )
-            shown = plan_scene(tmp_path / "s.yaml", cache=False)
-            assert ("textures 4,095.9 MiB" in shown) == is_used
+            assert ("textures 4,095.9 MiB" in plan_of(tmp_path / "s.yaml")) == is_used
 
 
 @pytest.fixture

@@ -52,6 +52,7 @@ def scene(tmp_path):
     [
         (["-D", "seed=1,2"], ["ball-1.left", "ball-1.right", "ball-2.left", "ball-2.right"]),
         (["--only", "depth", "--only", "uv", "-D", "cameras.right=null"], ["ball.depth", "ball.uv"]),
+        (["-D", "cameras=null", "-D", "camera={fov: 30},{fov: 40}"], ["ball-_fov_30_", "ball-_fov_40_"]),
         (["--frames", "7:7"], ["ball.left.0007", "ball.right.0007"]),
         (["-D", "cameras=no:null,one:{a: {}},two:{a: {}, b: {}}"],
          ["ball-no.main", "ball-one.a", "ball-two.a", "ball-two.b"]),

@@ -173,5 +173,14 @@ def test_two_values_of_a_path_have_different_names():
         axis_of("a=x:1,2,x:3")
 
 
+def test_values_of_a_path_are_given_in_one_place(tmp_path):
+    rows = tmp_path / "r.csv"
+    rows.write_text("a\n1\n2\n")
+    for words in ({"texts": ["a=1,2", "a=3,4"], "together": True}, {"texts": ["a=3,4"], "rows": rows}):
+        with pytest.raises(InputError, match="a: has values twice"):
+            variants_of(**words)
+    assert [each.values["a"] for each in variants_of(["a=1", "a=2"])] == ["2"]  # the last, as in a render
+
+
 def test_commas_inside_brackets_and_quotes_part_nothing():
     assert split_at_commas("f(a,b),[c,d],'e,f',g") == ["f(a,b)", "[c,d]", "'e,f'", "g"]

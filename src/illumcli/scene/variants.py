@@ -65,8 +65,10 @@ class Variant(Value):
 
     @property
     def fields(self) -> dict[str, str]:
-        """Fields for names of files: all names that are not the values themselves."""
-        return {path: name for path, name in self.names.items() if name != self.values.get(path)}
+        """Fields for names of files: all names that are not the values themselves, and the value of `camera`,
+        which is otherwise the field of the camera's name."""
+        own = {path: name for path, name in self.names.items() if path == "camera"}
+        return own | {path: name for path, name in self.names.items() if name != self.values.get(path)}
 
 
 def variants_of(
@@ -104,7 +106,11 @@ def variants_of(
     fps = of_scene.fps if of_scene else FRAMES_PER_SECOND
     axes = [axis_of(text) for text in texts]
     table = _rows(rows) if rows else [_Point({}, {})]
-    for path in (*(axis.path for axis in axes if len(axis.values) > 1), *table[0].values):
+    paths = [axis.path for axis in axes if len(axis.values) > 1]
+    for path, count in Counter([*paths, *table[0].values]).items():
+        if count > 1:
+            raise InputError(f"{path}: has values twice; give all of them in one -D, or in the rows alone")
+    for path in (*paths, *table[0].values):
         if path.partition(".")[0] == "frames":
             raise InputError(f"{path}: all variants have the same frames; give it one value with -D")
     lengths = [len(axis.values) for axis in axes]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import signal
-import socket
+import shutil
 import subprocess
-import sys
-import time
-from pathlib import Path
+from contextlib import ExitStack
 
 import pytest
+
+from cluster.machines import COUNT, Client, Machines, pictures
+from cluster.network import Network
 
 pytest.importorskip("distributed", reason="needs Dask's distributed")
 
@@ -45,57 +45,41 @@ def scene(tmp_path):
     return folder / "s.yaml"
 
 
-class Machines:
-    """Processes of a scheduler and its workers; all end with the test."""
-
-    def __init__(self, folder: Path) -> None:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self.port}"
-        self.folder = folder
-        self.workers: list[subprocess.Popen[bytes]] = []
-        self.scheduler = self.start_scheduler()
-
-    def start_scheduler(self):
-        words = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"]
-        self.scheduler = self._started("dask_scheduler", words, "scheduler")
-        until = time.monotonic() + 60
-        while time.monotonic() < until:
-            with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
-                    return self.scheduler
-            time.sleep(0.1)
-        raise RuntimeError("no scheduler")
-
-    def start_worker(self, before=()):
-        """A worker in a folder of its own; `before` are the words of a command that starts it."""
-        place = self.folder / f"worker{len(self.workers)}"
-        place.mkdir(exist_ok=True)
-        words = [self.address, "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1",
-                 "--local-directory", str(place)]  # fmt: skip
-        self.workers.append(self._started("dask_worker", words, place.name, before))
-        return self.workers[-1]
-
-    def _started(self, module, words, name, before=()):
-        environment = {**os.environ, "ILLUM_CACHE": str(self.folder / f"cache-{name}")}
-        with (self.folder / f"{name}.log").open("ab") as log:
-            return subprocess.Popen(
-                [*before, sys.executable, "-m", f"distributed.cli.{module}", *words],
-                stdout=log, stderr=log, cwd=self.folder, env=environment, start_new_session=True,
-            )  # fmt: skip
-
-    def stop(self):
-        for process in (*self.workers, self.scheduler):
-            try:
-                os.killpg(process.pid, signal.SIGKILL)
-            except ProcessLookupError:
-                continue
-            process.wait()
-
-
 @pytest.fixture
 def machines(tmp_path):
     made = Machines(tmp_path)
     yield made
     made.stop()
+
+
+@pytest.fixture
+def hosts(tmp_path):
+    """Makes machines of so many hosts in network namespaces."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can make network namespaces")
+    if shutil.which("ip") is None:
+        pytest.skip("network namespaces need the command ip, of iproute2")
+    with ExitStack() as stack:
+
+        def make(count: int, **environment: str) -> Machines:
+            try:
+                network = Network(count)
+            except subprocess.CalledProcessError as error:
+                pytest.skip(f"no network namespaces here: {error.stderr.strip()}")
+            stack.callback(network.remove)
+            made = Machines(tmp_path, network, **environment)
+            stack.callback(made.stop)
+            return made
+
+        yield make
+
+
+@pytest.fixture
+def expected(scene):
+    """The pictures as one process renders them."""
+    Client(scene.parent).finish()
+    found = pictures(scene.parent)
+    assert len(found) == COUNT
+    for name in found:
+        (scene.parent / name).unlink()
+    return found

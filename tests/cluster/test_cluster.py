@@ -11,13 +11,12 @@ from contextlib import suppress
 
 import pytest
 
+from cluster.machines import HIDDEN
 from illumcli.cluster.address import Address, address_of
 from illumcli.cluster.facts import facts, refuse_differences
 from illumcli.errors import InputError
 
 SWEEP = ["sweep", "s.yaml", "-D", "materials.clay.exponent=1:100:6", "--no-cache"]
-HIDDEN = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"']
-"""Starts a process that does not see the folder that follows."""
 
 
 def illum(folder, *words, check=True):

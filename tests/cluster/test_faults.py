@@ -1,65 +1,25 @@
-"""Accidents of workers, schedulers and clients: no picture is lost or half, and all are the same bytes."""
+"""Accidents of workers, schedulers and clients: no picture is lost or half, and all are the same bytes.
+
+Only pictures that were in work at that moment are rendered again. Each fault is tried once, and nine times
+more with `-m slow`.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
 
-COUNT = 12
-SWEEP = ["sweep", "s.yaml", "-D", f"materials.clay.exponent=1:100:{COUNT}", "--no-cache",
-         "-D", "film={width: 320, height: 240, samples: 4}"]  # fmt: skip
+from cluster.machines import COUNT, Client, is_clean, pictures
 
-
-class Client:
-    """A sweep in a process of its own."""
-
-    def __init__(self, folder: Path, *words: str) -> None:
-        self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "illumcli", *SWEEP, *words],
-            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        )  # fmt: skip
-
-    def wait_for(self, count: int, seconds: float = 120) -> None:
-        """Until so many pictures are there."""
-        until = time.monotonic() + seconds
-        while len(pictures(self.folder)) < count:
-            assert time.monotonic() < until, self.process.poll()
-            assert self.process.poll() is None, self.process.communicate()
-            time.sleep(0.02)
-
-    def finish(self, code: int = 0, seconds: float = 240) -> str:
-        """The errors that it printed."""
-        errors = self.process.communicate(timeout=seconds)[1]
-        assert self.process.returncode == code, errors
-        return errors
-
-
-def pictures(folder):
-    return {path.name: path.read_bytes() for path in sorted(folder.glob("s-*.png"))}
-
-
-@pytest.fixture
-def expected(scene):
-    Client(scene.parent).finish()
-    found = pictures(scene.parent)
-    assert len(found) == COUNT
-    for name in found:
-        (scene.parent / name).unlink()
-    return found
-
-
-def clean(folder, expected):
-    """True if the folder holds all pictures and nothing that was left."""
-    return pictures(folder) == expected and sorted(os.listdir(folder)) == sorted(
-        [*expected, "meshes", "s.yaml", "t.png"]
-    )
+pytestmark = pytest.mark.parametrize(
+    "turn", [0, *(pytest.param(turn, marks=pytest.mark.slow) for turn in range(1, 10))]
+)
+LARGE = ["-D", "film={width: 1800, height: 1800, samples: 1}", "-t", "1"]
+LITTLE_MEMORY = ["prlimit", "--as=700000000"]
+"""Enough for a worker to start, too little for a LARGE picture."""
 
 
 def kill(process):
@@ -67,41 +27,62 @@ def kill(process):
     process.wait()
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(10, marks=pytest.mark.slow)])
-def test_killed_workers_are_replaced_and_nothing_is_lost(scene, expected, machines, times):
+def check(machines, scene, expected, again=0, kept=0):
+    """Assert that all pictures are there, and how many renders were begun more than once."""
+    renders = machines.renders()
+    print(dict(renders))
+    assert is_clean(scene.parent, expected)
+    assert renders["began"] - renders["kept"] <= COUNT + again
+    assert renders["kept"] <= kept
+
+
+def test_killed_workers_are_replaced_and_nothing_is_lost(scene, expected, machines, turn):
     for _ in range(2):
         machines.start_worker()
     client = Client(scene.parent, "--cluster", machines.address)
-    for number in range(times):
-        client.wait_for(min(1 + number, COUNT - 1))
+    for number in (1, 4, 7):
+        client.wait_for(number + turn % 3)
         kill(machines.workers[-1])
         machines.start_worker()
-        if client.process.poll() is not None:
-            break
     client.finish()
-    assert clean(scene.parent, expected)
+    check(machines, scene, expected, again=3, kept=3)
 
 
-def test_a_scheduler_that_is_started_again_gets_the_rest(scene, expected, machines):
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_workers_killed_while_they_write(scene, expected, machines, turn, is_hidden):
+    if is_hidden and os.geteuid() != 0:
+        pytest.skip("only root can hide a folder from a process")
+    deaths = machines.folder / "deaths"
+    deaths.mkdir()
+    for number in range(2):
+        (deaths / str(number)).touch()
+        start = machines.start_hidden_worker if is_hidden else machines.start_worker
+        start(ILLUM_TEST_DEATHS=str(deaths))
+    Client(scene.parent, "--cluster", machines.address).finish()
+    assert list(deaths.iterdir()) == []
+    check(machines, scene, expected, again=2)
+
+
+def test_a_scheduler_that_is_started_again_gets_the_rest(scene, expected, machines, turn):
     machines.start_worker()
     client = Client(scene.parent, "--cluster", machines.address)
-    client.wait_for(2)
+    client.wait_for(2 + turn % 3)
     kill(machines.scheduler)
     kill(machines.workers[0])
     time.sleep(1)
     machines.start_scheduler()
     machines.start_worker()
-    client.finish()
-    assert clean(scene.parent, expected)
+    assert "the scheduler is lost" in client.finish()
+    check(machines, scene, expected, again=1, kept=1)
 
 
 @pytest.mark.parametrize("cluster", ["local:2", "scheduler"])
-def test_an_interrupted_client_leaves_whole_pictures_and_goes_on(scene, expected, machines, cluster):
+def test_an_interrupted_client_leaves_whole_pictures_and_goes_on(scene, expected, machines, turn, cluster):
     if cluster == "scheduler":
         machines.start_worker()
         cluster = machines.address
     client = Client(scene.parent, "--cluster", cluster)
-    client.wait_for(2)
+    client.wait_for(2 + turn % 3)
     os.killpg(client.process.pid, signal.SIGINT)
     errors = client.finish(-signal.SIGINT, 60)
     assert "Traceback" not in errors
@@ -110,10 +91,12 @@ def test_an_interrupted_client_leaves_whole_pictures_and_goes_on(scene, expected
     assert all(expected[name] == content for name, content in found.items())
     again = Client(scene.parent, "--cluster", cluster)
     assert again.finish().count("kept, its content is the same") >= len(found)
-    assert clean(scene.parent, expected)
+    assert is_clean(scene.parent, expected)
+    if cluster == machines.address:
+        check(machines, scene, expected, kept=3)
 
 
-def test_a_worker_that_stands_still_delays_its_own_pieces_only(scene, expected, machines):
+def test_a_worker_that_stands_still_delays_its_own_pieces_only(scene, expected, machines, turn):
     for _ in range(2):
         machines.start_worker()
     client = Client(scene.parent, "--cluster", machines.address)
@@ -122,20 +105,36 @@ def test_a_worker_that_stands_still_delays_its_own_pieces_only(scene, expected, 
     client.wait_for(COUNT - 4)
     os.killpg(machines.workers[0].pid, signal.SIGCONT)
     client.finish()
-    assert clean(scene.parent, expected)
+    check(machines, scene, expected)
 
 
-def test_workers_that_die_of_a_variant_are_told_with_its_name(scene, machines):
-    limit = ["prlimit", "--as=700000000"]  # too little for the pictures, enough to start
-    machines.start_worker(limit)
-    client = Client(
-        scene.parent, "--cluster", machines.address, "-D", "film.width=9000", "-D", "film.height=9000"
-    )
-    errors = client.finish(4)
+def test_a_slow_worker_gets_less(scene, expected, machines, turn):
+    machines.start_worker(ILLUM_TEST_DELAY="4")
+    machines.start_worker()
+    Client(scene.parent, "--cluster", machines.address).finish()
+    check(machines, scene, expected)
+
+
+def test_a_variant_of_which_all_workers_die_is_named(scene, machines, turn):
+    machines.start_worker(LITTLE_MEMORY)
+    words = ["-D", "film.width=9000", "-D", "film.height=9000"]
+    errors = Client(scene.parent, "--cluster", machines.address, *words).finish(4)
     assert "exponent 1: " in errors
 
 
-def test_a_full_disk_of_a_worker_without_a_shared_folder(scene, expected, machines):
+def test_a_worker_with_little_memory_leaves_pictures_to_others(scene, machines, turn):
+    Client(scene.parent, *LARGE).finish()
+    expected = pictures(scene.parent)
+    for name in expected:
+        (scene.parent / name).unlink()
+    machines.start_worker(LITTLE_MEMORY)
+    machines.start_worker()
+    Client(scene.parent, "--cluster", machines.address, *LARGE).finish()
+    print(dict(machines.renders()))
+    assert is_clean(scene.parent, expected)
+
+
+def test_a_full_disk_of_a_worker_without_a_shared_folder(scene, expected, machines, turn):
     if os.geteuid() != 0:
         pytest.skip("only root can mount a small disk")
     small = 'mount -t tmpfs none "$0" && mount -t tmpfs -o size=60k none "$1" && shift && exec "$@"'
@@ -143,6 +142,6 @@ def test_a_full_disk_of_a_worker_without_a_shared_folder(scene, expected, machin
     place.mkdir()
     machines.start_worker(["unshare", "--mount", "sh", "-c", small, str(scene.parent), str(place)])
     machines.start_worker()
-    client = Client(scene.parent, "--cluster", machines.address)
-    client.finish()
-    assert clean(scene.parent, expected)
+    Client(scene.parent, "--cluster", machines.address).finish()
+    print(dict(machines.renders()))
+    assert is_clean(scene.parent, expected)

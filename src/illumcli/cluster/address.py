@@ -35,7 +35,7 @@ def address_of(text: str) -> Address:
         if not 1 <= count <= MOST_LOCAL:
             raise InputError(f"--cluster {text}: start from 1 to {MOST_LOCAL} workers")
         return Address(local=count)
-    if re.fullmatch(r"(tcp|tls)://[^/]+:\d{1,5}", text):
+    if (match := re.fullmatch(r"(?:tcp|tls)://[^/]+:(\d{1,5})", text)) and 0 < int(match[1]) < 65536:
         return Address(scheduler=text)
     if "://" in text:
         raise InputError(f"--cluster {text}: write tcp://HOST:PORT or tls://HOST:PORT")

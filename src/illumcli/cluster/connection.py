@@ -7,9 +7,10 @@ import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from illumcli.cluster.address import Address
+from illumcli.cluster.handshake import address_in, shake_hands
 from illumcli.errors import IllumError, InputError
 
 if TYPE_CHECKING:
@@ -44,9 +45,9 @@ class Connection:
                 "distributed.admin.large-graph-warning-threshold": "1GB",
             }
         )
-        self._address, self._distributed = address, distributed
+        self._address, self._distributed, self._tell = address, distributed, tell
         self._cluster: LocalCluster | None = self._started() if address.local else None
-        self.client: Client = self._connected(time.monotonic() + TIMEOUT)
+        self.client: Client = self._connected(until=time.monotonic())
         scheduler = str(self.client.scheduler_info()["address"])
         if not address.local and not scheduler.startswith("tls://"):
             tell(f"{scheduler}: without TLS; who reaches this scheduler can run code on it and its workers")
@@ -68,24 +69,36 @@ class Connection:
         )
 
     def _connected(self, until: float) -> Client:
-        """A client; several attempts until this time.
+        """A client; attempts are repeated until this time.
 
         Raises
         ------
         IllumError
             No scheduler answers.
         """
-        place: dict[str, Any] = {"address": self._cluster or self._address.scheduler or None}
-        if self._address.file is not None:
-            place = {"scheduler_file": str(self._address.file)}
         while True:
             try:
-                return self._distributed.Client(**place, timeout=TIMEOUT, set_as_default=False)
-            except (OSError, TimeoutError, ValueError) as error:
+                return self._distributed.Client(self._place(), timeout=TIMEOUT, set_as_default=False)
+            except (IllumError, OSError) as error:
                 if time.monotonic() > until:
-                    name = self._address.scheduler or self._address.file or "local"
-                    raise IllumError(f"--cluster {name}: no scheduler answers: {error}") from error
+                    raise (
+                        error if isinstance(error, IllumError) else IllumError(f"--cluster: {error}")
+                    ) from error
                 time.sleep(1)
+
+    def _place(self) -> LocalCluster | str:
+        """The cluster that was started here, or the address of a scheduler that answers.
+
+        Raises
+        ------
+        IllumError
+        """
+        if self._cluster is not None:
+            return self._cluster
+        file = self._address.file
+        scheduler = self._address.scheduler if file is None else address_in(file)
+        shake_hands(scheduler, TIMEOUT)
+        return scheduler
 
     @property
     def is_lost(self) -> bool:
@@ -94,6 +107,7 @@ class Connection:
 
     def reconnect(self) -> None:
         """Connect to the scheduler that took the place of the lost one."""
+        self._tell(f"the scheduler is lost; waiting up to {PATIENCE:.0f} s for it or another in its place")
         self.client.close(timeout=1)
         self.client = self._connected(time.monotonic() + PATIENCE)
 
@@ -105,10 +119,14 @@ class Connection:
         IllumError
             No worker came.
         """
-        until = time.monotonic() + PATIENCE
+        began, is_told = time.monotonic(), False
         while not (found := list(self.client.scheduler_info(n_workers=-1)["workers"])):
-            if time.monotonic() > until:
+            waited = time.monotonic() - began
+            if waited > PATIENCE:
                 raise IllumError("--cluster: the scheduler has no workers; start some")
+            if waited > TIMEOUT and not is_told:
+                self._tell(f"the scheduler has no workers; waiting up to {PATIENCE:.0f} s for one")
+                is_told = True
             time.sleep(0.2)
         return found
 

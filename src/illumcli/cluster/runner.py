@@ -151,7 +151,20 @@ class _Blocks:
         return Block(tuple(self._left.popleft() for _ in range(count)))
 
     def _taken(self, block: Block, result: BlockResult) -> Iterator[tuple[int, Callable[[], Any]]]:
-        """The results of a block, or the block again with the files that the worker lacks."""
+        """The results of a block, or the block again with the files that the worker lacks.
+
+        Raises
+        ------
+        InputError
+            The worker differs from this process.
+        RuntimeError
+            A fault of the program.
+        """
+        if result.refusal:
+            raise InputError(result.refusal)
+        if result.fault:
+            scene = scene_of(self._unit_of(block.numbers[0]))
+            raise RuntimeError(f"worker {result.worker}, {scene}:\n{result.fault}")
         if result.lacks_files:
             contents = self._session.contents(result.lacking)
             asked = replace(block, attempt=block.attempt + 1, contents=contents, asker=result.worker)
@@ -166,19 +179,9 @@ class _Blocks:
                 yield number, partial(_result, done)
 
     def _failed(self, block: Block, error: BaseException | None) -> Iterator[tuple[int, Callable[[], Any]]]:
-        """The pieces of a block that killed its workers, one by one, or their errors.
-
-        Raises
-        ------
-        InputError
-            A worker differs from this process.
-        """
+        """The pieces of a block that killed its workers, one by one, or their errors."""
         from distributed import KilledWorker
 
-        from illumcli.cluster.task import Refusal
-
-        if isinstance(error, Refusal):
-            raise InputError(str(error)) from error
         if not isinstance(error, KilledWorker):
             raise error or IllumError("--cluster: a task failed without a reason")
         if len(block.numbers) > 1:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from tempfile import mkdtemp
+from traceback import format_exception
 from typing import TYPE_CHECKING, Any, cast
 
 from distributed import WorkerPlugin, get_worker
@@ -68,10 +69,10 @@ class BlockResult(Value):
     """True if nothing was done: the worker does not see the client's files."""
     lacking: tuple[Path, ...] = ()
     """Files that it needs first, as far as it knows them."""
-
-
-class Refusal(Exception):
-    """A worker that differs from the client; the text says how."""
+    refusal: str = ""
+    """How the worker differs from the client, if it may not."""
+    fault: str = ""
+    """Traceback of a fault of the program. Dask's client waits for ever for errors that cannot be pickled."""
 
 
 class CommandPlugin(WorkerPlugin):
@@ -98,19 +99,11 @@ class CommandPlugin(WorkerPlugin):
 
         Raises
         ------
-        Refusal
-            It differs from the client.
+        OSError
+            They cannot be made.
         """
         if self.worker is not None:
             return
-        own, wanted = facts(), self.command.facts
-        differing = [
-            f"{name} is {own.get(name)}, not {value}"
-            for name, value in wanted.items()
-            if own.get(name) != value
-        ]
-        if differing and not self.command.is_mixed:
-            raise Refusal(f"worker {platform.node()}: {'; '.join(differing)}; {ADVICE}")
         self._folder = os.getcwd()
         if is_shared(self.command.token):
             os.chdir(self.command.folder)
@@ -119,6 +112,18 @@ class CommandPlugin(WorkerPlugin):
             self.mirror = Mirror(Path(mkdtemp(prefix="illum-", dir=folder)))
             self.mirror.enter(self.command.folder)
         self.worker = Worker()
+
+    def refusal(self) -> str:
+        """How this process differs from the client; an empty text if it may do so, or does not."""
+        own, wanted = facts(), self.command.facts
+        differing = [
+            f"{name} is {own.get(name)}, not {value}"
+            for name, value in wanted.items()
+            if own.get(name) != value
+        ]
+        if not differing or self.command.is_mixed:
+            return ""
+        return f"worker {platform.node()}: {'; '.join(differing)}; {ADVICE}"
 
 
 def do(
@@ -139,19 +144,27 @@ def do(
         Files that this worker said to lack.
     """
     dask_worker = get_worker()
+    address = dask_worker.address
     plugin = cast(CommandPlugin, dask_worker.plugins.setdefault(command.name, CommandPlugin(command)))
-    plugin.start(dask_worker.local_directory)
-    mirror, worker = plugin.mirror, plugin.worker
-    assert worker is not None
-    if mirror is not None:
-        mirror.add(contents or {})
-        lacking = mirror.lacking(digests or {})
-        if digests is None or lacking:
-            return BlockResult(dask_worker.address, lacks_files=True, lacking=tuple(lacking))
-        units = [_mirrored(unit, mirror) for unit in units]
-    done = _all_done(worker, units, mirror)
-    worker.finish()
-    return BlockResult(dask_worker.address, done)
+    if refusal := plugin.refusal():
+        return BlockResult(address, refusal=refusal)
+    try:
+        plugin.start(dask_worker.local_directory)
+        mirror, worker = plugin.mirror, plugin.worker
+        assert worker is not None
+        if mirror is not None:
+            mirror.add(contents or {})
+            lacking = mirror.lacking(digests or {})
+            if digests is None or lacking:
+                return BlockResult(address, lacks_files=True, lacking=tuple(lacking))
+            units = [_mirrored(unit, mirror) for unit in units]
+        done = _all_done(worker, units, mirror)
+        worker.finish()
+    except Exception as error:
+        if known(error) is None:
+            return BlockResult(address, fault="".join(format_exception(error)))
+        done = (_failed(error, has_own_disk=True),) * len(units)
+    return BlockResult(address, done)
 
 
 def _all_done(worker: Worker, units: Sequence[Unit], mirror: Mirror | None) -> tuple[UnitResult, ...]:

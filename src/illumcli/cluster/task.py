@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import platform
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import field, replace
 from pathlib import Path
 from tempfile import mkdtemp
+from threading import Lock
 from traceback import format_exception
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
     from illumcli.commands.report import Report
 
+ONE_BLOCK = Lock()
+"""Held while a block is done: the current folder belongs to the whole process."""
 WRITTEN_OR_KEPT = ("written", "kept")
 """Fields of reports with the names of files."""
 
@@ -85,33 +89,40 @@ class CommandPlugin(WorkerPlugin):
         self.name = command.name
         self.worker: Worker | None = None
         self.mirror: Mirror | None = None
-        self._folder = ""
+        self.is_ended = False
 
     def teardown(self, worker: Any) -> None:
-        """Leave the client's folder, and remove the copies."""
-        if self._folder:
-            os.chdir(self._folder)
+        """Remove the copies; a unit that is in work is done to its end, those after it are not."""
+        self.is_ended = True
+        if ONE_BLOCK.acquire(blocking=False):  # otherwise the block that is in work removes them
+            self._remove_copies()
+            ONE_BLOCK.release()
+
+    @contextmanager
+    def entered(self, folder: str) -> Iterator[Worker]:
+        """In the client's folder, what does its units; copies of its files go below `folder`."""
+        with ONE_BLOCK:
+            before, allowed = os.getcwd(), os.environ.get("ILLUM_ALLOW", "")
+            try:
+                if self.worker is None:
+                    if not is_shared(self.command.token):
+                        self.mirror = Mirror(Path(mkdtemp(prefix="illum-", dir=folder)))
+                    self.worker = Worker()
+                if self.mirror is not None:
+                    self.mirror.enter(self.command.folder)
+                else:
+                    os.chdir(self.command.folder)
+                    os.environ["ILLUM_ALLOW"] = self.command.allowed
+                yield self.worker
+            finally:
+                os.chdir(before)
+                os.environ["ILLUM_ALLOW"] = allowed
+                if self.is_ended:
+                    self._remove_copies()
+
+    def _remove_copies(self) -> None:
         if self.mirror is not None:
             shutil.rmtree(self.mirror.root, ignore_errors=True)
-
-    def start(self, folder: str) -> None:
-        """Prepare this process for the units of the command; copies of the client's files go below `folder`.
-
-        Raises
-        ------
-        OSError
-            They cannot be made.
-        """
-        if self.worker is not None:
-            return
-        self._folder = os.getcwd()
-        if is_shared(self.command.token):
-            os.chdir(self.command.folder)
-            os.environ["ILLUM_ALLOW"] = self.command.allowed
-        else:
-            self.mirror = Mirror(Path(mkdtemp(prefix="illum-", dir=folder)))
-            self.mirror.enter(self.command.folder)
-        self.worker = Worker()
 
     def refusal(self) -> str:
         """How this process differs from the client; an empty text if it may do so, or does not."""
@@ -149,17 +160,15 @@ def do(
     if refusal := plugin.refusal():
         return BlockResult(address, refusal=refusal)
     try:
-        plugin.start(dask_worker.local_directory)
-        mirror, worker = plugin.mirror, plugin.worker
-        assert worker is not None
-        if mirror is not None:
-            mirror.add(contents or {})
-            lacking = mirror.lacking(digests or {})
-            if digests is None or lacking:
-                return BlockResult(address, lacks_files=True, lacking=tuple(lacking))
-            units = [_mirrored(unit, mirror) for unit in units]
-        done = _all_done(worker, units, mirror)
-        worker.finish()
+        with plugin.entered(dask_worker.local_directory) as worker:
+            if (mirror := plugin.mirror) is not None:
+                mirror.add(contents or {})
+                lacking = mirror.lacking(digests or {})
+                if digests is None or lacking:
+                    return BlockResult(address, lacks_files=True, lacking=tuple(lacking))
+                units = [_mirrored(unit, mirror) for unit in units]
+            done = _all_done(plugin, worker, units)
+            worker.finish()
     except Exception as error:
         if known(error) is None:
             return BlockResult(address, fault="".join(format_exception(error)))
@@ -167,12 +176,17 @@ def do(
     return BlockResult(address, done)
 
 
-def _all_done(worker: Worker, units: Sequence[Unit], mirror: Mirror | None) -> tuple[UnitResult, ...]:
-    """The results of units in their order; buffers that the next one reads stay in memory."""
+def _all_done(plugin: CommandPlugin, worker: Worker, units: Sequence[Unit]) -> tuple[UnitResult, ...]:
+    """The results of units in their order, until the client ends.
+
+    Buffers that the next one reads stay in memory.
+    """
     done, work = [], _prepared(worker, units[0])
     for upcoming in (*units[1:], None):
+        if plugin.is_ended:
+            break
         following = None if upcoming is None else _prepared(worker, upcoming)
-        done.append(work if isinstance(work, UnitResult) else _done(worker, work, following, mirror))
+        done.append(work if isinstance(work, UnitResult) else _done(worker, work, following, plugin.mirror))
         work = following or work
     return tuple(done)
 

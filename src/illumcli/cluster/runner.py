@@ -57,6 +57,8 @@ class Block(Value):
     """Files that a worker asked for."""
     asker: str | None = None
     """The worker that asked for them."""
+    among: frozenset[str] = frozenset()
+    """Workers that it was given to; empty for any."""
 
 
 class ClusterRunner:
@@ -111,6 +113,7 @@ class _Blocks:
     def results(self) -> Iterator[tuple[int, Callable[[], Any]]]:
         """The index of each piece, and a function that returns its result or raises its error."""
         while self._left or self._again or self._given:
+            self._take_back()
             self._give_out()
             done = [future for future in self._given if future.done()]
             for future in done:
@@ -129,19 +132,34 @@ class _Blocks:
             elif not done:
                 time.sleep(POLL)
 
+    def _take_back(self) -> None:
+        """Take back blocks for workers that are all gone: Dask would keep them for ever, loose or not."""
+        workers = frozenset(self._session.workers())
+        lost = [
+            future
+            for future, block in self._given.items()
+            if block.among and not block.among & workers and not future.done()
+        ]
+        for future in lost:
+            block = self._given.pop(future)
+            future.cancel()
+            self._again.append(replace(block, attempt=block.attempt + 1))
+
     def _give_out(self) -> None:
         """Give blocks to the scheduler, until it holds enough of them."""
-        workers = len(self._session.workers())
-        most = 1 if self._is_first_alone else HELD * workers
+        workers = frozenset(self._session.workers())
+        most = 1 if self._is_first_alone else HELD * len(workers)
         while (self._left or self._again) and len(self._given) < most:
-            block = self._again.popleft() if self._again else self._next(workers)
+            block = self._again.popleft() if self._again else self._next(len(workers))
             due = tuple(number for number in block.numbers if self._batch.is_due(number))
             if not due:
                 continue
-            block = replace(block, numbers=due)
+            others = workers - block.failed_on if block.failed_on else frozenset[str]()
+            among = frozenset({block.asker}) & workers if block.asker else others
+            block = replace(block, numbers=due, among=among)
             units = [self._unit_of(number) for number in due]
             key = digest((due, block.attempt))
-            future = self._session.submit(units, key, block.contents, block.asker, block.failed_on)
+            future = self._session.submit(units, key, block.contents, among)
             self._given[future] = block
 
     def _next(self, workers: int) -> Block:

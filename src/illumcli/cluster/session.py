@@ -80,23 +80,21 @@ class Session:
         units: Sequence[Unit],
         key: str,
         contents: Mapping[Path, bytes] | None,
-        asker: str | None,
-        avoid: frozenset[str],
+        among: frozenset[str],
     ) -> Future:
         """Give a block of units to the scheduler.
 
         Parameters
         ----------
-        contents, asker
-            Files for the worker that asked for them.
-        avoid
-            Workers that shall not do it.
+        contents
+            Files that the worker lacks.
+        among
+            Workers of which one shall do it; empty for any.
         """
         from illumcli.cluster.task import do
 
         digests = self._inputs.of_all(units) if self._ships else None
         threaded = [self._with_threads(unit) for unit in units]
-        among = [asker] if asker else [each for each in self.workers() if each not in avoid]
         return self._connection.client.submit(
             do,
             self._command,
@@ -104,8 +102,7 @@ class Session:
             digests,
             contents,
             key=f"{self._name}-{key}",
-            workers=among if asker or avoid else None,
-            allow_other_workers=asker is not None,
+            workers=sorted(among) or None,
             retries=2,
             pure=False,
         )

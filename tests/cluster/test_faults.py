@@ -17,9 +17,8 @@ from cluster.machines import COUNT, Client, is_clean, pictures
 pytestmark = pytest.mark.parametrize(
     "turn", [0, *(pytest.param(turn, marks=pytest.mark.slow) for turn in range(1, 10))]
 )
-LARGE = ["-D", "film={width: 1800, height: 1800, samples: 1}", "-t", "1"]
 LITTLE_MEMORY = ["prlimit", "--as=700000000"]
-"""Enough for a worker to start, too little for a LARGE picture."""
+"""Enough for a worker to start, too little for a large picture."""
 
 
 def kill(process):
@@ -120,18 +119,6 @@ def test_a_variant_of_which_all_workers_die_is_named(scene, machines, turn):
     words = ["-D", "film.width=9000", "-D", "film.height=9000"]
     errors = Client(scene.parent, "--cluster", machines.address, *words).finish(4)
     assert "exponent 1: " in errors
-
-
-def test_a_worker_with_little_memory_leaves_pictures_to_others(scene, machines, turn):
-    Client(scene.parent, *LARGE).finish()
-    expected = pictures(scene.parent)
-    for name in expected:
-        (scene.parent / name).unlink()
-    machines.start_worker(LITTLE_MEMORY)
-    machines.start_worker()
-    Client(scene.parent, "--cluster", machines.address, *LARGE).finish()
-    print(dict(machines.renders()))
-    assert is_clean(scene.parent, expected)
 
 
 def test_a_full_disk_of_a_worker_without_a_shared_folder(scene, expected, machines, turn):

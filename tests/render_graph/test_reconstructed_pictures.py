@@ -7,7 +7,6 @@ import pytest
 
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
-from illumcli.errors import InputError
 from illumcli.render_graph.execute import Run, at_pixels, bands, run_once
 from illumcli.render_graph.explain import expected_rays
 from illumcli.scene.load import load
@@ -111,9 +110,7 @@ def test_baked_objects_keep_their_values(path, tmp_path, illum):
     assert (raw["obscurance"] != after["obscurance"])[~baked].any()
 
 
-def test_what_has_no_reconstruction_is_refused(path):
-    with pytest.raises(InputError, match="layer error"):
-        planned(load(path), ["error"])
+def test_pixels_alone_are_refused(path):
     steps = planned(load(path))
     x = np.arange(3)
     with pytest.raises(ValueError, match="alone"):

@@ -23,20 +23,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.accuracy.error_law import standard_errors
 from illumcli.accuracy.sampled_blocks import SampledBlocks
-from illumcli.arrays import Floats
+from illumcli.arrays import F, Floats
+from illumcli.color import LUMINANCE
 from illumcli.film.adaptive import around
 from illumcli.film.tiles import Samples, Scattered, Tile
 from illumcli.film.view import View
 from illumcli.graph import Node
-from illumcli.layers import Layer
+from illumcli.layers import FIXED, Layer
 from illumcli.rays.interaction import Hits
 from illumcli.rays.sampling import hashed, pixel_points, stream, unit_interval
 from illumcli.records import Record, Value
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.execute import Run, at_pixels
 from illumcli.render_graph.replicates import numbered_draws
-from illumcli.render_graph.schedule import Plan, schedule
+from illumcli.render_graph.schedule import Plan, error_is_audited, schedule
 from illumcli.visibility.obscurance import obscurance_method
 
 FEWEST_PILOTS, MOST_PILOTS = 1800, 7200
@@ -87,6 +89,30 @@ class AuditedError(Value):
         return dict(vars(self))
 
 
+class Draws(Record):
+    """The K draws of pixels that state the error."""
+
+    pixel: NDArray[np.int64]  # (K,)
+    weights: NDArray[np.float64]  # (K,) their expected sum is 1
+    first: NDArray[np.float64]  # (K, channels) F - C
+    second: NDArray[np.float64]  # (K, channels) F - D
+
+    @property
+    def products(self) -> NDArray[np.float64]:
+        """(K,) (F - C)(F - D), means over the channels."""
+        return np.asarray((self.first * self.second).mean(axis=1))
+
+    @property
+    def luminance_products(self) -> NDArray[np.float64]:
+        """(K,) the same of the luminance, of a layer of three channels."""
+        return np.asarray((self.first @ LUMINANCE) * (self.second @ LUMINANCE))
+
+    @property
+    def variance(self) -> float:
+        """Variance of C and D."""
+        return float(np.square(self.first - self.second).mean()) / 2
+
+
 class Audit(Record):
     """The audit of one layer of a view: it takes the picture's values as its tiles are finished."""
 
@@ -109,10 +135,22 @@ class Audit(Record):
 
     def take(self, tile: Tile, layers: Mapping[str, NDArray[Any]]) -> None:
         """Keep the values of a finished tile; any thread."""
-        self.picture.take(tile, layers[self.layer.name])
+        self.picture.take(tile, self._shown(layers))
+
+    def _shown(self, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """The layer's pixels; the beauty over its background."""
+        values = np.asarray(layers[self.layer.name], F)
+        background = self.plan.graph.scene.film.background
+        if self.layer.buffer != "beauty" or background is None:
+            return values
+        return values + (1 - layers["alpha"]) * np.asarray(background, F)
 
     def error(self, shared: Mapping[str, Any], run: Run) -> AuditedError:
-        """The error of the picture, of which every tile was taken.
+        """The error of the picture, of which every tile was taken; see `measured`."""
+        return self.measured(shared, run)[0]
+
+    def measured(self, shared: Mapping[str, Any], run: Run) -> tuple[AuditedError, Draws]:
+        """The error of the picture, of which every tile was taken, and the draws that state it.
 
         Pixels that determine how many are audited do not state the error.
 
@@ -127,26 +165,38 @@ class Audit(Record):
 
         # The pilot: how large the error is, how unevenly it is spread, and how noisy C and D are.
         number = min(max(chances.size // 512, FEWEST_PILOTS), MOST_PILOTS)
-        products, weights, noise = self._products(chances, number, RAYS, "pilot", buffers, run)
-        pilot = AuditedError.of_products(self.layer.name, products, weights)
+        draws = self._draws(chances, number, RAYS, "pilot", buffers, run)
+        pilot = AuditedError.of_products(self.layer.name, draws.products, draws.weights)
         if not pilot.rmse:
-            return replace(pilot, rays=sum(run.stats.rays.values()))
-        more = max(noise / (2 * pilot.rmse**2), 1.0) ** (2 / 3)  # noise falls as rays^-1.5
+            return replace(pilot, rays=sum(run.stats.rays.values())), draws
+        more = max(draws.variance / (2 * pilot.rmse**2), 1.0) ** (2 / 3)  # noise falls as rays^-1.5
         rays = min(int(RAYS * more), MOST_RAYS)
 
         # The audit itself.
         wanted = number * (pilot.standard_error / pilot.rmse / self.precision) ** 2
         number = int(min(max(wanted, number), max(self._budget() // (2 * rays), number)))
-        products, weights, _ = self._products(chances, number, rays, "main", buffers, run)
-        stated = AuditedError.of_products(self.layer.name, products, weights)
-        return replace(stated, rays=sum(run.stats.rays.values()))
+        draws = self._draws(chances, number, rays, "main", buffers, run)
+        stated = AuditedError.of_products(self.layer.name, draws.products, draws.weights)
+        return replace(stated, rays=sum(run.stats.rays.values())), draws
+
+    def pixel_errors(self, draws: Draws) -> NDArray[np.float32]:
+        """(H, W, 1) float32 standard error of the luminance of every pixel, of a picture that is held whole.
+
+        Parameters
+        ----------
+        draws : Draws
+            From `measured`.
+        """
+        picture = self.picture.values
+        by_pixel = standard_errors(contrasts(picture), draws.pixel, draws.luminance_products, draws.weights)
+        return by_pixel.reshape(*picture.shape[:2], 1)
 
     def _budget(self) -> int:
         """Obscurance rays that the audit may take, about."""
         pixels = self.plan.view.width * self.plan.view.height
         return min(max(BUDGET_PER_PIXEL * pixels, LEAST_BUDGET), MOST_BUDGET)
 
-    def _products(
+    def _draws(
         self,
         chances: NDArray[np.float64],
         number: int,
@@ -154,8 +204,8 @@ class Audit(Record):
         purpose: str,
         buffers: dict[str, Any],
         run: Run,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """(K,) (F - C)(F - D) of pixels drawn by chance, their weights, and the variance of C and D."""
+    ) -> Draws:
+        """So many pixels, drawn by chance, and estimates with so many obscurance rays there."""
         start = float(
             unit_interval(hashed(stream(self.seed, f"audit pixels:{purpose}"), np.zeros(1, np.uint32)))[0]
         )
@@ -164,7 +214,7 @@ class Audit(Record):
         c, d = (self._fresh(x, y, rays, f"{purpose}:{half}", buffers, run) for half in ("c", "d"))
         own = self.picture.values.reshape(chances.size, -1)[pixel].astype(np.float64)
         weights = 1 / (chances[pixel] * np.count_nonzero(self.picture.is_inside) * number)
-        return ((own - c) * (own - d)).mean(axis=1), weights, float(np.square(c - d).mean()) / 2
+        return Draws(pixel, weights, own - c, own - d)
 
     def _fresh(
         self,
@@ -181,22 +231,27 @@ class Audit(Record):
         for node in plan.once:
             if node.output not in buffers or node.output == "obscurance_method":
                 buffers[node.output] = node.run(buffers)
-        return at_pixels(plan, buffers, run, x, y)[self.layer.name].astype(np.float64)
+        return self._shown(at_pixels(plan, buffers, run, x, y)).astype(np.float64)
 
 
 def pixel_chances(picture: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(H * W,) chance of each pixel at each draw: a third the same for all, a third by the range of values in
-    the 3 x 3 pixels around, and a third by its square, since most of the error is at edges and highlights."""
-    values = np.zeros(picture.shape[:2])
-    for channel in range(picture.shape[2]):  # a mean over the last axis takes ten times as long
-        values += picture[..., channel]
-    values /= picture.shape[2]
-    contrast = (around(values, np.maximum, 1) - around(values, np.minimum, 1)).ravel()
+    """(H * W,) chance of each pixel at each draw: a third the same for all, a third by the contrast around
+    it, and a third by its square, since most of the error is at edges and highlights."""
+    contrast = contrasts(picture)
     chances = np.full(contrast.size, 1 / contrast.size)
     if not contrast.any():
         return chances
     square = np.square(contrast)
     return (chances + contrast / contrast.sum() + square / square.sum()) / 3
+
+
+def contrasts(picture: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(H * W,) range of the values, means over the channels, in the 3 x 3 pixels around each pixel."""
+    values = np.zeros(picture.shape[:2])
+    for channel in range(picture.shape[2]):  # a mean over the last axis takes ten times as long
+        values += picture[..., channel]
+    values /= picture.shape[2]
+    return np.asarray((around(values, np.maximum, 1) - around(values, np.minimum, 1)).ravel())
 
 
 def drawn(chances: NDArray[np.float64], number: int, start: float) -> NDArray[np.int64]:
@@ -208,9 +263,11 @@ def drawn(chances: NDArray[np.float64], number: int, start: float) -> NDArray[np
 
 def audited_layer(plan: Plan) -> Layer | None:
     """The layer whose error is stated: the beauty, else the first mean of samples that reconstructed
-    obscurance is part of; None where there is none."""
+    obscurance is part of; None where there is none. The layer `error` always is that of the beauty."""
     if "raw_obscurance" not in plan.graph.nodes:
         return None
+    if error_is_audited(plan.graph.scene, plan.outputs):
+        return FIXED["beauty"]
     graph = plan.graph.without_loaders()
     means = [
         layer

@@ -18,7 +18,6 @@ from illumcli.accuracy.target import ATTEMPTS, MARGIN, SAMPLE_COST, count_overri
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
-from illumcli.errors import InputError
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
 from illumcli.rays.sampling import stream
@@ -29,7 +28,7 @@ from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.render_graph.limits import refuse_rays
 from illumcli.render_graph.needs import PROBE_SHARE
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
-from illumcli.render_graph.schedule import needed_buffers, outputs_of
+from illumcli.render_graph.schedule import error_is_audited, needed_buffers, outputs_of
 from illumcli.render_graph.tile_nodes import Planes
 from illumcli.scene.load import load
 from illumcli.scene.spec import Scene
@@ -209,9 +208,8 @@ class Attempt(Record):
 
 def can_reconstruct(graph: Graph, only: Sequence[str]) -> bool:
     """Does a layer whose error is asked for depend on obscurance that a fit may estimate?"""
-    try:
-        outputs = outputs_of(graph.scene, only)
-    except InputError:  # other layers cannot be reconstructed
+    outputs = outputs_of(graph.scene, only)
+    if error_is_audited(graph.scene, outputs):  # its own audit comes after the picture is chosen
         return False
     means = [layer for layer in outputs if not layer.data]
     too_large = any(view.width * view.height > LARGEST for view in graph.views)

@@ -15,6 +15,7 @@ from illumcli.film.view import View
 from illumcli.layers import Layer
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.keys import content_key
+from illumcli.render_graph.schedule import error_is_audited, sampled_outputs
 from illumcli.scene.access import refuse_outside
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
@@ -73,5 +74,7 @@ def file_content(graph: Graph, view: View, layers: Sequence[Layer], suffix: str)
     film = graph.scene.film
     coded = (suffix, view.name, [layer.name for layer in layers], graph.scene.outputs.colour)
     shown = (film.background, film.exposure if suffix == ".png" else 0.0)
+    if error_is_audited(graph.scene, layers):  # of the beauty
+        layers = sampled_outputs(layers)
     buffers = dict.fromkeys([*(layer.buffer for layer in layers), "alpha"])
     return digest((coded, shown, content_key(graph.nodes, view, buffers)))

@@ -8,9 +8,11 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from illumcli.accuracy.sampled_blocks import MOST_PIXELS
 from illumcli.cache.fingerprint import FileFingerprints, digest
 from illumcli.commands.options import RenderJob
 from illumcli.commands.targets import image_set
+from illumcli.errors import LimitError
 from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
 from illumcli.film.develop import Development, Target
@@ -21,7 +23,7 @@ from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build
 from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory, refuse_rays
-from illumcli.render_graph.schedule import outputs_of
+from illumcli.render_graph.schedule import error_is_audited, outputs_of
 from illumcli.scene.load import load
 from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
 from illumcli.scene.spec import Scene
@@ -103,8 +105,20 @@ def work_of(job: RenderJob, loaded: SceneFile, files: FileFingerprints | None = 
     scene = loaded.scene if options.seed is None else loaded.scene.model_copy(update={"seed": options.seed})
     graph, outputs = build(scene, loaded, files), outputs_of(scene, options.only)
     refuse_rays(graph, outputs)
+    refuse_large_errors(graph, outputs)
     targets = image_set(job, loaded, graph, outputs)
     return Work(job, loaded, graph, outputs, tuple(targets))
+
+
+def refuse_large_errors(graph: Graph, outputs: Sequence[Layer]) -> None:
+    """Raise LimitError if the layer `error` needs the audit of a picture that is too large to be held."""
+    for view in graph.views if error_is_audited(graph.scene, outputs) else ():
+        if view.width * view.height > MOST_PIXELS:
+            raise LimitError(
+                f"camera {view.name}: the layer error of reconstructed obscurance needs a whole picture, of "
+                f"at most {MOST_PIXELS:,} pixels; leave it out, render a smaller film, or set "
+                "obscurance.reconstruct=false"
+            )
 
 
 def unused_keys(work: Work) -> list[str]:
@@ -121,7 +135,8 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
     expected = expected_memory(work.loaded, work.scene) if due else {}
     for target in due:
         view = target.view
-        refuse_memory(BAND_ROWS, view.width, values, expected, str(work.loaded.path))
+        rows = view.height if error_is_audited(work.scene, work.outputs) else BAND_ROWS  # held for the audit
+        refuse_memory(rows, view.width, values, expected, str(work.loaded.path))
         types = work.development.channels(target).values()
         refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
 

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from illumcli import __version__
+from illumcli.commands.file_metadata import metadata
+from illumcli.commands.view_audit import audit_of, bands_with_errors, measured
 from illumcli.commands.work import Work
-from illumcli.film.develop import ErrorSums, Target, how_to_read
+from illumcli.film.develop import ErrorSums, Target
 from illumcli.film.tiles import Tile
 from illumcli.graph import Buffers
 from illumcli.images.format import RESERVED
 from illumcli.progress import Progress
 from illumcli.records import Value
-from illumcli.render_graph.execute import Run, bands
-from illumcli.render_graph.needs import reconstructs
-from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.execute import Band, Run, bands
+from illumcli.render_graph.schedule import Plan, error_is_audited
 from illumcli.render_graph.tile_nodes import Planes
-from illumcli.render_space import RenderSpace
-from illumcli.scene.spec import Scene
 
 if TYPE_CHECKING:
-    from illumcli.accuracy.audit import Audit, AuditedError
+    from illumcli.accuracy.audit import AuditedError
 
 
 class ViewOutcome(Value):
@@ -47,7 +45,7 @@ def write_view(
     run: Run,
     progress: Progress,
 ) -> ViewOutcome:
-    """Write one view's files band by band."""
+    """Write one view's files band by band; all at once where an audit of the picture makes a layer."""
     from illumcli.images.writer import ImageWriter
 
     view, space, development = plan.view, shared["render_space"], work.development
@@ -60,15 +58,20 @@ def write_view(
         done += count
         progress(view.name, done, pixels)
 
-    # Called by the threads for each tile: turn layers into values of the files.
-    audit, known = _audit(work, plan), work.audited.get(view.name)
+    # Called by the threads for each tile: turn layers into values of the files. If an audit makes the layer
+    # `error`, the picture is held until then.
+    audit, known = audit_of(work, plan), work.audited.get(view.name)
+    is_held = error_is_audited(work.scene, plan.outputs)
     stated = audit.layer.name if audit is not None else known.layer if known is not None else None
 
     def develop(tile: Tile, layers: Planes) -> dict[str, NDArray[Any]]:
-        if audit is not None:
-            audit.take(tile, layers)
         files = {str(target.path): development.pixels(target, tile, layers, space) for target in targets}
         return files | ({"error": layers["error"]} if "error" in layers else {})
+
+    def finish(tile: Tile, layers: Planes) -> Mapping[str, NDArray[Any]]:
+        if audit is not None:
+            audit.take(tile, layers)
+        return layers if is_held else develop(tile, layers)
 
     # Open all files; each gets its name only when all of it is written.
     sums, error = ErrorSums(), known
@@ -88,7 +91,12 @@ def write_view(
         ]
 
         # Render and write band by band.
-        for band in bands(plan, shared, run, advance, develop=develop):
+        made: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
+        if audit is not None and is_held:
+            held = list(made)
+            error, draws = measured(audit, shared, run)
+            made = bands_with_errors(held, audit.pixel_errors(draws), develop)
+        for band in made:
             start = time.perf_counter()
             if "error" in band.layers:
                 sums.add(band.layers["error"])
@@ -97,11 +105,8 @@ def write_view(
             run.stats.add({"write": time.perf_counter() - start}, {})
 
         # Measure the error of reconstructed obscurance, and write it beside the layer.
-        if audit is not None:
-            start, auditing = time.perf_counter(), Run(threads=run.threads)
-            error = audit.error(shared, auditing)
-            rays = sum(auditing.stats.rays.values())
-            run.stats.add({"audit": time.perf_counter() - start}, {"audit": rays})
+        if audit is not None and not is_held:
+            error, _ = measured(audit, shared, run)
         if error is not None:
             for target, writer in zip(targets, writers, strict=True):
                 for name in _room(target, stated):
@@ -114,33 +119,6 @@ def write_view(
     return ViewOutcome(clamped, sums, error)
 
 
-def _audit(work: Work, plan: Plan) -> Audit | None:
-    """The audit of a view; None if nothing is reconstructed, or the job has no audit."""
-    if not (work.job.options.audit and reconstructs(work.scene)):
-        return None
-    from illumcli.accuracy.audit import Audit, audited_layer
-
-    layer = audited_layer(plan)
-    return Audit.of(plan, layer, work.scene.seed) if layer is not None else None
-
-
 def _room(target: Target, stated: str | None) -> dict[str, str]:
     """Room in the metadata of a file for the error of a layer, where it holds that layer."""
     return {"illum:audited_error": RESERVED} if stated in {layer.name for layer in target.layers} else {}
-
-
-def metadata(scene: Scene, target: Target, space: RenderSpace) -> dict[str, Any]:
-    """The metadata of a file."""
-    return {
-        "Software": f"illum {__version__}",
-        "illum:version": __version__,
-        "illum:content": target.content,
-        "illum:camera": target.view.name,
-        "illum:layers": ",".join(layer.name for layer in target.layers),
-        "illum:samples": target.view.samples,
-        "illum:seed": str(scene.seed),
-        "illum:exposure": scene.film.exposure,
-        "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
-        "illum:obscurance_reconstructed": int(reconstructs(scene)),
-        **how_to_read(target, space),
-    }

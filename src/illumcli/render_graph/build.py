@@ -123,7 +123,8 @@ def build(
     views = tuple(needs.views(scene))
     counts = [view.samples for view in views]
     by_name |= adaptive_nodes(scene, by_name, GIVEN)
-    by_name |= error_nodes(by_name, scene.seed, scene.film.background, counts, GIVEN)
+    if not needs.reconstructs(scene):  # there an audit of the finished picture makes the error
+        by_name |= error_nodes(by_name, scene.seed, scene.film.background, counts, GIVEN)
     return Graph(scene, views, by_name, reasons=_reasons(scene, by_name))
 
 

@@ -16,7 +16,7 @@ from illumcli.render_graph.build import Graph
 from illumcli.render_graph.build_adaptive import FITTED, OPEN, REFINED
 from illumcli.render_graph.culling import why_all
 from illumcli.render_graph.replicates import REPLICATE, replicated_count
-from illumcli.render_graph.schedule import Plan, reached
+from illumcli.render_graph.schedule import Plan, error_is_audited, reached
 from illumcli.render_graph.tile_nodes import LARGEST_FIT
 from illumcli.scene.spec import Scene
 
@@ -104,7 +104,9 @@ def expected_bytes(plan: Plan) -> dict[str, int]:
     """Upper bounds of the memory of a plan beside its meshes: a band of tiles, and each buffer that is read
     from or may be written to the cache; the system may drop the pages of the latter."""
     view = plan.view
-    samples = min(view.height, plan.tile_side(view)) * view.width * view.samples
+    is_held = error_is_audited(plan.graph.scene, plan.outputs)  # until the audit makes that layer
+    rows = view.height if is_held else min(view.height, plan.tile_side(view))
+    samples = rows * view.width * view.samples
     sizes = {"band": samples * 4 * sum(len(layer.channels) for layer in plan.outputs) // view.samples}
     for name in [*plan.lookup.keeps, *plan.lookup.reused]:
         if name == FITTED:  # column, row, object and value of about one pair of each pixel

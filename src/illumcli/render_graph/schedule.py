@@ -8,7 +8,6 @@ from functools import cached_property
 
 from illumcli.cache.codec import codec_of
 from illumcli.cache.recorder import Cache
-from illumcli.errors import InputError
 from illumcli.film.tiles import TILES, TILES_WITH_MARGINS, min_tile_samples, tile_side
 from illumcli.film.view import View
 from illumcli.graph import Node
@@ -63,7 +62,7 @@ class Plan(Value):
     @property
     def sampled(self) -> tuple[Layer, ...]:
         """The layers that are made of samples."""
-        return sampled_outputs(self.outputs) if self.view.adaptive else self.outputs
+        return of_samples(self.graph, self.outputs, [self.view])
 
     @property
     def computed(self) -> set[str]:
@@ -127,15 +126,15 @@ def outputs_of(scene: Scene, only: Sequence[str] = ()) -> tuple[Layer, ...]:
     Raises
     ------
     InputError
-        Layers that do not exist, or that this film cannot have.
+        Layers that do not exist.
     """
-    outputs = tuple(layers(scene, only or scene.outputs.layers))
-    if reconstructs(scene) and any(layer.per_pixel for layer in outputs):
-        raise InputError(
-            "the layer error is that of samples which are not reconstructed; leave it out, or "
-            "obscurance.reconstruct"
-        )
-    return outputs
+    return tuple(layers(scene, only or scene.outputs.layers))
+
+
+def error_is_audited(scene: Scene, outputs: Sequence[Layer]) -> bool:
+    """Is the layer `error` among these, and made by an audit of the finished picture? So it is where
+    obscurance is reconstructed: replicates of a pixel alone cannot be."""
+    return reconstructs(scene) and any(layer.per_pixel for layer in outputs)
 
 
 def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]) -> list[str]:
@@ -145,8 +144,8 @@ def needed_buffers(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]
     or not.
     """
     buffers: dict[str, None] = {"hits": None}
+    outputs = of_samples(graph, outputs, shown)
     if any(view.adaptive for view in shown):
-        outputs = sampled_outputs(outputs)
         buffers |= dict.fromkeys(decisions(outputs))
         buffers |= dict.fromkeys(_fitted(graph, outputs))
     buffers |= dict.fromkeys(layer.buffer for layer in outputs)
@@ -164,8 +163,16 @@ def _fitted(graph: Graph, outputs: Sequence[Layer]) -> list[str]:
     return ["edges", FITTED] if any(node.output == FITTED for node in needed) else []
 
 
+def of_samples(graph: Graph, outputs: Sequence[Layer], shown: Sequence[View]) -> tuple[Layer, ...]:
+    """The layers that are made of samples to have these layers of some views."""
+    if reconstructs(graph.scene) or any(view.adaptive for view in shown):
+        return sampled_outputs(outputs)
+    return tuple(outputs)
+
+
 def sampled_outputs(outputs: Sequence[Layer]) -> tuple[Layer, ...]:
-    """The layers that an adaptive picture makes of samples; the error is made of the beauty's pixels."""
+    """The layers that are made of samples where the error is made of the beauty's pixels: in adaptive
+    pictures, and where obscurance is reconstructed."""
     sampled = [layer for layer in outputs if not layer.per_pixel]
     needs_beauty = len(sampled) < len(outputs) and FIXED["beauty"] not in sampled
     return (*sampled, *([FIXED["beauty"]] if needs_beauty else []))
@@ -216,7 +223,7 @@ def schedule(
 
     # The error compares finished pixels with replicates, which have all samples.
     replicates = None
-    if any(layer.per_pixel for layer in outputs):
+    if any(layer.per_pixel for layer in outputs) and not reconstructs(graph.scene):
         scene_loaders = {name: node for name, node in graph.loaders.items() if not node.inputs}
         whole = replace(graph, loaders=scene_loaders)
         first, rest = once_and_tile(whole.topological_order(REPLICATED))

@@ -1,0 +1,28 @@
+"""The metadata of the files that a render writes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from illumcli import __version__
+from illumcli.film.develop import Target, how_to_read
+from illumcli.render_graph.needs import reconstructs
+from illumcli.render_space import RenderSpace
+from illumcli.scene.spec import Scene
+
+
+def metadata(scene: Scene, target: Target, space: RenderSpace) -> dict[str, Any]:
+    """The metadata of a file."""
+    return {
+        "Software": f"illum {__version__}",
+        "illum:version": __version__,
+        "illum:content": target.content,
+        "illum:camera": target.view.name,
+        "illum:layers": ",".join(layer.name for layer in target.layers),
+        "illum:samples": target.view.samples,
+        "illum:seed": str(scene.seed),
+        "illum:exposure": scene.film.exposure,
+        "illum:obscurance_samples": scene.obscurance.samples if scene.obscurance else 0,
+        "illum:obscurance_reconstructed": int(reconstructs(scene)),
+        **how_to_read(target, space),
+    }

@@ -41,7 +41,7 @@ def counted(self, work, **more):
 
 @wraps(replace)
 def deadly(source, target, **more):
-    for token in Path(DEATHS).iterdir() if str(target).endswith(".png") else ():
+    for token in Path(DEATHS).iterdir() if Path(target).name.startswith("s-") else ():
         with suppress(FileNotFoundError):  # the other worker took it
             token.unlink()
             os.kill(os.getpid(), signal.SIGKILL)

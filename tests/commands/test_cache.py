@@ -157,7 +157,7 @@ illum()
 
 
 def test_a_picture_is_done_where_no_entry_can_be_removed(own, monkeypatch):
-    monkeypatch.setenv("ILLUM_CACHE_SIZE", "600k")
+    monkeypatch.setenv("ILLUM_CACHE_SIZE", "800k")
     command = [sys.executable, "-c", UNREMOVABLE, "render", "ring.yaml", "--force"]
     for k in range(4):
         change = ["-D", f"camera.position=[3,2,{4 + k}]"]

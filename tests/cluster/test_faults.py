@@ -101,7 +101,7 @@ def test_a_worker_that_stands_still_delays_its_own_pieces_only(scene, expected, 
     client = Client(scene.parent, "--cluster", machines.address)
     client.wait_for(2)
     os.killpg(machines.workers[0].pid, signal.SIGSTOP)
-    client.wait_for(COUNT - 4)
+    client.wait_for(4)  # the other goes on; blocks that the scheduler gave to the first wait for it
     os.killpg(machines.workers[0].pid, signal.SIGCONT)
     client.finish()
     check(machines, scene, expected)

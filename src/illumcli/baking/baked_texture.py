@@ -1,0 +1,50 @@
+"""Baked textures: obscurance over the uv atlas of one material of one object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.records import Record
+
+
+class BakedTexture(Record):
+    """Values of the texels of one material of one object, (H, W) each, linear.
+
+    Row 0 is the top of the picture, as in image files. The centre of the texel in row i and column j is at
+    u = (j + 0.5) / W, and at v = 1 - (i + 0.5) / H in a `Mesh`, whose v points up; in glTF, whose v points
+    down, at v = (i + 0.5) / H. uv outside [0, 1] repeat the texture.
+
+    Texels that no polygon covers have the values of those near them, so that neither bilinear lookups nor
+    mipmaps mix in a background.
+    """
+
+    object: int  # index of the object
+    material: int  # index in `material_names` of the object's mesh; -1 for polygons without a material
+    name: str  # of the object, and of the material if the object has several: unique among a bake's textures
+    obscurance: NDArray[np.float32]  # (H, W) w in [0, 1]: 1 where open
+    standard_error: NDArray[np.float32]  # (H, W)
+    is_covered: NDArray[np.bool_]  # (H, W) True where a polygon covers a part of the texel
+    channels: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    """Further values by name, (H, W) or (H, W, 3)."""
+
+
+class TextureUvs(Record):
+    """uv of an object's corners, as `Mesh` has them: where the file's own do not serve."""
+
+    uvs: NDArray[np.float64]  # (U, 2) v upwards
+    corner_uvs: NDArray[np.int32]  # (C,) row of `uvs`
+
+
+class BakedTextures(Record):
+    """The textures of a bake."""
+
+    textures: tuple[BakedTexture, ...]
+    unwrapped: Mapping[int, TextureUvs] = field(default_factory=dict)
+    """Object -> the uv that its textures use, if they are not those of its file."""
+    about: Mapping[str, Any] = field(default_factory=dict)
+    """What the files say of themselves: the same text as other baked files have."""

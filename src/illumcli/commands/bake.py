@@ -11,7 +11,7 @@ from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import Shard
-from illumcli.commands.runner import Pieces, Runner
+from illumcli.commands.runner import PlannedPieces, Runner
 from illumcli.commands.unit import Worker
 from illumcli.files.names import check_unique, expand
 from illumcli.progress import Progress
@@ -61,15 +61,12 @@ def bake_inputs(
 
     # Find faults before the first ray. The meshes of a single input are kept for its bake.
     single: BakeWork | None = None
-    claims: dict[int, Path | None] = {}
-    kept: set[int] = set()
+    planned = PlannedPieces()
     for index in batch.due():
         with batch.piece(index):
             work = worker.prepare(request.job(inputs[index]))
             entries.plan(index, digest((work.content, [str(each) for each in work.outputs])))
-            is_due = bool(work.due())
-            claims[index] = work.claim if is_due else None
-            kept |= set() if is_due else {index}
+            planned.add(index, work)
             single = work if len(inputs) == 1 else None
             del work
     entries.look(request.options.force)
@@ -78,7 +75,7 @@ def bake_inputs(
     def run(index: int, progress: Progress) -> tuple[list[Path], BakeReport]:
         return worker.run(single or worker.prepare(request.job(inputs[index])), progress)
 
-    pieces = Pieces(lambda index: request.job(inputs[index]), claims.__getitem__, run, frozenset(kept))
+    pieces = planned.pieces(lambda index: request.job(inputs[index]), run)
     for index, result in runner.results(batch, pieces):
         with batch.piece(index):
             paths, done = result()

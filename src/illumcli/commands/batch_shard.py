@@ -14,7 +14,7 @@ from illumcli.commands.batch import Batch, BatchReport
 from illumcli.commands.merged_shards import MergedShards
 from illumcli.commands.options import RenderJob
 from illumcli.commands.report import Report
-from illumcli.commands.runner import Pieces, Runner
+from illumcli.commands.runner import PlannedPieces, Runner
 from illumcli.commands.sharding import Sharding
 from illumcli.commands.unit import Unit, Worker
 from illumcli.commands.work import Work
@@ -45,17 +45,14 @@ def run_shard(of: BatchUnits, batch: Batch, worker: Worker, runner: Runner, done
     """
     batch.leave_all_but(of.sharding.own)
     contents: dict[int, tuple[str, ...]] = {}
-    claims: dict[int, Path | None] = {}
-    kept: set[int] = set()
+    planned = PlannedPieces()
 
     # Find faults before the first ray.
     for number in batch.due():
         with batch.piece(number):
             work = worker.prepare(of.units[number])
             contents[number] = work.contents
-            is_due = bool(work.due())
-            claims[number] = work.claim if is_due else None
-            kept |= set() if is_due else {number}
+            planned.add(number, work)
             del work
     of.sharding.look(contents, of.force)
 
@@ -70,8 +67,7 @@ def run_shard(of: BatchUnits, batch: Batch, worker: Worker, runner: Runner, done
         upcoming = _following(of, number, worker)
         return worker.run(work, progress, next(iter(upcoming.values()), None))
 
-    pieces = Pieces(of.units.__getitem__, claims.__getitem__, run, frozenset(kept))
-    for number, result in runner.results(batch, pieces):
+    for number, result in runner.results(batch, planned.pieces(of.units.__getitem__, run)):
         with batch.piece(number):
             report = done(of.units[number], *result())
             of.sharding.add(number, report.as_data())

@@ -12,7 +12,7 @@ from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
-from illumcli.commands.runner import Pieces, Runner
+from illumcli.commands.runner import PlannedPieces, Runner
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress
 from illumcli.records import Value
@@ -51,17 +51,14 @@ def render_scenes(
     what = "frames" if any(job.frame is not None for job in jobs) else "scenes"
     batch = Batch(what, len(jobs), options.keep_going, once(tell) if what == "frames" else tell)
     entries = BatchReport(report, [entry_of(job) for job in jobs])
-    claims: dict[int, Path | None] = {}
-    kept: set[int] = set()
+    planned = PlannedPieces()
     files: dict[tuple[Path, str], None] = {}  # every file once, even if a scene is given twice
 
     # Find faults before the first ray.
     for number in batch.due():
         with batch.piece(number, jobs.label(number)):
             work = jobs.planned(number)
-            is_due = bool(work.due())
-            claims[number] = work.claim if is_due else None
-            kept |= set() if is_due else {number}
+            planned.add(number, work)
             names = [str(target.path) for target in work.targets]
             entries.plan(number, digest((work.content, names, options.target_error)))
             files |= dict.fromkeys((target.path, target.content) for target in work.targets)
@@ -75,8 +72,7 @@ def render_scenes(
         ending = jobs.worker.finish() if following is None else ()
         return paths, replace(done, warnings=(*done.warnings, *ending))
 
-    pieces = Pieces(jobs.unit, claims.__getitem__, run, frozenset(kept))
-    for number, result in runner.results(batch, pieces):
+    for number, result in runner.results(batch, planned.pieces(jobs.unit, run)):
         with batch.piece(number, jobs.label(number)):
             paths, done = result()
             work = jobs.work(number)

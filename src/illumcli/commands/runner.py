@@ -14,7 +14,9 @@ from illumcli.progress import Progress, no_progress
 from illumcli.records import Value
 
 if TYPE_CHECKING:
+    from illumcli.baking.inputs import BakeWork
     from illumcli.commands.unit import Unit
+    from illumcli.commands.work import Work
 
 R = TypeVar("R")
 
@@ -30,6 +32,34 @@ class Pieces(Value, Generic[R]):
     """Does a piece in this process, and tells how far it is."""
     kept: frozenset[int]
     """Those of which all files exist already: nothing is computed."""
+
+
+class PlannedPieces:
+    """The pieces of a batch as they are planned: which exist already, and the claims on the others."""
+
+    def __init__(self) -> None:
+        self._claims: dict[int, Path | None] = {}
+        self._kept: set[int] = set()
+
+    def add(self, number: int, work: Work | BakeWork) -> None:
+        """Plan a piece.
+
+        Raises
+        ------
+        OutputError
+            A different file exists; a file cannot be written.
+        LimitError
+            Memory or disk cannot hold what is due.
+        """
+        if work.due():
+            self._claims[number] = work.claim
+        else:
+            self._claims[number] = None
+            self._kept.add(number)
+
+    def pieces(self, unit: Callable[[int], Unit], run: Callable[[int, Progress], R]) -> Pieces[R]:
+        """The pieces, each done by `run`."""
+        return Pieces(unit, self._claims.__getitem__, run, frozenset(self._kept))
 
 
 class Runner(Protocol):

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import errno
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+R = TypeVar("R")
 
 
 class IllumError(Exception):
@@ -79,3 +82,13 @@ def known(error: BaseException) -> IllumError | None:
         case SystemError() if _NO_REASON.fullmatch(str(error)):
             return LimitError(f"{error}: most often for want of memory; {_SMALLER}, or report it as a fault")
     return None
+
+
+def unless_faulty(prepare: Callable[[], R]) -> R | None:
+    """The result of a function; None for a known error, which is reported when its unit has its turn."""
+    try:
+        return prepare()
+    except Exception as error:
+        if known(error) is None:
+            raise
+        return None

@@ -156,10 +156,10 @@ def test_references_are_numbers_of_variants_or_files(tmp_path, said):
 def plan_of(path):
     """The plan of a scene as text."""
     from illumcli.commands.options import RenderOptions
-    from illumcli.commands.plan import plan_scene
+    from illumcli.commands.plan import ScenePlan
     from illumcli.commands.plan_table import plan_table
 
-    return plan_table(plan_scene(path, options=RenderOptions(cache=False)))
+    return plan_table(ScenePlan(path, options=RenderOptions(cache=False)).parts())
 
 
 def test_plans_show_what_shapes_and_textures_take(tmp_path):

@@ -15,7 +15,7 @@ from illumcli.commands.options import RenderJob, RenderOptions, Shard
 from illumcli.commands.shards import loads, shard_of_each
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import cost_of
+from illumcli.commands.unit_cost import cost_of
 from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.scene.variants import variants_of
 

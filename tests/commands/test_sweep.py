@@ -14,7 +14,7 @@ import pytest
 
 from illumcli.cache import fingerprint
 from illumcli.cache.fingerprint import file_digest as digest
-from illumcli.commands import sweep_planning
+from illumcli.commands import held_works
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
@@ -144,7 +144,7 @@ def test_many_variants_hold_no_scene(scene, tmp_path):
 
 @pytest.mark.parametrize("held", [1, 256])
 def test_what_others_write_to_the_scene_and_its_mesh_meanwhile_is_not_seen(tmp_path, monkeypatch, held):
-    monkeypatch.setattr(sweep_planning, "HELD", held)
+    monkeypatch.setattr(held_works, "HELD", held)
     read = []
     monkeypatch.setattr(fingerprint, "file_digest", lambda path: read.append(path.name) or digest(path))
     mesh = tmp_path / "a.obj"

@@ -205,17 +205,17 @@ def test_a_moving_camera_shares_the_geometry_of_what_any_variant_saw(scene, tmp_
 
 
 def test_the_plan_tells_them_once_their_boxes_are_known(scene, tmp_path, monkeypatch):
-    from illumcli.commands.plan import plan_scene as told
+    from illumcli.commands.plan import ScenePlan
 
     monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "kept"))
     monkeypatch.setattr(policy, "worth", lambda seconds, size: True)
-    (cold,) = told(scene)
+    (cold,) = ScenePlan(scene).parts()
     assert "unless their bounds" in cold["objects"]
     render_scene(RenderJob(scene, RenderOptions(pattern=str(tmp_path / "a.png"))))
-    (warm,) = told(scene)
+    (warm,) = ScenePlan(scene).parts()
     assert "object:away" in warm["skipped"]
     assert "hits" in warm["reused"]
-    (every,) = told(scene, variants_of(["obscurance.falloff={falloff: step}"]))
+    (every,) = ScenePlan(scene, variants_of(["obscurance.falloff={falloff: step}"])).parts()
     assert every["objects"] == "all: obscurance rays reach any distance"
 
 

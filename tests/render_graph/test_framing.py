@@ -8,8 +8,8 @@ import pytest
 from illumcli.accuracy.sampled import sampled_layer
 from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store, default_folder
-from illumcli.commands import plan as plan_job
 from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.plan import ScenePlan
 from illumcli.commands.render import render_scene
 from illumcli.commands.sweep import sweep_scene
 from illumcli.errors import InputError
@@ -79,10 +79,10 @@ def test_an_object_that_nobody_sees_is_left_out_of_the_placed_view(scene):
 
 def test_the_plan_knows_where_the_camera_stands_once_it_was_there(scene):
     words = ["film.width=600", "film.height=400", "film.samples=4"]
-    cold = plan_job.plan_scene(scene, variants_of(words))
+    cold = ScenePlan(scene, variants_of(words)).parts()
     assert "hits" not in cold[0]["reused"]
     render_scene(RenderJob(scene, RenderOptions(words)))
-    warm = plan_job.plan_scene(scene, variants_of(words))
+    warm = ScenePlan(scene, variants_of(words)).parts()
     assert "hits" in warm[0]["reused"]
     assert "camera:main" not in warm[0]["skipped"]
     loaded = load(scene, words)

@@ -49,9 +49,10 @@ def plan(scene: Path, variants: list[Variant], options: RenderOptions, as_json: 
     """
     import json
 
-    from illumcli.commands.plan import plan_scene, refuse_too_large
+    from illumcli.commands.plan import ScenePlan
     from illumcli.commands.plan_table import plan_table
 
-    parts = plan_scene(scene, variants, options)
+    planned = ScenePlan(scene, variants, options)
+    parts = planned.parts()
     click.echo(json.dumps(parts, indent=1) if as_json else plan_table(parts))
-    refuse_too_large(scene, variants, options)
+    planned.refuse_too_large()

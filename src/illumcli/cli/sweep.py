@@ -119,10 +119,10 @@ def sweep(
     if dry_run:
         import json
 
-        from illumcli.commands.plan import plan_scene
+        from illumcli.commands.plan import ScenePlan
         from illumcli.commands.plan_table import variants_table
 
-        parts = plan_scene(scene, variants, options, is_sweep=True)
+        parts = ScenePlan(scene, variants, options, is_sweep=True).parts()
         shown = [part["variants"] for part in parts]
         click.echo(json.dumps(shown, indent=1) if as_json else variants_table(parts))
         return

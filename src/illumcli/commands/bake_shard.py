@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from illumcli.commands.batch_shard import BatchUnits, run_shard
 from illumcli.commands.runner import Runner
 from illumcli.commands.sharding import PlannedUnit, Sharding
 from illumcli.commands.unit import Unit, Worker
-from illumcli.errors import known
+from illumcli.errors import unless_faulty
 from illumcli.files.names import check_unique
 from illumcli.render_graph.costs import Cost
 
@@ -49,9 +50,9 @@ def bake_shard(
 
     def done(unit: Unit, paths: list[Path], report: Any) -> BakeReport:
         assert isinstance(unit, BakeJob)
-        found: BakeReport = report
-        written(unit.path, paths, found)
-        return found
+        baked: BakeReport = report
+        written(unit.path, paths, baked)
+        return baked
 
     batch = Batch("inputs", len(jobs), request.keep_going, tell)
     units = BatchUnits(jobs, sharding, request.options.force)
@@ -59,11 +60,6 @@ def bake_shard(
 
 
 def _cost(job: BakeJob) -> Cost:
-    """The cost of a bake; nothing for an input with a fault, which its shard reports."""
-    try:
-        cost = bake_cost(job)
-    except Exception as error:
-        if known(error) is None:
-            raise
-        cost = 0
+    """The cost of a bake; nothing for an input with a fault."""
+    cost = unless_faulty(partial(bake_cost, job)) or 0
     return Cost(cost, cost)

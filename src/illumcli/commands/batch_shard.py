@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -18,7 +19,7 @@ from illumcli.commands.runner import PlannedPieces, Runner
 from illumcli.commands.sharding import Sharding
 from illumcli.commands.unit import Unit, Worker
 from illumcli.commands.work import Work
-from illumcli.errors import IllumError
+from illumcli.errors import IllumError, unless_faulty
 from illumcli.progress import Progress
 from illumcli.records import Value
 
@@ -83,10 +84,8 @@ def _following(of: BatchUnits, number: int, worker: Worker) -> dict[int, Work]:
     following = of.units[later]
     if later == number or not isinstance(unit, RenderJob) or not isinstance(following, RenderJob):
         return {}
-    try:
-        return {later: worker.prepare(following)} if following.scene == unit.scene else {}
-    except IllumError:  # reported when it is its turn
-        return {}
+    work = unless_faulty(partial(worker.prepare, following)) if following.scene == unit.scene else None
+    return {} if work is None else {later: work}
 
 
 def merge_batch(whole: MergedShards, force: bool) -> tuple[list[Path], list[Path]]:

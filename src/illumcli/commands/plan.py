@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,55 +26,64 @@ ONE = (Variant({}),)
 """A scene as it is."""
 
 
-def plan_scene(
-    path: Path,
-    variants: Sequence[Variant] = ONE,
-    options: RenderOptions | None = None,
-    is_sweep: bool = False,
-) -> list[dict[str, Any]]:
-    """The plan of each view of a scene; with a cache, of a run that loads what the store holds now.
+class ScenePlan:
+    """The plan of a scene and its variants. Each variant is prepared once.
 
-    Of several variants it is the plan of the first, and what all of them take. Of a sweep it is the latter,
-    too, even if it has one variant, and its images have the names that `illum sweep` gives them.
-
-    Raises
-    ------
-    InputError
-        A variant has a fault.
+    Parameters
+    ----------
+    is_sweep : bool
+        True for a plan of all variants, even if there is one, in which images have the names that
+        `illum sweep` gives them; otherwise it is the plan of the first, and of all if there are several.
     """
-    options = options or RenderOptions()
-    if is_sweep or options.pattern is not None or any(variant.values for variant in variants[1:]):
-        options = named(path, variants, options)
-    works = SweepWorks(path, options)
-    outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]
-    first = works.of(outcomes[0])
-    store = open_store() if options.cache else None
-    run = Run(cache=Cache(store), threads=options.threads or len(os.sched_getaffinity(0)))
 
-    # Compute nothing: object bounds and cameras are known only if the store has them.
-    graph = place_and_cull(first.graph, first.outputs, run, only_cached=True)
-    plans = [plan_view(graph, first.outputs, view, run.cache, look=True) for view in graph.views]
-    expected, speeds = expected_memory(first.loaded, first.scene), read_speeds(store)
-    parts = []
-    for plan in plans:
-        time = time_of(by_stage(units_of(plan)), speeds, run.threads)
-        parts.append(plan_data(plan, expected) | {"expected_time": time.as_data()})
+    def __init__(
+        self,
+        path: Path,
+        variants: Sequence[Variant] = ONE,
+        options: RenderOptions | None = None,
+        is_sweep: bool = False,
+    ) -> None:
+        options = options or RenderOptions()
+        if is_sweep or options.pattern is not None or any(variant.values for variant in variants[1:]):
+            options = named(path, variants, options)
+        self._path, self._variants, self._options = path, variants, options
+        self._is_of_all = is_sweep or len(variants) > 1
+        self._expected: Mapping[str, int] = {}
 
-    # What all variants take.
-    if is_sweep or len(variants) > 1:
-        planned = planned_variants(works, outcomes)
-        for plan, part in zip(plans, parts, strict=True):
-            camera = plan.view.name
-            time = time_of(by_stage(planned.units[camera]), speeds, run.threads)
-            part["variants"] = planned.as_data(camera, time)
-    return parts
+    def parts(self) -> list[dict[str, Any]]:
+        """The plan of each view of the scene; with a cache, of a run that loads what the store holds now.
 
+        Raises
+        ------
+        InputError
+            A variant has a fault.
+        """
+        options, works = self._options, SweepWorks(self._path, self._variants, self._options)
+        first = works.of(0)
+        store = open_store() if options.cache else None
+        run = Run(cache=Cache(store), threads=options.threads or len(os.sched_getaffinity(0)))
 
-def refuse_too_large(path: Path, variants: Sequence[Variant], options: RenderOptions) -> None:
-    """Raise LimitError where memory cannot hold the shapes, meshes and textures of a variant."""
-    works = SweepWorks(path, options)
-    for number, variant in enumerate(variants, 1):
-        outcome = Outcome(number, variant)
-        loaded = works.of(outcome).loaded
-        works.drop(outcome)
-        refuse_memory(0, 0, 0, expected_memory(loaded, loaded.scene), str(path))
+        # Compute nothing: object bounds and cameras are known only if the store has them.
+        graph = place_and_cull(first.graph, first.outputs, run, only_cached=True)
+        plans = [plan_view(graph, first.outputs, view, run.cache, look=True) for view in graph.views]
+        self._expected, speeds = expected_memory(first.loaded, first.scene), read_speeds(store)
+        parts = []
+        for plan in plans:
+            time = time_of(by_stage(units_of(plan)), speeds, run.threads)
+            parts.append(plan_data(plan, self._expected) | {"expected_time": time.as_data()})
+
+        # What all variants take.
+        if self._is_of_all:
+            outcomes = [Outcome(number, variant) for number, variant in enumerate(self._variants, 1)]
+            planned = planned_variants(works, outcomes)
+            self._expected = planned.most_memory
+            for plan, part in zip(plans, parts, strict=True):
+                camera = plan.view.name
+                time = time_of(by_stage(planned.units[camera]), speeds, run.threads)
+                part["variants"] = planned.as_data(camera, time)
+        return parts
+
+    def refuse_too_large(self) -> None:
+        """Raise LimitError if memory cannot hold the shapes, meshes and textures of a variant, once `parts`
+        has seen them."""
+        refuse_memory(0, 0, 0, self._expected, str(self._path))

@@ -16,6 +16,7 @@ from illumcli.records import Value
 from illumcli.render_graph.expected_time import ExpectedTime, units
 from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.keys import Keys
+from illumcli.render_graph.limits import expected_memory
 from illumcli.render_graph.schedule import once_and_tile
 
 
@@ -33,6 +34,8 @@ class PlannedVariants(Value):
     """Camera -> upper bound of the rays of all variants, by purpose."""
     units: Mapping[str, Mapping[str, float]]
     """Camera -> units of work of all variants, by buffer."""
+    most_memory: Mapping[str, int]
+    """Expected memory of the variant that needs most [bytes]."""
 
     def as_data(self, camera: str, time: ExpectedTime) -> dict[str, Any]:
         """The variants for JSON, as one camera sees them."""
@@ -58,11 +61,14 @@ def planned_variants(works: SweepWorks, outcomes: Iterable[Outcome]) -> PlannedV
         A variant has a fault.
     """
     labels, files, due = list[str](), dict[Path, None](), 0
+    most_memory: Mapping[str, int] = {}
     times, rays, work_units = (defaultdict[str, Counter[str]](Counter) for _ in range(3))
     seen: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for outcome in outcomes:
-        work = works.of(outcome)
-        works.drop(outcome)
+        work = works.of(outcome.number - 1)
+        works.drop(outcome.number - 1)
+        expected = expected_memory(work.loaded, work.scene)
+        most_memory = max(most_memory, expected, key=lambda each: sum(each.values()))
         labels.append(outcome.label)
         files |= dict.fromkeys(target.path for target in work.targets)
         due += _is_due(work)
@@ -78,7 +84,7 @@ def planned_variants(works: SweepWorks, outcomes: Iterable[Outcome]) -> PlannedV
             times[view.name].update(new)
             rays[view.name].update(expected_rays(work.scene, (view,), set(new)))
             work_units[view.name].update(units(work.scene, view, new, once))
-    return PlannedVariants(tuple(labels), tuple(files), due, times, rays, work_units)
+    return PlannedVariants(tuple(labels), tuple(files), due, times, rays, work_units, most_memory)
 
 
 def _is_due(work: Work) -> bool:

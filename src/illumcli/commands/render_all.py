@@ -67,21 +67,19 @@ def render_scenes(
 
     # Render; buffers that the next frame reads stay in memory.
     def run(number: int, progress: Progress) -> tuple[list[Path], Report]:
-        following = jobs.following(number)
-        paths, done = jobs.worker.run(jobs.work(number), progress, following)
+        work, following = jobs.work(number), jobs.following(number)
+        paths, done = jobs.worker.run(work, progress, following)
         ending = jobs.worker.finish() if following is None else ()
         return paths, replace(done, warnings=(*done.warnings, *ending))
 
     for number, result in runner.results(batch, planned.pieces(jobs.unit, run)):
         with batch.piece(number, jobs.label(number)):
             paths, done = result()
-            work = jobs.work(number)
-            done = replace(done, warnings=(*done.warnings, *jobs.unused(work.job.scene)))
+            job = jobs.unit(number)
+            done = replace(done, warnings=(*done.warnings, *jobs.unused(job.scene)))
             if report is not None:
-                entries.add(number, entry_of(work.job) | done.as_data())
-            frames = work.scene.frames
-            fps = frames.fps if frames else FRAMES_PER_SECOND
-            written(Rendered(work.job.scene, paths, done, work.job.frame, fps))
+                entries.add(number, entry_of(job) | done.as_data())
+            written(Rendered(job.scene, paths, done, job.frame, jobs.fps(job.scene)))
         jobs.drop(number)
     return entries.finish(batch)
 

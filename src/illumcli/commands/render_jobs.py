@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from illumcli.commands.held_works import HeldWorks
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.unit import Worker
 from illumcli.commands.work import Work, unused_keys
-from illumcli.errors import IllumError, InputError
+from illumcli.errors import InputError, unless_faulty
 from illumcli.scene.frames import FRAMES_PER_SECOND, MAX_FRAMES, frame_numbers
 from illumcli.scene.load import read_frames
 
-HELD = 256
-"""The work of so many units is held from planning until rendering; that of others is prepared twice."""
-
 
 class RenderJobs:
-    """The jobs of scenes, in order, and the work of each until it is dropped.
+    """The jobs of scenes, in order, and their works.
 
     Raises
     ------
@@ -28,8 +27,9 @@ class RenderJobs:
 
     def __init__(self, scenes: Sequence[Path], options: RenderOptions) -> None:
         self.worker = Worker()
+        self._fps: dict[Path, float] = {}
         self._jobs = [job for scene in scenes for job in self._of_scene(scene, options)]
-        self._held: dict[int, Work] = {}
+        self._held = HeldWorks(lambda number: self.worker.prepare(self._jobs[number]))
         self._unused: dict[Path, list[str]] = {}
 
     def __len__(self) -> int:
@@ -41,6 +41,7 @@ class RenderJobs:
     def _of_scene(self, scene: Path, options: RenderOptions) -> Iterator[RenderJob]:
         """A scene without frames, or each frame of those of the option, or else of the scene."""
         frames = read_frames(scene, options.overrides, self.worker.shared(scene).text)
+        fps = self._fps[scene] = frames.fps if frames else FRAMES_PER_SECOND
         numbers = frames.numbers if frames else None
         if options.frames is not None:
             numbers = frame_numbers(options.frames)
@@ -49,7 +50,7 @@ class RenderJobs:
         elif len(numbers) > MAX_FRAMES:
             raise InputError(f"{len(numbers)} frames are more than {MAX_FRAMES}; render them in parts")
         for number in numbers or ():
-            overrides = _at_frame(options.overrides, number, frames.fps if frames else FRAMES_PER_SECOND)
+            overrides = _at_frame(options.overrides, number, fps)
             yield RenderJob(scene, replace(options, overrides=overrides), number)
 
     def unit(self, number: int) -> RenderJob:
@@ -69,26 +70,22 @@ class RenderJobs:
         return work
 
     def work(self, number: int) -> Work:
-        """The work of a job."""
-        if number in self._held:
-            return self._held[number]
-        work = self.worker.prepare(self._jobs[number])
-        if len(self._held) < HELD:
-            self._held[number] = work
-        return work
+        """The work of a job, held until it is dropped."""
+        return self._held.of(number)
 
     def drop(self, number: int) -> None:
-        """Drop the work of a job; it is prepared again if it is needed again."""
-        self._held.pop(number, None)
+        """Drop the work of a job that is done."""
+        self._held.drop(number)
+
+    def fps(self, scene: Path) -> float:
+        """Frames per second of a scene."""
+        return self._fps[scene]
 
     def following(self, number: int) -> Work | None:
         """The work of the next frame of the same scene; None if there is none, or it has a fault."""
         if number + 1 == len(self) or self._jobs[number + 1].scene != self._jobs[number].scene:
             return None
-        try:
-            return self.work(number + 1)
-        except IllumError:  # reported when it is its turn
-            return None
+        return unless_faulty(partial(self.work, number + 1))
 
     def unused(self, scene: Path) -> list[str]:
         """A line for each value of a scene that has no effect at any frame, when first asked for."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,8 @@ from illumcli.commands.report import Report
 from illumcli.commands.runner import Runner
 from illumcli.commands.sharding import PlannedUnit, Sharding
 from illumcli.commands.unit import Unit
-from illumcli.commands.work import cost_of
-from illumcli.errors import known
+from illumcli.commands.unit_cost import cost_of
+from illumcli.errors import unless_faulty
 from illumcli.files.names import check_unique
 from illumcli.render_graph.costs import CostModel
 
@@ -48,9 +49,9 @@ def render_shard(
 
     def done(unit: Unit, paths: list[Path], report: Any) -> Report:
         assert isinstance(unit, RenderJob)
-        found: Report = replace(report, warnings=(*report.warnings, *jobs.unused(unit.scene)))
-        written(Rendered(unit.scene, paths, found, unit.frame))
-        return found
+        rendered: Report = replace(report, warnings=(*report.warnings, *jobs.unused(unit.scene)))
+        written(Rendered(unit.scene, paths, rendered, unit.frame))
+        return rendered
 
     batch = Batch("units", len(planned), options.keep_going, once(tell))
     return run_shard(BatchUnits(batch_units, sharding, options.force), batch, jobs.worker, runner, done)
@@ -62,11 +63,8 @@ def _units(jobs: RenderJobs, by_camera: bool) -> tuple[list[RenderJob], list[Pla
     for number, job in enumerate(jobs):
         about = {"entry": number, "of": entry_of(job)}
         label = ", ".join(filter(None, (str(job.scene), jobs.label(number))))
-        try:
-            work = jobs.planned(number)
-        except Exception as error:
-            if known(error) is None:
-                raise
+        work = unless_faulty(partial(jobs.planned, number))
+        if work is None:
             units.append(job)
             planned.append(PlannedUnit(label, (), about=about))
             continue

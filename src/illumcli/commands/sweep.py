@@ -45,7 +45,7 @@ def sweep_scene(
     batch = Batch("variants", len(variants), options.keep_going, lambda text: None)
 
     # Find faults before the first ray.
-    works = SweepWorks(path, named(path, variants, options))
+    works = SweepWorks(path, variants, named(path, variants, options))
     plan = plan_variants(works, variants, batch, pattern_of(variants, files.reference or ""))
     outcomes, warnings = plan.outcomes, plan.warnings
     check_unique([str(image) for outcome in outcomes for image in outcome.paths])

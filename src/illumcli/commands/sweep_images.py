@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,7 @@ from illumcli.commands.runner import Pieces, Runner
 from illumcli.commands.sweep_files import PlannedFiles
 from illumcli.commands.sweep_outcome import Outcome, following_due
 from illumcli.commands.sweep_works import SweepWorks
-from illumcli.errors import IllumError
+from illumcli.errors import unless_faulty
 from illumcli.progress import Progress
 
 
@@ -32,11 +31,9 @@ def render_variants(
 
     def run(index: int, progress: Progress) -> tuple[list[Path], Report]:
         """Render a variant here; buffers that the next one reads stay in memory."""
-        number, upcoming = following[index], None
-        if number is not None:
-            with suppress(IllumError):  # reported when it is its turn
-                upcoming = works.of(done[number])
-        return works.worker.run(works.of(done[index]), progress, upcoming)
+        work, number = works.of(index), following[index]
+        upcoming = None if number is None else unless_faulty(partial(works.of, number))
+        return works.worker.run(work, progress, upcoming)
 
     def rendered(result: Callable[[], tuple[list[Path], Report]], outcome: Outcome) -> Outcome:
         outcome = replace(outcome, report=result()[1].sharing(last))
@@ -45,7 +42,7 @@ def render_variants(
 
     kept = (number for number, each in enumerate(done) if each.planned and not each.planned.is_due)
     pieces = Pieces(
-        unit=lambda index: works.unit(done[index]),
+        unit=works.unit,
         claim_of=lambda index: done[index].claim,
         run=run,
         kept=frozenset(kept),
@@ -53,7 +50,7 @@ def render_variants(
     for index, result in runner.results(batch, pieces):
         done[index] = attempt(done[index], partial(rendered, result), batch, written)
         last = done[index].report or last
-        works.drop(done[index])
+        works.drop(index)
         planned.update(done)
 
     # Collect the warnings.

@@ -9,10 +9,11 @@ from illumcli.commands.batch import Batch
 from illumcli.commands.sweep_images import attempt
 from illumcli.commands.sweep_names import refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome
-from illumcli.commands.sweep_works import HELD, SweepWorks, planned_variant
+from illumcli.commands.sweep_works import SweepWorks, planned_variant
+from illumcli.commands.unit_cost import cost_of
 from illumcli.commands.work import unused_keys
 from illumcli.records import Record
-from illumcli.render_graph.costs import Cost
+from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.scene.variants import Variant
 
 
@@ -32,18 +33,16 @@ def plan_variants(works: SweepWorks, variants: Sequence[Variant], batch: Batch, 
     assert works.options.pattern is not None
     refuse_equal_names(variants, works.options.pattern)
     warnings: list[str] | None = None
-    costs = [Cost(0, 0)] * len(variants)
+    costs, model = [Cost(0, 0)] * len(variants), CostModel()
 
     def planned(outcome: Outcome) -> Outcome:
         nonlocal warnings
-        work = works.of(outcome)
+        work = works.of(outcome.number - 1)
         outcome = replace(outcome, planned=planned_variant(work, reference))
         lines = unused_keys(work)
         warnings = lines if warnings is None else [line for line in warnings if line in lines]
         if works.options.shard is not None:
-            costs[outcome.number - 1] = works.cost(outcome)
-        if outcome.number > HELD:
-            works.drop(outcome)
+            costs[outcome.number - 1] = cost_of(work, model)
         return outcome
 
     outcomes = [Outcome(number, variant) for number, variant in enumerate(variants, 1)]

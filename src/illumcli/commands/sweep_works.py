@@ -3,52 +3,45 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from illumcli.commands.held_works import HeldWorks
 from illumcli.commands.options import RenderJob, RenderOptions
-from illumcli.commands.sweep_outcome import Outcome, PlannedImage, PlannedVariant
+from illumcli.commands.sweep_outcome import PlannedImage, PlannedVariant
 from illumcli.commands.targets import expanded
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, cost_of
+from illumcli.commands.work import Work
 from illumcli.files.names import fields
 from illumcli.film.channels import channel_count
 from illumcli.film.develop import Target
-from illumcli.render_graph.costs import Cost, CostModel
-
-HELD = 256
-"""The work of so many variants is held from planning until rendering, some 80 kB each; later variants are
-prepared twice."""
+from illumcli.scene.variants import Variant
 
 
 class SweepWorks:
-    """The units of a sweep, one per variant; holds the work of each until it is dropped."""
+    """The units of a sweep and their works, one per variant; variants are numbered by their indices."""
 
-    def __init__(self, path: Path, options: RenderOptions) -> None:
+    def __init__(self, path: Path, variants: Sequence[Variant], options: RenderOptions) -> None:
         self.path = path
         self.options = options
-        self.worker, self._costs = Worker(), CostModel()
-        self._held: dict[int, Work] = {}
+        self.worker = Worker()
+        self._variants = variants
+        self._held = HeldWorks(lambda index: self.worker.prepare(self.unit(index)))
 
-    def unit(self, outcome: Outcome) -> RenderJob:
+    def unit(self, index: int) -> RenderJob:
         """The unit of work of a variant."""
-        overrides = tuple(outcome.variant.overrides)
-        options = replace(self.options, overrides=overrides, audit=False, shard=None)
-        return RenderJob(self.path, options, outcome.variant.frame, fields=outcome.variant.fields)
+        variant = self._variants[index]
+        options = replace(self.options, overrides=tuple(variant.overrides), audit=False, shard=None)
+        return RenderJob(self.path, options, variant.frame, fields=variant.fields)
 
-    def of(self, outcome: Outcome) -> Work:
-        """The work of a variant."""
-        if outcome.number not in self._held:
-            self._held[outcome.number] = self.worker.prepare(self.unit(outcome))
-        return self._held[outcome.number]
+    def of(self, index: int) -> Work:
+        """The work of a variant, held until it is dropped."""
+        return self._held.of(index)
 
-    def cost(self, outcome: Outcome) -> Cost:
-        """The cost of a variant, and what it adds to that of the variant before."""
-        return cost_of(self.of(outcome), self._costs)
-
-    def drop(self, outcome: Outcome) -> None:
-        """Drop the work of a variant; it is prepared again if it is needed again."""
-        self._held.pop(outcome.number, None)
+    def drop(self, index: int) -> None:
+        """Drop the work of a variant that is rendered."""
+        self._held.drop(index)
 
 
 def picture_name(target: Target) -> str:

@@ -8,7 +8,6 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from illumcli.accuracy.sampled_blocks import MOST_PIXELS
 from illumcli.cache.fingerprint import FileFingerprints, digest
 from illumcli.commands.options import RenderJob
 from illumcli.commands.targets import image_set
@@ -21,7 +20,6 @@ from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build
-from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory, refuse_rays
 from illumcli.render_graph.schedule import error_is_audited, outputs_of
 from illumcli.scene.load import load
@@ -112,7 +110,11 @@ def work_of(job: RenderJob, loaded: SceneFile, files: FileFingerprints | None = 
 
 def refuse_large_errors(graph: Graph, outputs: Sequence[Layer]) -> None:
     """Raise LimitError if the layer `error` needs the audit of a picture that is too large to be held."""
-    for view in graph.views if error_is_audited(graph.scene, outputs) else ():
+    if not error_is_audited(graph.scene, outputs):
+        return
+    from illumcli.accuracy.sampled_blocks import MOST_PIXELS
+
+    for view in graph.views:
         if view.width * view.height > MOST_PIXELS:
             raise LimitError(
                 f"camera {view.name}: the layer error of reconstructed obscurance needs a whole picture, of "
@@ -139,11 +141,3 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
         refuse_memory(rows, view.width, values, expected, str(work.loaded.path))
         types = work.development.channels(target).values()
         refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
-
-
-def cost_of(work: Work, model: CostModel) -> Cost:
-    """The cost of rendering the pictures of a work, and what they add to those of the work before."""
-    rendered = {target.view.name for target in work.targets}
-    views = [view for view in work.graph.views if view.name in rendered]
-    meshes = expected_memory(work.loaded, work.scene).get("meshes", 0)
-    return model.of(work.graph, work.outputs, views, meshes)

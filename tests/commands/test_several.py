@@ -93,7 +93,7 @@ def test_meshes(illum, folder):
     assert (stopped.returncode, stopped.stdout) == (2, "x-a.npz\n")
     clash = illum("ao-bake", "a.obj", "c.obj", "-o", "one.npz")
     assert clash.returncode == 2
-    assert "one.npz: the name of 2 images" in clash.stderr
+    assert "one.npz: the name of the outputs of a.obj, c.obj; write {name} into the pattern" in clash.stderr
 
 
 def test_variants_up_to_the_first_that_fails(illum, folder):

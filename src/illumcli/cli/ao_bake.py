@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _EPILOG = """\b
 Examples:
   illum ao-bake bunny.ply -o bunny.npz
-  illum ao-bake parts/*.obj -o 'baked/{scene}.npz'
+  illum ao-bake parts -o 'baked/{name}.glb'
   illum ao-bake bunny.obj -o bunny.glb -o bunny.ply --target-error 0.005
   illum ao-bake rock.glb -o rock.ao.glb --falloff exponential --tau 2 --max-distance 0.5r --ground y
   illum ao-bake scenes/teapot.yaml -o baked/teapot.npz --occluders own
@@ -120,7 +120,7 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     metavar="OUT",
     multiple=True,
     required=True,
-    help=".npz, .ply or .glb; may be repeated, may hold {scene}, the name of the input.",
+    help=".npz, .ply or .glb; may be repeated, may hold {name}, the name of the input.",
 )
 @click.option("--samples", type=click.IntRange(1, 65536), help="Rays per vertex, by default 256.")
 @click.option(
@@ -205,7 +205,7 @@ def ao_bake(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Bake obscurance at every vertex of each INPUT, a mesh file or a scene; print the path of every file.
+    """Bake obscurance at the vertices of each INPUT, a mesh, scene or folder; print the path of each file.
 
     1 is open. Values are in the order of the file's vertices, each with its standard error. A vertex with
     several normals has the mean of their values, and all of them if the file format allows. An interrupted
@@ -213,6 +213,7 @@ def ao_bake(
     """
     from illumcli.cli._progress import reporter
     from illumcli.commands.bake import bake_inputs
+    from illumcli.commands.bake_folders import with_folders
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
         found.add(paths, lambda: {"input": str(source), **done.as_data()})
@@ -225,16 +226,20 @@ def ao_bake(
                 say(f"{seconds:8.3f} s  {name}")
 
     found = Results(as_json)
+    with found:
+        named = with_folders(inputs)
+    for line in () if quiet else named.passed_over:
+        say(line)
     if request.shard is not None:
         from illumcli.commands.bake_shard import bake_shard
 
         with found:
-            lines = bake_shard(inputs, request, report, runner(reporter(quiet)), written, found.fail)
+            lines = bake_shard(named.paths, request, report, runner(reporter(quiet)), written, found.fail)
         if not quiet:
             say(lines)
         return
     with found:
-        is_kept = bake_inputs(inputs, request, report, runner(reporter(quiet)), written, found.fail)
+        is_kept = bake_inputs(named.paths, request, report, runner(reporter(quiet)), written, found.fail)
     if is_kept and not quiet:
         say_kept([report])
 
@@ -250,4 +255,4 @@ def _say_report(source: Path, report: BakeReport, verbose: bool) -> None:
     for text in report.warnings:
         say(text)
     if report.written:
-        say(report.summary())
+        say(f"{source}: {report.summary()}")

@@ -23,7 +23,7 @@ class BakeRequest(Value):
 
     settings: BakeSettings
     patterns: tuple[str, ...]
-    """Patterns of the outputs' names; `{scene}` is the input's name without its suffix."""
+    """Patterns of the outputs' names; `{name}` and `{scene}` are the input's name without its suffix."""
     options: BakeOptions = BakeOptions()
     keep_going: bool = True
     shard: Shard | None = None
@@ -31,7 +31,13 @@ class BakeRequest(Value):
 
     def outputs(self, path: Path) -> list[Path]:
         """The files of one input."""
-        return [Path(expand(pattern, {"scene": path.stem})) for pattern in self.patterns]
+        fields = {"name": path.stem, "scene": path.stem}
+        return [Path(expand(pattern, fields)) for pattern in self.patterns]
+
+    def refuse_shared_outputs(self, inputs: Sequence[Path]) -> None:
+        """Raise InputError for all files that several inputs would write; an input may be given twice."""
+        files = [(str(each), str(path)) for path in dict.fromkeys(inputs) for each in self.outputs(path)]
+        check_unique(*zip(*files, strict=True))
 
     def job(self, path: Path) -> BakeJob:
         """The unit of work of one input."""
@@ -57,7 +63,7 @@ def bake_inputs(
     """
     worker, batch = Worker(), Batch("inputs", len(inputs), request.keep_going, tell)
     entries = BatchReport(report, [{"input": str(path)} for path in inputs])
-    check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
+    request.refuse_shared_outputs(inputs)
 
     # Find faults before the first ray. The meshes of a single input are kept for its bake.
     single: BakeWork | None = None

@@ -17,7 +17,6 @@ from illumcli.commands.runner import Runner
 from illumcli.commands.sharding import PlannedUnit, Sharding
 from illumcli.commands.unit import Unit, Worker
 from illumcli.errors import unless_faulty
-from illumcli.files.names import check_unique
 from illumcli.render_graph.costs import Cost
 
 
@@ -39,7 +38,7 @@ def bake_shard(
         At the end if any of them failed; at once if files have equal names.
     """
     assert request.shard is not None
-    check_unique([str(each) for path in dict.fromkeys(inputs) for each in request.outputs(path)])
+    request.refuse_shared_outputs(inputs)
     jobs = [request.job(path) for path in inputs]
     planned = [
         PlannedUnit(str(job.path), job.outputs, _cost(job), {"entry": k, "of": {"input": str(job.path)}})

@@ -121,13 +121,18 @@ def fields(pattern: str) -> set[str]:
     return {match["name"] for match in _FIELD.finditer(pattern) if match["name"] is not None}
 
 
-def check_unique(names: Sequence[str]) -> None:
+def check_unique(names: Sequence[str], inputs: Sequence[str] | None = None) -> None:
     """Raise InputError if two of `names` are the same file, possibly on file systems that ignore case.
+
+    Parameters
+    ----------
+    inputs : sequence of str, optional
+        What each file is computed from, to name in messages; by default they number images from 1.
 
     Raises
     ------
     InputError
-        Every such name, and the numbers of its images from 1.
+        Every such name, with its inputs or the numbers of its images.
     """
     # Images by name, ignoring case.
     images = defaultdict(list)
@@ -139,11 +144,15 @@ def check_unique(names: Sequence[str]) -> None:
     problems = []
     for same in images.values():
         if len(same) > 1:
-            listed = ", ".join(map(str, same[:5])) + (", ..." if len(same) > 5 else "")
+            each_of = [str(number) if inputs is None else inputs[number - 1] for number in same]
+            listed = ", ".join(each_of[:5]) + (", ..." if len(same) > 5 else "")
+            what = f"{len(same)} images ({listed})" if inputs is None else f"the outputs of {listed}"
             advice = "add a field to the pattern in which they differ"
+            if inputs is not None:
+                advice = "write {name} into the pattern, or give the inputs names that differ"
             if len({normal[number - 1] for number in same}) == len(same):
                 advice = "they differ only in case, which some file systems ignore; rename one of them"
-            problems.append(f"{names[same[0] - 1]}: the name of {len(same)} images ({listed}); {advice}")
+            problems.append(f"{names[same[0] - 1]}: the name of {what}; {advice}")
     if problems:
         raise InputError(problems)
 

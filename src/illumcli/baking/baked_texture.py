@@ -1,4 +1,4 @@
-"""Baked textures: obscurance over the uv atlas of one material of one object."""
+"""Baked textures: channels over the uv atlas of one material of one object."""
 
 from __future__ import annotations
 
@@ -19,18 +19,16 @@ class BakedTexture(Record):
     u = (j + 0.5) / W, and at v = 1 - (i + 0.5) / H in a `Mesh`, whose v points up; in glTF, whose v points
     down, at v = (i + 0.5) / H. uv outside [0, 1] repeat the texture.
 
-    Texels that no polygon covers have the values of those near them, so that neither bilinear lookups nor
-    mipmaps mix in a background.
+    Texels that no lookup reads have the values of those near them, so that mipmaps mix in no background.
     """
 
     object: int  # index of the object
     material: int  # index in `material_names` of the object's mesh; -1 for polygons without a material
     name: str  # of the object, and of the material if the object has several: unique among a bake's textures
-    obscurance: NDArray[np.float32]  # (H, W) w in [0, 1]: 1 where open
-    standard_error: NDArray[np.float32]  # (H, W)
-    is_covered: NDArray[np.bool_]  # (H, W) True where a polygon covers a part of the texel
-    channels: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-    """Further values by name, (H, W) or (H, W, 3)."""
+    channels: Mapping[str, NDArray[np.float32]]
+    """(H, W) or, of directions, (H, W, 3), by the names that baked vertices have: `obscurance` (1 where
+    open), `standard_error` and so on."""
+    is_covered: NDArray[np.bool_]  # (H, W) True where a lookup on the surface reads the texel
 
 
 class TextureUvs(Record):

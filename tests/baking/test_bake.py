@@ -28,6 +28,7 @@ from illumcli.scene.load import load
 from illumcli.visibility.baked import read_npz
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Method
+from illumcli.visibility.open_hemisphere import ClusterTree
 from planned import planned
 
 CUBE = """
@@ -645,3 +646,21 @@ def test_a_mesh_that_is_turned_inside_out_is_told(text_mesh, tmp_path):
     )
     _, report = bake(text_mesh(inside_out), tmp_path / "out.npz")
     assert "the polygons seem to face inwards" in report.warnings[0]
+
+
+def test_an_object_without_open_triangles_is_not_searched_for_them(text_mesh, tmp_path, monkeypatch):
+    y, x = (each.ravel() for each in np.mgrid[-1:1:20j, -1:1:20j])
+    saddle = "".join(f"v {a} {b} {a * b}\n" for a, b in zip(x, y, strict=True))
+    saddle += "".join(f"f {k} {k + 1} {k + 21} {k + 20}\n" for k in range(1, 380) if k % 20)
+    text_mesh(saddle, "saddle.obj")
+    scene = tmp_path / "scene.yaml"
+    ball = "{mesh: {shape: sphere}, transform: {translate: [9, 0, 0]}}"
+    scene.write_text(f"version: 1\nobjects: [{{mesh: saddle.obj}}, {ball}]\n")
+    tested = []
+    whole = ClusterTree.is_open
+    monkeypatch.setattr(
+        ClusterTree, "is_open", lambda self, count, planes: tested.append(count) or whole(self, count, planes)
+    )
+    report = bake(scene, tmp_path / "out.npz", samples=8, occluders=("own",))[1]
+    assert report.open > 0
+    assert sum(tested) == report.triangles - 2 * 19 * 19

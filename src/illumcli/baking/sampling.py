@@ -23,7 +23,7 @@ from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.records import Record
 from illumcli.visibility.obscurance import Method, estimates
 from illumcli.visibility.obscurance_error import Errors, Estimates
-from illumcli.visibility.open_hemisphere import triangle_planes
+from illumcli.visibility.open_hemisphere import trial_planes, triangle_planes
 
 UNIT_RAYS = 1 << 18
 """Rays of a unit of work: an interrupt loses no more, and there are enough units to share."""
@@ -89,32 +89,33 @@ class BakeSampler(Record):
 
     def open_points(self) -> NDArray[np.bool_]:
         """(M,) True for points with no geometry above the triangles that their rays leave."""
-        # Units of neighbouring triangles that have an area.
         geometry = self.points.geometry
         a, b, c = triangle_corners(geometry.vertices, geometry.triangles)
         area = cross(b - a, c - a)
-        order = compact(a + b + c)
-        order = order[dot(area, area)[order] > 0]
-        objects = geometry.objects[order]
-        by_object = np.argsort(objects, kind="stable")
-        begins = np.flatnonzero(np.diff(objects[by_object], prepend=-1))
-        units = [
-            WorkUnit(
-                group[first : first + UNIT_TRIANGLES],
-                UNIT_RAYS // UNIT_TRIANGLES,
-                int(geometry.objects[group[0]]),
-            )
-            for group in (np.split(order[by_object], begins[1:]) if len(order) else ())
-            for first in range(0, len(group), UNIT_TRIANGLES)
-        ]
+        sound = np.flatnonzero(dot(area, area) > 0)
+        by_object = sound[np.argsort(geometry.objects[sound], kind="stable")]
+        begins = np.flatnonzero(np.diff(geometry.objects[by_object], prepend=-1))
+        objects = np.split(by_object, begins[1:]) if len(sound) else []
+
+        def planes_of(triangle: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
+            of = triangle.astype(np.int32)
+            return triangle_planes(geometry, geometry.objects.take(of), of, np.zeros(len(of), bool))
+
+        # Units of neighbouring triangles of the objects where some seem to be open.
+        units = []
+        for triangles in objects:
+            owner = int(geometry.objects[triangles[0]])
+            if not self.occluders[owner].clusters.is_promising(*planes_of(trial_planes(triangles))):
+                continue
+            ordered = triangles[compact((a + b + c)[triangles])]
+            units += [
+                WorkUnit(ordered[first : first + UNIT_TRIANGLES], UNIT_RAYS // UNIT_TRIANGLES, owner)
+                for first in range(0, len(ordered), UNIT_TRIANGLES)
+            ]
 
         def compute(unit: WorkUnit, stop: threading.Event) -> NDArray[np.bool_]:
-            def planes(index: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
-                triangle = unit.points[index].astype(np.int32)
-                own = geometry.objects.take(triangle)
-                return triangle_planes(geometry, own, triangle, np.zeros(len(triangle), bool))
-
-            return self.occluders[unit.object].clusters.is_open(len(unit.points), planes)
+            clusters = self.occluders[unit.object].clusters
+            return clusters.is_open(len(unit.points), lambda index: planes_of(unit.points[index]))
 
         open_triangles = np.zeros(len(geometry.triangles), bool)
         for index, is_open in self._run("horizon", units, compute):

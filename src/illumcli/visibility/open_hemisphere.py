@@ -150,11 +150,11 @@ class ClusterTree:
             out[tested] &= self._all_below(o[tested], n[tested])
         return out
 
-    def is_promising(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> bool:
+    def is_promising(self, o: Vectors, n: Vectors) -> bool:
         """True if enough of these planes pass the cheap tests for `open_planes` to be worth its time."""
         return bool(self._candidates(o, n).sum() >= MIN_CANDIDATES * len(o))
 
-    def _candidates(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _candidates(self, o: Vectors, n: Vectors) -> NDArray[np.bool_]:
         """(M,) True for planes that pass the cheap tests, in groups where at least half of the planes do.
 
         In other groups most planes have geometry above them, and the tree would decide few of the rest.
@@ -164,7 +164,7 @@ class ClusterTree:
         groups[groups.sum(axis=1) * 2 < GROUP] = False
         return out
 
-    def _passes_cheap_tests(self, o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _passes_cheap_tests(self, o: Vectors, n: Vectors) -> NDArray[np.bool_]:
         """(M,) False where an extreme vertex, or a point of the same group, is clearly above the plane."""
         height = np.einsum("ij,ij->i", o, n)
         out = (n.astype(F) @ self._extremes.T).max(axis=1) <= height + CLEARANCE
@@ -319,12 +319,20 @@ def triangle_planes(
     return np.ascontiguousarray(o), np.ascontiguousarray(n)
 
 
+def trial_planes(planes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """`TRIAL_GROUPS` runs of `GROUP` of these numbers, spread evenly; all of them where they are fewer, the
+    last one repeated to fill its run."""
+    groups = -(-len(planes) // GROUP)
+    chosen = np.arange(0, groups, max(1, groups // TRIAL_GROUPS))
+    return planes[np.minimum(_members(chosen), len(planes) - 1)]
+
+
 def _members(groups: NDArray[np.int64]) -> NDArray[np.int64]:
     """(64 K,) numbers of the planes in K groups."""
     return (groups[:, None] * GROUP + np.arange(GROUP)).ravel()
 
 
-def is_above_group(o: NDArray[np.float64], n: NDArray[np.float64]) -> NDArray[np.bool_]:
+def is_above_group(o: Vectors, n: Vectors) -> NDArray[np.bool_]:
     """(M,) False where one of the points is clearly above the plane of another.
 
     The points lie on occluders, offset by a hundredth of `CLEARANCE`, so this decides most concave regions.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import ssl
 from pathlib import Path
 
@@ -61,10 +62,7 @@ def shake_hands(address: str, seconds: float) -> None:
             raise InputError(f"{name}: {fact}; give all the same authority (CA_FILE)") from error
         raise InputError(f"{name}: {_wrong_peer(has_tls)}") from error
     except OSError as error:
-        if asyncio.TimeoutError in (type(error), type(error.__cause__)):
-            fact = f"no answer within {seconds:.0f} s"
-        else:
-            fact = f"no scheduler: {_reason(error)}"
+        fact = _refusal(address) or f"no answer within {seconds:.0f} s"
         way = "check the address, the firewall, and that a scheduler runs"
         raise IllumError(f"{name}: {fact}; {way}") from error
     except TypeError as error:  # of Dask, which finds no certificates
@@ -81,8 +79,18 @@ def _wrong_peer(has_tls: bool) -> str:
     return "what answers is no scheduler without TLS; write tls:// for one with TLS, and check the port"
 
 
-def _reason(error: OSError) -> str:
-    cause: BaseException = error
-    while cause.__cause__ is not None:
-        cause = cause.__cause__
-    return str(getattr(cause, "strerror", None) or cause)
+def _refusal(address: str) -> str:
+    """Why nothing listens there; empty if something does, or if no answer comes.
+
+    Dask tries again and again, and the last attempt may end by its own time limit instead of the cause.
+    """
+    from distributed.comm.addressing import parse_address, parse_host_port
+
+    host, port = parse_host_port(parse_address(address)[1])
+    try:
+        socket.create_connection((host, port), timeout=1).close()
+    except TimeoutError:
+        return ""
+    except OSError as error:
+        return f"no scheduler: {error.strerror or error}"
+    return ""

@@ -64,3 +64,21 @@ class Results:
         if error is not None and not any(isinstance(each.get("error"), str) for each in self._entries):
             self._entries.append({"error": str(error)})
         click.echo(json.dumps(self._entries, indent=1))
+
+
+def run_batch(results: Results, do: Callable[[], bool | str], report: Path | None, quiet: bool) -> None:
+    """Do several pieces of work, and print their results and what is known at the end.
+
+    Parameters
+    ----------
+    do : callable
+        Returns lines about a shard; otherwise whether the report is kept.
+    """
+    with results:
+        ending = do()
+    if quiet:
+        return
+    if isinstance(ending, str):
+        say(ending)
+    elif ending:
+        say_kept([report])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +29,7 @@ from illumcli.cli._options import (
     threads_option,
     verbose_option,
 )
-from illumcli.cli._printing import Results, say, say_kept
+from illumcli.cli._printing import Results, run_batch, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
@@ -212,11 +213,10 @@ def ao_bake(
     bake resumes when the same command is given again.
     """
     from illumcli.cli._progress import reporter
-    from illumcli.commands.bake import bake_inputs
     from illumcli.commands.bake_folders import with_folders
 
     def written(source: Path, paths: list[Path], done: BakeReport) -> None:
-        found.add(paths, lambda: {"input": str(source), **done.as_data()})
+        results.add(paths, lambda: {"input": str(source), **done.as_data()})
         if not quiet:
             _say_report(source, done, verbose)
         if verbose:
@@ -225,23 +225,21 @@ def ao_bake(
             for name, seconds in done.seconds.items():
                 say(f"{seconds:8.3f} s  {name}")
 
-    found = Results(as_json)
-    with found:
-        named = with_folders(inputs)
-    for line in () if quiet else named.passed_over:
-        say(line)
-    if request.shard is not None:
-        from illumcli.commands.bake_shard import bake_shard
+    do: Callable[..., bool | str]
+    if request.shard is None:
+        from illumcli.commands.bake import bake_inputs as do
+    else:
+        from illumcli.commands.bake_shard import bake_shard as do
 
-        with found:
-            lines = bake_shard(named.paths, request, report, runner(reporter(quiet)), written, found.fail)
-        if not quiet:
-            say(lines)
-        return
-    with found:
-        is_kept = bake_inputs(named.paths, request, report, runner(reporter(quiet)), written, found.fail)
-    if is_kept and not quiet:
-        say_kept([report])
+    results = Results(as_json)
+
+    def bake_all() -> bool | str:
+        named = with_folders(inputs)
+        for line in () if quiet else named.passed_over:
+            say(line)
+        return do(named.paths, request, report, runner(reporter(quiet)), written, results.fail)
+
+    run_batch(results, bake_all, report, quiet)
 
 
 def _say_report(source: Path, report: BakeReport, verbose: bool) -> None:

@@ -32,7 +32,7 @@ from illumcli.cli._options import (
     threads_option,
     verbose_option,
 )
-from illumcli.cli._printing import Results, say, say_kept
+from illumcli.cli._printing import Results, run_batch, say, say_kept
 
 if TYPE_CHECKING:
     from illumcli.commands.options import RenderOptions
@@ -90,7 +90,6 @@ def render(
     from illumcli.cli._progress import reporter
 
     said: set[str] = set()
-
     films: dict[Path, list[Rendered]] = {}
 
     def say_once(line: str) -> None:
@@ -104,27 +103,21 @@ def render(
             error = done.report.error
             reached = f"for an error of {error['target']:g}; reached {error['reached']:.3g}"
             say(f"{done.scene}: {' '.join(done.report.chosen)}, {reached}")
-        found.add(done.paths, lambda: _entry(done))
+        results.add(done.paths, lambda: _entry(done))
         _say_report(done, quiet, verbose, say_once)
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)
 
-    found = Results(as_json)
-    if options.shard is not None:
-        from illumcli.commands.render_shard import render_shard
+    do: Callable[..., bool | str]
+    if options.shard is None:
+        from illumcli.commands.render_all import render_scenes as do
+    else:
+        from illumcli.commands.render_shard import render_shard as do
 
-        with found:
-            lines = render_shard(scenes, options, report, runner(reporter(quiet)), written, found.fail)
-        if not quiet:
-            say(lines)
-        return
-    from illumcli.commands.render_all import render_scenes
-
-    with found:
-        is_kept = render_scenes(scenes, options, report, runner(reporter(quiet)), written, found.fail)
-    if is_kept and not quiet:
-        say_kept([report])
-    if not quiet and sys.stderr.isatty():
+    results = Results(as_json)
+    given = scenes, options, report, runner(reporter(quiet)), written, results.fail
+    run_batch(results, lambda: do(*given), report, quiet)
+    if options.shard is None and not quiet and sys.stderr.isatty():
         _say_films(films)
 
 

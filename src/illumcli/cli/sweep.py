@@ -132,11 +132,11 @@ def sweep(
         # a fault of the scene is the same in all variants: print it once
         if outcome.error is not None and (fault := without_frame(str(outcome.error))) not in printed:
             printed.add(fault)
-            found.fail(f"{outcome.label}: {outcome.error}", _about(outcome))
+            results.fail(f"{outcome.label}: {outcome.error}", _about(outcome))
         report = outcome.report
         if report is None:
             return
-        found.add(outcome.paths, lambda: _about(outcome) | report.as_data())
+        results.add(outcome.paths, lambda: _about(outcome) | report.as_data())
         if quiet:
             return
         say_kept(report.kept)
@@ -145,8 +145,8 @@ def sweep(
                 say(f"{scene}: {line}")
             printed.add(line)
 
-    found = Results(as_json)
-    with found:
+    results = Results(as_json)
+    with results:
         result = sweep_scene(scene, variants, options, files, runner(reporter(quiet)), written)
     for warning in result.warnings:
         say(warning)

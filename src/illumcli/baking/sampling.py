@@ -26,7 +26,7 @@ from illumcli.visibility.obscurance_error import Errors, Estimates
 from illumcli.visibility.open_hemisphere import trial_planes, triangle_planes
 
 UNIT_RAYS = 1 << 18
-"""Rays of a unit of work: an interrupt loses no more, and there are enough units to share."""
+"""Rays of a unit of work: an interrupt loses at most this, and there are enough units to share."""
 UNIT_TRIANGLES = 1 << 14
 """Triangles of a unit of work that tests which of them are open."""
 PAIR_SHARE, MIN_PAIRS = 100, 512

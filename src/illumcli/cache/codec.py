@@ -242,7 +242,7 @@ def decode(data: Any, arrays: tuple[NDArray[Any], ...]) -> Any:
 
 
 def _fits(part: object, declared: str) -> bool:
-    """True if a decoded part agrees with its declaration, as far as arrays and None are concerned."""
+    """True if a decoded part agrees with its declaration in arrays and None."""
     if part is None:
         return "None" in declared
     if isinstance(part, np.ndarray):

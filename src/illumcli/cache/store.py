@@ -50,7 +50,7 @@ SMALL, COUNTED = 1024, "00"
 `COUNTED`, as one of 256 does: on average the limit is exceeded by a quarter at most."""
 LONGEST = 1 << 24  # [bytes] of a description
 LARGE = 1 << 26
-"""An entry of so many bytes is read only if it takes no more than `MEMORY_SHARE` of the free memory."""
+"""An entry of so many bytes is read only if it takes at most `MEMORY_SHARE` of the free memory."""
 MEMORY_SHARE = 0.5
 
 _HEADER = struct.Struct("<8sIIQ32s8x")  # magic, format, length of the description, of the arrays, checksum
@@ -188,7 +188,7 @@ class Store:
         """Note that an entry of so many bytes was added."""
         self._fresh += size
         self._counts |= self._fresh * SMALL > self.limit or key.startswith(COUNTED)
-        # A long run exceeds the limit by no more than the largest entry.
+        # A long run exceeds the limit by at most the largest entry.
         if self._fresh > self.largest:
             self._prune()
 

@@ -120,7 +120,7 @@ class Connection:
             No worker came.
         """
         began, is_told = time.monotonic(), False
-        while not (found := list(self.client.scheduler_info(n_workers=-1)["workers"])):
+        while not (workers := list(self.client.scheduler_info(n_workers=-1)["workers"])):
             waited = time.monotonic() - began
             if waited > PATIENCE:
                 raise IllumError("--cluster: the scheduler has no workers; start some")
@@ -128,7 +128,7 @@ class Connection:
                 self._tell(f"the scheduler has no workers; waiting up to {PATIENCE:.0f} s for one")
                 is_told = True
             time.sleep(0.2)
-        return found
+        return workers
 
     def close(self, plugin: str) -> None:
         """End the connection, and the workers that were started here; others give up this plugin."""

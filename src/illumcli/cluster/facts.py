@@ -43,10 +43,10 @@ def refuse_differences(own: Mapping[str, str], others: Mapping[str, Mapping[str,
         Address of a worker -> its facts.
     """
     problems = [
-        f"worker {address}: has {name} {found.get(name, 'of no known version')}, this process {value}"
-        for address, found in others.items()
+        f"worker {address}: has {name} {its.get(name, 'of no known version')}, this process {value}"
+        for address, its in others.items()
         for name, value in own.items()
-        if found.get(name) != value
+        if its.get(name) != value
     ]
     if problems:
         raise InputError([*problems, ADVICE])

@@ -72,7 +72,7 @@ class BlockResult(Value):
     lacks_files: bool = False
     """True if nothing was done: the worker does not see the client's files."""
     lacking: tuple[Path, ...] = ()
-    """Files that it needs first, as far as it knows them."""
+    """Files that it is known to need first."""
     refusal: str = ""
     """How the worker differs from the client, if it may not."""
     fault: str = ""

@@ -21,7 +21,7 @@ Records: TypeAlias = Mapping[Path, ShardRecord]
 
 
 class MergedShards(Record):
-    """The whole command, with the results of all shards that were found."""
+    """The whole command, with the results of all its shards that have a record."""
 
     command: str
     settings: Mapping[str, Any]

@@ -25,11 +25,11 @@ def shard_of_each(costs: Sequence[Cost], count: int) -> list[int]:
 
 def loads(costs: Sequence[Cost], shards: Sequence[int], count: int) -> list[int]:
     """The cost of each shard: of a unit whose predecessor is in the same shard, only what it adds to it."""
-    found = [0] * count
+    costs_of_shards = [0] * count
     for number, (cost, shard) in enumerate(zip(costs, shards, strict=True)):
         follows = number > 0 and shards[number - 1] == shard
-        found[shard - 1] += cost.after if follows else cost.alone
-    return found
+        costs_of_shards[shard - 1] += cost.after if follows else cost.alone
+    return costs_of_shards
 
 
 def _greedy(costs: Sequence[Cost], count: int) -> list[int]:
@@ -42,7 +42,7 @@ def _greedy(costs: Sequence[Cost], count: int) -> list[int]:
 
 
 def _runs(costs: Sequence[Cost], count: int) -> list[int]:
-    # Bisect the least limit under which runs of units, each as long as it allows, are no more than `count`.
+    # Bisect the least limit under which runs of units, each as long as it allows, are at most `count`.
     low = max((cost.alone for cost in costs), default=0)
     high = sum(cost.alone for cost in costs)
     while low < high:

@@ -48,9 +48,9 @@ class Measurer:
         reference = self.references.get(outcome.number)
         if reference is not None:
             against = self._pixels(reference)
-            found = difference(against, pixels, 1.0 if encoded else None)
-            measures |= {name: getattr(found, name) for name in MEASURES}
-            if FLIP in self.names and pixels.shape[2] == 3 and not found.not_finite:
+            measured = difference(against, pixels, 1.0 if encoded else None)
+            measures |= {name: getattr(measured, name) for name in MEASURES}
+            if FLIP in self.names and pixels.shape[2] == 3 and not measured.not_finite:
                 from illumcli.images.flip import flip
 
                 measures[FLIP] = flip(against, pixels, encoded)[0]

@@ -42,7 +42,7 @@ def fields_of_images(path: Path, variants: Sequence[Variant], options: RenderOpt
 
     One variant without a fault tells, unless cameras or layers vary.
     """
-    text, found = read_text(path), set[str]()
+    text, differing = read_text(path), set[str]()
     varies = any(each.partition(".")[0] in ("cameras", "outputs") for each in variants[0].values)
     for variant in variants:
         try:
@@ -50,10 +50,10 @@ def fields_of_images(path: Path, variants: Sequence[Variant], options: RenderOpt
             counts = {"camera": len(scene.named_cameras()), "layer": len(outputs_of(scene, options.only))}
         except InputError:  # reported when it is planned
             continue
-        found |= {name for name, count in counts.items() if count > 1}
+        differing |= {name for name, count in counts.items() if count > 1}
         if not varies:
             break
-    return tuple(sorted(found))
+    return tuple(sorted(differing))
 
 
 def default_pattern(variants: Sequence[Variant], also: Sequence[str] = ()) -> str:

@@ -90,7 +90,7 @@ def merge_sweep(whole: MergedShards, force: bool) -> tuple[list[Path], list[Path
 
 
 def _outcome(whole: MergedShards, number: int) -> Outcome:
-    """The outcome of a variant, as far as it is known."""
+    """The outcome of a variant, with what the records say of it."""
     about, report = whole.units[number].about, whole.reports.get(number)
     variant = Variant(**{**about["variant"], "parts": tuple(about["variant"]["parts"])})
     planned = None

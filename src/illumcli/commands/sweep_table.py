@@ -56,7 +56,7 @@ class SweepTable:
         self._written = time.monotonic()
 
     def update(self, outcomes: Sequence[Outcome], now: bool = False) -> None:
-        """Write the table as far as it is known, `now` or if it was not written for a while."""
+        """Write the rows that are known, `now` or if it was not written for a while."""
         if now or time.monotonic() - self._written > INTERVAL:
             self.write(outcomes)
 

@@ -32,14 +32,14 @@ def turns(batch: Batch, claim_of: Callable[[int], Path | None], progress: Progre
     while left:
         # The next piece that nobody else is known to do.
         in_order = chain(range(at, batch.count), range(at))
-        found = next((number for number in in_order if number in left and number not in refused), None)
-        if found is None:
+        upcoming = next((number for number in in_order if number in left and number not in refused), None)
+        if upcoming is None:
             progress("waiting for another process", batch.count - len(left), batch.count)
             time.sleep(WAIT)
             refused.clear()
             at = 0
             continue
-        at = found
+        at = upcoming
 
         # Do it, unless another process is doing it.
         if not batch.is_due(at):

@@ -91,12 +91,12 @@ def write_view(
         ]
 
         # Render and write band by band.
-        made: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
+        developed: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
         if audit is not None and is_held:
-            held = list(made)
+            held = list(developed)
             error, draws = measured(audit, shared, run)
-            made = bands_with_errors(held, audit.pixel_errors(draws), develop)
-        for band in made:
+            developed = bands_with_errors(held, audit.pixel_errors(draws), develop)
+        for band in developed:
             start = time.perf_counter()
             if "error" in band.layers:
                 sums.add(band.layers["error"])

@@ -105,12 +105,12 @@ class Claim:
     ----------
     handle : int
         The descriptor of the locked claim; -1 if none could be made.
-    made : sequence of Path
-        Folders that were made for it, the deepest first; they are removed if nothing else is in them.
+    folders : sequence of Path
+        Folders that were created for it, the deepest first; they are removed if nothing else is in them.
     """
 
-    def __init__(self, path: Path, handle: int, made: Sequence[Path]) -> None:
-        self._path, self._handle, self._made = path, handle, made
+    def __init__(self, path: Path, handle: int, folders: Sequence[Path]) -> None:
+        self._path, self._handle, self._folders = path, handle, folders
         self._done = threading.Event()
         self._toucher = threading.Thread(target=self._touch, name="claim", daemon=True)
         if handle >= 0:
@@ -139,7 +139,7 @@ class Claim:
             untrack(self._path)
             os.close(self._handle)
         with suppress(OSError):  # outputs are in them
-            for folder in self._made:
+            for folder in self._folders:
                 folder.rmdir()
 
 

@@ -30,7 +30,7 @@ The Jacobian of the bilinear map is 0 at a corner of 180 degrees, and coordinate
 MAX_CORNERS = 128
 """Larger polygons are interpolated by triangles: time and memory of a hit are proportional to the corners."""
 EQUAL_NORMALS = 1e-6
-"""Unit normals whose components differ by no more are equal: the difference is rounding."""
+"""Unit normals whose components differ by at most this are equal: the difference is rounding."""
 FLAT_NORMAL = 1e-3
 """A file's normal within this angle of its polygon's is the polygon's, written with few digits [rad]."""
 SAME_AREA = 1e-6

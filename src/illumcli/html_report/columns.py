@@ -49,8 +49,8 @@ def parameters_of(contents: Contents) -> list[Parameter]:
     """The parameters of a report, in the order of the entries' values."""
     entries = contents.entries
     paths = dict.fromkeys(path for entry in entries for path in entry.values)
-    found = [(path, _distinct(entries, path)) for path in paths]
-    varying = [(path, values) for path, values in found if len(values) > 1]
+    values_of = [(path, _distinct(entries, path)) for path in paths]
+    varying = [(path, values) for path, values in values_of if len(values) > 1]
     labels = short_labels([path for path, _ in varying])
     return [
         _parameter(path, label, values, entries)

@@ -1,4 +1,4 @@
-"""Embree's tree over triangles and instances, made through its documented interface.
+"""Embree's tree over triangles and instances, built through its documented interface.
 
 References
 ----------
@@ -30,7 +30,7 @@ from illumcli.rays.ray_loop import InstancedMeshes
 
 @cache
 def device() -> Handle:
-    """The device of all trees of this process, which can make about a thousand devices and no more."""
+    """The device of all trees of this process, which can make about a thousand devices."""
     library = loaded_library()
     device: Handle | None = library.rtcNewDevice(None)
     if not device:

@@ -68,14 +68,14 @@ class PythonPacketLoop:
         self, query: str, origins: Vectors, directions: Vectors, limits: Floats | np.float32
     ) -> NDArray[np.float32]:
         """(P, ROWS, width) the packets of some rays, after the query."""
-        # Lanes beyond the last ray are not valid.
+        # Places beyond the last ray are not valid.
         count, width = len(directions), self.width
         packets = _aligned((-(-count // width), ROWS, width))
-        lanes = packets.transpose(1, 0, 2).reshape(ROWS, -1)
+        by_ray = packets.transpose(1, 0, 2).reshape(ROWS, -1)
         for k in range(3):
-            lanes[ORIGIN + k, :count], lanes[DIRECTION + k, :count] = origins[:, k], directions[:, k]
-        lanes[LIMIT, :count] = limits
-        packets[:] = lanes.reshape(ROWS, -1, width).transpose(1, 0, 2)
+            by_ray[ORIGIN + k, :count], by_ray[DIRECTION + k, :count] = origins[:, k], directions[:, k]
+        by_ray[LIMIT, :count] = limits
+        packets[:] = by_ray.reshape(ROWS, -1, width).transpose(1, 0, 2)
         numbers = packets.view(np.int32)
         numbers[:, MASK] = ALL_BITS
         numbers[:, ID] = np.arange(width)

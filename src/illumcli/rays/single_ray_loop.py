@@ -78,7 +78,7 @@ class SingleRayLoop:
 
 
 def _new_scene() -> Any:
-    """An EmbreeScene of the one device of this process, which can make about a thousand and no more."""
+    """An EmbreeScene of the one device of this process, which can make about a thousand."""
     from embreex.rtcore_scene import EmbreeScene
 
     return EmbreeScene(_device(), robust=True)

@@ -82,7 +82,7 @@ def paths_in(tree: Node) -> Iterator[tuple[source.Path, Node]]:
 
 
 def is_path(path: source.Path, text: str) -> bool:
-    """True if a text at `path` of a scene is the path of a file; the keys of a curve stand for its place."""
+    """True if a text at `path` of a scene is the path of a file; the keys of a curve count as its place."""
     if len(path) > 2 and path[-2] == "keys":
         path = path[:-2]
     key = path[-1] if path else None

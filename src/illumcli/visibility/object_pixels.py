@@ -122,9 +122,9 @@ class FittedPixels(Record):
             more = (following > pair[search]) & (own[following] == number[pixel[search]])
             search, following = search[more], following[more]
             pair[search] = following
-            found = self.object[following] == objects[search]
-            w[search[found]] = self.w[following[found]]
-            search = search[~found]
+            is_same = self.object[following] == objects[search]
+            w[search[is_same]] = self.w[following[is_same]]
+            search = search[~is_same]
         return w
 
 

@@ -71,7 +71,7 @@ def numeric(value: Any) -> Any:
 
 
 def same_shape(values: Sequence[Any]) -> list[Any]:
-    """Values of equal lengths; one number stands for as many as the others have.
+    """Values of equal lengths; one number is repeated to the length of the others.
 
     Raises
     ------

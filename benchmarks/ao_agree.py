@@ -132,8 +132,7 @@ def agreement(path: Path, folder: Path) -> list[float]:
     corners = geometry.placed[0].mesh.corners
     w = values.of_corners("mesh", corners, len(geometry.vertices))
     error = values.standard_error[corners]
-    if values.corner_standard_error is not None:
-        error = values.corner_standard_error
+    error = values.corner_channels.get("standard_error", error)
 
     # at corners that cast rays
     random = np.random.default_rng(0)

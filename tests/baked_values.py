@@ -12,5 +12,7 @@ ABOUT = {"content": "abc", "vertices": {"a": 4, "b": 4}, "meshes": {"a": "hash a
 
 def baked(count=4, bent=False, **about):
     w = np.linspace(0, 1, count, dtype=np.float32)
-    normals = np.tile(np.float32([0, 0, 1]), (count, 1)) if bent else None
-    return Baked(w, w / 100, normals, about)
+    channels = {"obscurance": w, "standard_error": w / 100}
+    if bent:
+        channels["bent_normal"] = np.tile(np.float32([0, 0, 1]), (count, 1))
+    return Baked(channels, about)

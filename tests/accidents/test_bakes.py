@@ -103,9 +103,9 @@ def test_an_equal_bake_that_runs_already_is_neither_disturbed_nor_waited_for(mes
     with pytest.raises(KeyboardInterrupt):
         bake(mesh, out)
     monkeypatch.setattr(BakeSampler, "_run", whole)
-    assert said[0].resumed == 0
+    assert said[0].sampled["obscurance"].resumed == 0
     assert any("in use" in line for line in said[0].warnings)
-    assert bake(mesh, out).resumed == 10 * RAYS
+    assert bake(mesh, out).sampled["obscurance"].resumed == 10 * RAYS
     assert out.read_bytes() == twin.read_bytes()
     assert hidden(tmp_path) == []
 
@@ -119,7 +119,7 @@ def test_a_bake_taken_up_again_gives_the_same_file(mesh, tmp_path, monkeypatch, 
         with pytest.raises(KeyboardInterrupt):
             bake(mesh, out)
         monkeypatch.setattr(BakeSampler, "_run", whole)
-    assert bake(mesh, out).resumed == 24 * RAYS
+    assert bake(mesh, out).sampled["obscurance"].resumed == 24 * RAYS
     assert out.read_bytes() == (tmp_path / f"whole.{kind}").read_bytes()
     assert hidden(tmp_path) == []
 

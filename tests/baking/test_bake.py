@@ -87,8 +87,8 @@ def test_a_convex_mesh_is_open_exactly_and_casts_no_ray(text_mesh, tmp_path, sca
     baked = read_npz(tmp_path / "out.npz")
     assert (baked.obscurance == 1).all()
     assert (baked.standard_error == 0).all()
-    assert report.open == 24  # three normals a vertex: its edges are sharp
-    assert sum(report.rays.values()) == 0
+    assert report.sampled["obscurance"].open == 24  # three normals a vertex: its edges are sharp
+    assert sum(report.sampled["obscurance"].rays.values()) == 0
 
 
 def test_values_keep_the_order_and_unused_vertices_are_open(text_mesh, tmp_path):
@@ -112,7 +112,7 @@ def test_the_stated_error_is_true(tmp_path):
         cast = found.standard_error > 0
         off = found.obscurance - truth
         covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
-        assert 0.8 < np.sqrt(np.mean(off**2)) / report.rmse < 1.25
+        assert 0.8 < np.sqrt(np.mean(off**2)) / report.sampled["obscurance"].rmse < 1.25
     assert 0.93 < np.mean(covered) < 0.97
 
 
@@ -124,8 +124,8 @@ def test_a_target_error_is_reached_without_bias(tmp_path):
     for seed in range(4):
         _, report = bake(path, tmp_path / f"{seed}.npz", target_error=0.01, seed=seed)
         off.append(read_npz(tmp_path / f"{seed}.npz").obscurance - truth)
-        assert report.rmse <= 0.01
-        assert len(report.samples) > 1
+        assert report.sampled["obscurance"].rmse <= 0.01
+        assert len(report.sampled["obscurance"].samples) > 1
     off = np.concatenate(off)
     assert 0.006 < np.sqrt(np.mean(off**2)) <= 0.0105
     assert abs(off.mean()) < 3 * off.std() / len(off) ** 0.5
@@ -142,12 +142,12 @@ def test_reconstructed_values_err_less_and_state_it(tmp_path):
         found = read_npz(tmp_path / f"{seed}.npz")
         off = found.obscurance - truth
         cast = found.standard_error > 0
-        stated.append(report.rmse)
+        stated.append(report.sampled["obscurance"].rmse)
         error.append(np.sqrt(np.mean(off**2)))
         covered.append((np.abs(off[cast]) <= 1.96 * found.standard_error[cast]).mean())
-        assert report.rmse < raw.rmse / 2
-        audit = report.reconstruction["audit"]
-        assert audit["low"] < report.rmse < audit["high"]
+        assert report.sampled["obscurance"].rmse < raw.sampled["obscurance"].rmse / 2
+        audit = report.sampled["obscurance"].reconstruction["audit"]
+        assert audit["low"] < report.sampled["obscurance"].rmse < audit["high"]
     assert 0.9 < np.mean(np.array(stated) / error) < 1.1
     assert 0.92 < np.mean(covered) < 0.98
     assert np.mean(np.array(error)) < 0.02
@@ -160,15 +160,15 @@ def test_a_target_error_is_reached_by_reconstruction(tmp_path):
     _, raw = bake(path, tmp_path / "raw.npz", target_error=0.01)
     _, report = bake(path, tmp_path / "out.npz", target_error=0.01, reconstruct=True)
     off = read_npz(tmp_path / "out.npz").obscurance - truth
-    assert report.rmse <= 0.01
+    assert report.sampled["obscurance"].rmse <= 0.01
     assert 0.004 < np.sqrt(np.mean(off**2)) < 0.0115
-    assert sum(report.rays.values()) < sum(raw.rays.values())
+    assert sum(report.sampled["obscurance"].rays.values()) < sum(raw.sampled["obscurance"].rays.values())
 
 
 def test_a_target_that_is_not_reached_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("illumcli.baking.reconstructed.MAX_TRIALS", 1)
     _, report = bake(wavy(tmp_path), tmp_path / "out.npz", target_error=0.001, reconstruct=True)
-    assert report.rmse > 0.001
+    assert report.sampled["obscurance"].rmse > 0.001
     assert "trials did not reach it" in report.warnings[0]
 
 
@@ -246,7 +246,7 @@ def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
     assert np.array_equal(ply.corners, mesh.corners)
     assert len(glb.vertices) > len(mesh.vertices)
     w = np.asarray(glb.attributes["_OBSCURANCE"], np.float32)[glb.corners]
-    assert set(w.tolist()) == set(baked.corner_obscurance.tolist())
+    assert set(w.tolist()) == set(baked.corner_channels["obscurance"].tolist())
 
 
 def test_a_glb_keeps_all_it_has(text_mesh, tmp_path):
@@ -370,10 +370,10 @@ def test_smooth_falloffs_see_distance(text_mesh, tmp_path):
     path = text_mesh(STEP)
     bake(path, tmp_path / "step.npz")
     falloff = {"falloff": "linear", "max_distance": "1r"}
-    bake(path, tmp_path / "soft.npz", falloff=falloff, bent_normal=True)
+    bake(path, tmp_path / "soft.npz", falloff=falloff, what=("ao", "bent_normal"))
     step, soft = (read_npz(tmp_path / f"{n}.npz") for n in ("step", "soft"))
     assert (soft.obscurance[:4] > step.obscurance[:4]).all()
-    bent = soft.bent_normal
+    bent = soft.channels["bent_normal"]
     np.testing.assert_allclose(np.linalg.norm(bent[:6], axis=1), 1, rtol=1e-5)
     assert bent[2, 2] < -0.1  # away from the wall
 
@@ -403,8 +403,9 @@ def test_threads_change_nothing_and_a_part_is_taken_up(tmp_path, monkeypatch, se
     monkeypatch.setattr(BakeSampler, "_run", cast)
     _, report = bake_mesh(path, [out], settings, two)
     _, whole = bake_mesh(path, [tmp_path / "two.npz"], settings, two)
-    assert (report.resumed, whole.resumed) == (sum(rays), 0)
-    assert report.rays == whole.rays
+    resumed, new = report.sampled["obscurance"], whole.sampled["obscurance"]
+    assert (resumed.resumed, new.resumed) == (sum(rays), 0)
+    assert resumed.rays == new.rays
     assert out.read_bytes() == (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
     assert list(tmp_path.glob(".*")) == []
 
@@ -421,6 +422,20 @@ def test_the_same_is_kept_and_another_refused(text_mesh, tmp_path, kind):
     assert bake(path, out, samples=32, force=True)[1].written == [str(out)]
 
 
+def test_only_what_is_asked_for_is_written(text_mesh, tmp_path):
+    path, out = text_mesh(STEP), str(tmp_path / "out.npz")
+    done = CliRunner().invoke(illum, ["ao-bake", str(path), "-o", out, "--what", "bent_normal"])
+    assert done.exit_code == 0
+    assert list(read_npz(out).channels) == ["bent_normal"]
+    scene = (
+        f"version: 1\nambient: [1, 1, 1]\nobjects: [{{mesh: {{file: {path.name}, obscurance: out.npz}}}}]\n"
+    )
+    done = CliRunner().invoke(
+        illum, ["render", str(text_mesh(scene, "scene.yaml")), "-o", str(tmp_path / "a.png")]
+    )
+    assert "out.npz: holds no obscurance; bake it with --what ao" in done.output + str(done.exception)
+
+
 def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
     path = text_mesh(STEP)
     for arguments, said in (
@@ -429,6 +444,8 @@ def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
         (["-o", "x.npz", "--falloff", "linear"], "--max-distance"),
         (["-o", "x.npz", "--samples", "4", "--target-error", "0.1"], "exclude each other"),
         (["-o", "x.npz", "--max-distance", "2m"], "is no distance"),
+        (["-o", "x.npz", "--what", "ao,bend"], "'bend' is not one of ao, bent_normal"),
+        (["-o", "x.npz", "--what", "ao,bent_normal", "--method", "fit"], "--method fit computes ao alone"),
     ):
         done = CliRunner().invoke(illum, ["ao-bake", str(path), *arguments])
         assert done.exit_code != 0
@@ -444,7 +461,7 @@ def test_the_command_prints_files_and_writes_a_report(text_mesh, tmp_path):
     assert done.exit_code == 0
     assert done.stdout == f"{out}\n"
     said = json.loads(report.read_text())
-    assert said["rmse"] > 0
+    assert said["sampled"]["obscurance"]["rmse"] > 0
     assert said["unreferenced"] == 1
     about = read_npz(out).about
     assert about["parameters"]["falloff"] == {"falloff": "step", "max_distance": "0.5r"}
@@ -468,7 +485,7 @@ def test_the_command_reconstructs_where_a_target_or_the_user_asks(
     assert done.exit_code == 0
     assert ("audited" in done.stderr) == is_reconstructed
     for data in (json.loads(report.read_text()), read_npz(out).about):
-        assert (data["reconstruction"] is not None) == is_reconstructed
+        assert (data["sampled"]["obscurance"]["reconstruction"] is not None) == is_reconstructed
     assert read_npz(out).about["parameters"]["reconstruct"] == is_reconstructed
 
 
@@ -581,11 +598,13 @@ def test_a_vertex_on_a_hard_edge_has_a_value_for_each_normal(hard_cube, tmp_path
     outs = [tmp_path / name for name in ("out.npz", "out.glb", "out.ply")]
     _, report = bake(hard_cube, *outs, samples=1024)
     baked, mesh = read_npz(outs[0]), read_mesh(hard_cube)
-    at = baked.corner_obscurance.reshape(-1, 4)
+    at = baked.corner_channels["obscurance"].reshape(-1, 4)
     assert (at[3] == 1).all()  # the top
     low = mesh.vertices[mesh.corners.reshape(-1, 4), 1] < 0
     assert (np.abs(at[[0, 1, 4, 5]] - 0.5)[low[[0, 1, 4, 5]]] < 0.2).all()  # the foot of a side
-    mean = np.bincount(mesh.corners, baked.corner_obscurance) / np.bincount(mesh.corners)  # all right angles
+    mean = np.bincount(mesh.corners, baked.corner_channels["obscurance"]) / np.bincount(
+        mesh.corners
+    )  # all right angles
     np.testing.assert_allclose(baked.obscurance, mean, rtol=1e-6)
     assert report.left_out == ["mesh: normals that differ between the polygons of a vertex"]
 
@@ -595,7 +614,7 @@ def test_a_vertex_on_a_hard_edge_has_a_value_for_each_normal(hard_cube, tmp_path
     assert len(glb.vertices) == 28
     np.testing.assert_allclose(glb.vertices[:12], mesh.vertices, atol=1e-6)
     corner = np.asarray(glb.attributes["_OBSCURANCE"], np.float32)[glb.corners]
-    assert set(corner.tolist()) == set(baked.corner_obscurance.tolist())
+    assert set(corner.tolist()) == set(baked.corner_channels["obscurance"].tolist())
     assert glb.normals is not None
 
 
@@ -606,7 +625,7 @@ def test_split_gives_a_ply_a_vertex_for_each_normal(hard_cube, tmp_path):
     assert report.left_out == []
     assert len(made.vertices) == 28
     assert np.array_equal(np.asarray(made.attributes["obscurance"], np.float32)[made.corners],
-                          baked.corner_obscurance)  # fmt: skip
+                          baked.corner_channels["obscurance"])  # fmt: skip
     with pytest.raises(InputError, match=r"--split belongs to \.ply"):
         bake(hard_cube, tmp_path / "other.npz", split=True)
 
@@ -631,10 +650,12 @@ def test_flat_normals_of_faces_that_are_turned_round_point_outwards(hard_cube, t
     text_mesh("\n".join(turned[:-1]), "turned.obj")  # without the floor
     objects = "objects: [{mesh: {file: turned.obj}}]\n"
     scene = text_mesh("version: 1\nobscurance: {about: geometric}\n" + objects, "turned.yaml")
-    bake(scene, tmp_path / "out.npz", bent_normal=True)
+    bake(scene, tmp_path / "out.npz", what=("ao", "bent_normal"))
     baked, mesh = read_npz(tmp_path / "out.npz"), read_mesh(tmp_path / "turned.obj")
     assert (baked.obscurance == 1).all()
-    np.testing.assert_allclose(baked.corner_bent_normal, mesh.normals[mesh.corner_normals], atol=1e-6)
+    np.testing.assert_allclose(
+        baked.corner_channels["bent_normal"], mesh.normals[mesh.corner_normals], atol=1e-6
+    )
 
 
 def test_a_mesh_that_is_turned_inside_out_is_told(text_mesh, tmp_path):

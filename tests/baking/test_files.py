@@ -185,7 +185,7 @@ def test_a_glb_is_written_again_with_all_it_has(tmp_path):
     opened = open_document(tmp_path / "in.glb")
     counts = primitives_of(opened)
     assert counts == [(0, 0, 4), (1, 0, 4)]
-    again = Baked(baked(8).obscurance[::-1], baked(8).standard_error, None, ABOUT)
+    again = Baked({**baked(8).channels, "obscurance": baked(8).obscurance[::-1]}, ABOUT)
     add_baked_to_glb(tmp_path / "out.glb", (opened.json, opened.chunk or b""), counts, again)
     mesh = read_mesh(tmp_path / "out.glb")
     np.testing.assert_allclose(mesh.attributes["_OBSCURANCE"], again.obscurance)

@@ -44,7 +44,7 @@ def write(path, rows=5, seed=0):
     vertices = draw.random((3 * rows, 3))
     shape = OutputMesh("a", vertices, corners, starts, corners.reshape(1, 3), {})
     w = draw.random(3 * rows).astype(np.float32)
-    baked = Baked(w, w, about={"content": "abc"})
+    baked = Baked({"obscurance": w, "standard_error": w}, {"content": "abc"})
     match path.suffix:
         case ".npz":
             write_npz(path, baked)

@@ -1,82 +1,13 @@
-"""The method `vertex`: obscurance sampled at the vertices."""
+"""The method `vertex`: channels sampled at the vertices."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from illumcli.arrays import F
-from illumcli.baking.context import BakeContext, PointValues, SampledValues, SampleStatistics
-from illumcli.baking.reconstructed import reconstructed_values
-from illumcli.baking.sampling import BakeSampler, ChosenSamples, RayCounts
+from illumcli.baking.at_points import channels_at
+from illumcli.baking.context import BakeContext, VertexChannels
 from illumcli.baking.vertex_points import vertex_points
 
-FINAL_PAIRS = 1 << 20
-"""Number of the first scramble that measures the error of the values handed out."""
 
-
-def sampled_at_vertices(context: BakeContext) -> PointValues:
-    """Values at the vertices, each with its standard error."""
-    settings, clock = context.settings, context.clock
+def sampled_at_vertices(context: BakeContext) -> VertexChannels:
+    """The channels that the settings ask for, at the vertices."""
     vertices = vertex_points(context.surfaces)
-    points = vertices.points
-    sampler = BakeSampler(
-        points, context.occluders, context.method, settings.seed, context.threads, context.progress
-    )
-    clock.lap("points")
-
-    # open points need no rays
-    is_open = sampler.open_points()
-    closed = np.flatnonzero(~is_open)
-    clock.lap("horizon")
-
-    # values of the others
-    sampled = (reconstructed_values if settings.reconstruct else raw_values)(context, sampler, closed)
-    w, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
-    w[closed], error[closed] = sampled.w, sampled.error
-    bent = None
-    if sampled.bent is not None:
-        bent = points.n.copy()
-        bent[closed] = sampled.bent
-    count, number = np.unique(sampled.samples, return_counts=True)
-    statistics = SampleStatistics(
-        int(is_open.sum()),
-        len(closed),
-        sampled.rmse,
-        {purpose: cast for purpose, cast in sampled.rays.items() if cast},
-        sampled.resumed,
-        dict(zip(count.tolist(), number.tolist(), strict=True)),
-        sampled.reconstruction,
-    )
-    return PointValues(vertices, w, error, bent, statistics)
-
-
-def raw_values(context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64]) -> SampledValues:
-    """Values of the points that are not open, each from its own rays alone."""
-    settings, clock = context.settings, context.clock
-    share = len(closed) / max(len(sampler.points.key), 1)
-
-    # how many rays each of them casts
-    if settings.target_error is None:
-        chosen = ChosenSamples(np.full(len(closed), settings.samples), 0, 0)
-    else:
-        chosen = sampler.samples_for(closed, share, settings.target_error)
-        clock.lap("pilot")
-    counts = RayCounts(closed, chosen.samples)
-
-    # their values, and the error of these from other rays
-    estimates = sampler.estimate("values", counts, 0, settings.bent_normal, context.journal)
-    clock.lap("cast")
-    errors = sampler.errors(counts, FINAL_PAIRS)
-    clock.lap("errors")
-    values = estimates.values
-    rays = {"pilot": chosen.pilot_rays, "values": estimates.rays, "errors": chosen.error_rays + errors.rays}
-    return SampledValues(
-        values.w,
-        errors.law.at(values.neighbor_variation, counts.samples),
-        values.bent,
-        errors.law.rmse * share**0.5,
-        counts.samples,
-        rays,
-        estimates.resumed,
-    )
+    return VertexChannels(vertices, channels_at(context, vertices.points))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.baking.at_vertices import sampled_at_vertices
-from illumcli.baking.context import BakeContext, PointValues, SampleStatistics
+from illumcli.baking.context import BakeContext, PointChannels, SampleStatistics, VertexChannels
 from illumcli.baking.fit import fitted_to_surface
 from illumcli.baking.inputs import BakeWork, prepare_bake
 from illumcli.baking.occluders import occluders_of
@@ -33,7 +33,7 @@ from illumcli.visibility.obscurance import Method
 DARK, MOSTLY = 0.01, 0.9
 """If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
 
-METHODS: dict[str, Callable[[BakeContext], PointValues]] = {
+METHODS: dict[str, Callable[[BakeContext], VertexChannels]] = {
     "vertex": sampled_at_vertices,
     "fit": fitted_to_surface,
 }
@@ -66,24 +66,24 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
     work.clock.lap("read")
 
     # Compute the values, with a journal for a next run, and write the files.
-    values: PointValues | None = None
+    values: VertexChannels | None = None
     left_out: Sequence[str] = ()
     warnings: list[str] = []
     if due:
         with closing(open_journal(work.outputs[0], work.content)) as journal:
-            values = point_values(work, progress, journal)
-            baked = replace(baked_values(values), about=description(work, values.statistics))
+            values = vertex_channels(work, progress, journal)
+            baked = replace(baked_values(values), about=description(work, values.of_points.statistics))
             write = partial(write_outputs, work, due, baked)
             left_out = write_beside(journal, write)
-            warnings = [*warnings_of(work.settings, values), *journal_warnings(work, journal)]
+            warnings = [*warnings_of(work.settings, values.of_points), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])
     return list(work.outputs), bake_report(work, due, values, left_out, warnings)
 
 
-def point_values(work: BakeWork, progress: Progress, journal: Journal) -> PointValues:
-    """Obscurance of every point at a vertex, by the method of the settings."""
+def vertex_channels(work: BakeWork, progress: Progress, journal: Journal) -> VertexChannels:
+    """The channels of every point at a vertex, by the method of the settings."""
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
     wanted = settings.obscurance()
@@ -96,7 +96,7 @@ def point_values(work: BakeWork, progress: Progress, journal: Journal) -> PointV
     return METHODS[settings.method](context)
 
 
-def description(work: BakeWork, statistics: SampleStatistics) -> dict[str, Any]:
+def description(work: BakeWork, statistics: Mapping[str, SampleStatistics]) -> dict[str, Any]:
     """The description of a bake that its files contain."""
     names, placed = work.scene.object_names(), work.surfaces.geometry.placed
     return {
@@ -108,21 +108,22 @@ def description(work: BakeWork, statistics: SampleStatistics) -> dict[str, Any]:
         "corners": {name: len(each.mesh.corners) for name, each in zip(names, placed, strict=True)},
         "parameters": work.settings.as_data(),
         "seed": work.settings.seed,
-        "rmse": statistics.rmse,
-        "rays": sum(statistics.rays.values()),
-        "reconstruction": statistics.reconstruction,
+        "sampled": {name: each.as_data() for name, each in statistics.items()},
     }
 
 
-def warnings_of(settings: BakeSettings, values: PointValues) -> list[str]:
+def warnings_of(settings: BakeSettings, values: PointChannels) -> list[str]:
     """Warnings about a target that was not reached, and about a mesh that seems to be inside out."""
     warnings = []
-    rmse, target = values.statistics.rmse, settings.target_error
-    if target is not None and rmse > target:
-        at_limit = max(values.statistics.samples, default=0) >= MAX_SAMPLES
+    target = settings.target_error
+    for name, statistics in values.statistics.items():
+        if target is None or statistics.rmse <= target:
+            continue
+        at_limit = max(statistics.samples, default=0) >= MAX_SAMPLES
         reason = f"no vertex casts more than {MAX_SAMPLES} rays" if at_limit else "trials did not reach it"
-        warnings.append(f"error {rmse:.2g} is above the {target:g} asked for: {reason}")
-    dark = dark_share(values.w)
+        warnings.append(f"error of {name} {statistics.rmse:.2g} is above the {target:g} asked for: {reason}")
+    w = values.channels.get("obscurance")
+    dark = 0.0 if w is None else dark_share(w)
     if dark > MOSTLY:
         warnings.append(
             f"{dark:.0%} of the values are 0: the polygons seem to face inwards; turn their winding around, "
@@ -147,13 +148,13 @@ def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
 def bake_report(
     work: BakeWork,
     due: Sequence[Path],
-    values: PointValues | None,
+    values: VertexChannels | None,
     left_out: Sequence[str],
     warnings: list[str],
 ) -> BakeReport:
     """The report of a bake that wrote the files `due`; `values` are None if every output is kept."""
     # If nothing was computed, the counts are 0.
-    statistics = SampleStatistics() if values is None else values.statistics
+    statistics = {} if values is None else values.of_points.statistics
     vertices = None if values is None else values.vertices
     return BakeReport(
         # The input.
@@ -167,15 +168,9 @@ def bake_report(
         without_normal=vertices.without_normal if vertices else 0,
         copies=vertices.copies if vertices else 0,
         # The values, their errors and rays.
-        open=statistics.open,
-        cast=statistics.cast,
-        rmse=statistics.rmse,
+        sampled=statistics,
         target_error=work.settings.target_error,
-        rays=statistics.rays,
-        ray_loop=ray_loop_name() if any(statistics.rays.values()) else None,
-        resumed=statistics.resumed,
-        samples=statistics.samples,
-        reconstruction=statistics.reconstruction,
+        ray_loop=ray_loop_name() if any(each.rays for each in statistics.values()) else None,
         # What was repaired, left out and written.
         repairs=work.repairs,
         left_out=list(left_out),

@@ -18,6 +18,7 @@ from illumcli.baking.vertex_points import Vertices
 from illumcli.files.journal import Journal
 from illumcli.progress import Progress
 from illumcli.records import Record
+from illumcli.visibility.channels import Arrays
 from illumcli.visibility.obscurance import Method
 
 
@@ -59,13 +60,27 @@ class SampleStatistics(Record):
     samples: Mapping[int, int] = field(default_factory=dict)  # rays per point -> points
     reconstruction: Mapping[str, Any] | None = None  # how values were reconstructed, and their audit
 
+    def as_data(self) -> dict[str, Any]:
+        """What files say of their values: the same whether or not the bake was interrupted."""
+        rays = sum(self.rays.values())
+        return {"rmse": self.rmse, "rays": rays, "reconstruction": self.reconstruction}
+
+    def summary(self) -> str:
+        """The error of the values, and what they took."""
+        how = "root mean square"
+        if self.reconstruction is not None:
+            audit = self.reconstruction["audit"]
+            how += f", audited: {audit['low']:.2g} to {audit['high']:.2g}"
+        rays = sum(self.rays.values())
+        return f"error {self.rmse:.2g} ({how}), {rays} rays, {self.open} points open without a ray"
+
 
 class SampledValues(Record):
     """Values of K points that are not open, and what they took."""
 
     w: NDArray[np.float32]  # (K,)
     error: NDArray[np.float32]  # (K,) standard error
-    bent: Vectors | None  # (K, 3) float32
+    bent: Vectors | None  # (K, 3) float32 bent normals
     rmse: float  # root mean square error over all points, the open ones among them
     samples: NDArray[np.int64]  # (K,) rays of each
     rays: Mapping[str, int]  # purpose -> rays
@@ -73,11 +88,15 @@ class SampledValues(Record):
     reconstruction: Mapping[str, Any] | None = None
 
 
-class PointValues(Record):
-    """Obscurance of the M points at vertices."""
+class PointChannels(Record):
+    """The channels of the settings at M points."""
+
+    channels: Arrays  # (M,) or (M, 3) each
+    statistics: Mapping[str, SampleStatistics]  # of each value that rays estimate, by its channel
+
+
+class VertexChannels(Record):
+    """Channels at the points of vertices."""
 
     vertices: Vertices
-    w: NDArray[np.float32]  # (M,) in [0, 1]: 1 where open
-    error: NDArray[np.float32]  # (M,) standard error
-    bent: Vectors | None  # (M, 3) float32 unit mean unoccluded direction
-    statistics: SampleStatistics
+    of_points: PointChannels

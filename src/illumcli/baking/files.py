@@ -15,6 +15,7 @@ from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
 from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
+from illumcli.visibility.channels import ply_columns
 
 SUFFIXES = (".npz", ".ply", ".glb")
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
@@ -24,8 +25,8 @@ CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
 def write_baked_ply(
     path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, channel: str | None
 ) -> None:
-    """Write a PLY with float properties `obscurance`, `quality` (equal, the name that MeshLab reads),
-    `standard_error`, and `nx_bent ny_bent nz_bent` if there is a bent normal.
+    """Write a PLY with a float property for each name in `Channel.ply`; `quality`, which MeshLab shows, is
+    obscurance.
 
     Parameters
     ----------
@@ -34,18 +35,13 @@ def write_baked_ply(
     channel : {"r", "g", "b", "a", "rgb"}, optional
         Channels in which obscurance is written as 8-bit colour; others are kept, or are white.
     """
-    columns = {"obscurance": baked.obscurance, "quality": baked.obscurance}
-    columns["standard_error"] = baked.standard_error
-    if baked.bent_normal is not None:
-        for axis, name in enumerate("xyz"):
-            columns[f"n{name}_bent"] = baked.bent_normal[:, axis]
-    ply.write(path, meshes, _vertex_data(columns, baked, channel), source)
+    ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, channel), source)
 
 
 def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, channel: str | None) -> None:
-    """Write a GLB with a node per mesh, with `_OBSCURANCE`, `_STANDARD_ERROR`, and `_BENT_NORMAL` if there is
-    a bent normal; `COLOR_0` only if a `channel` is given."""
-    gltf.write_glb(path, meshes, _vertex_data(baked.columns(), baked, channel))
+    """Write a GLB with a node per mesh, with an attribute for each channel: `_OBSCURANCE` and so on;
+    `COLOR_0` only if a `channel` is given."""
+    gltf.write_glb(path, meshes, _vertex_data(baked.channels, baked, channel))
 
 
 def add_baked_to_glb(
@@ -53,7 +49,7 @@ def add_baked_to_glb(
 ) -> None:
     """Write a GLB that is a copy of another, with the same attributes added to each primitive; `source` and
     `counts` are those of `gltf.add_to_glb`."""
-    gltf.add_to_glb(path, source, counts, _vertex_data(baked.columns(), baked, None))
+    gltf.add_to_glb(path, source, counts, _vertex_data(baked.channels, baked, None))
 
 
 def baked_contents(path: Path) -> list[str]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.baking.area_points import AreaPoints, area_points
-from illumcli.baking.context import BakeContext, PointValues, SampleStatistics
+from illumcli.baking.context import BakeContext, PointChannels, SampleStatistics, VertexChannels
 from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.vertex_points import Vertices, vertex_points
 from illumcli.geometry.scene_geometry import SceneGeometry
@@ -34,7 +34,7 @@ points are few."""
 MAX_STEPS, TOLERANCE = 500, 1e-6
 
 
-def fitted_to_surface(context: BakeContext) -> PointValues:
+def fitted_to_surface(context: BakeContext) -> VertexChannels:
     """Vertex values by least squares, with `samples` rays per vertex spread over the area.
 
     The standard error of a value is estimated by how much the residuals in each of eight parts of the points
@@ -75,7 +75,8 @@ def fitted_to_surface(context: BakeContext) -> PointValues:
         {"values": estimates.rays} if estimates.rays else {},
         samples={settings.samples: len(closed)},
     )
-    return PointValues(vertices, value, error, None, statistics)
+    channels = {"obscurance": value, "standard_error": error}
+    return VertexChannels(vertices, PointChannels(channels, {"obscurance": statistics}))
 
 
 class NormalEquations(Record):

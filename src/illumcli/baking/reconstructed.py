@@ -97,7 +97,8 @@ class ReconstructedBake(Record):
         counts = RayCounts(closed, samples)
 
         # raw values and their errors
-        raw = sampler.estimate("values", counts, 0, context.settings.bent_normal, context.journal)
+        with_bent = "bent_normal" in context.settings.what
+        raw = sampler.estimate("values", counts, 0, with_bent, context.journal)
         clock.lap("cast")
         errors = sampler.errors(counts, PAIRS + (number << 10))
         clock.lap("errors")

@@ -24,7 +24,7 @@ class BakeSettings(Value):
     method: str = "vertex"  # or `fit`: least squares over the surface
     occluders: tuple[str, ...] = ("scene",)  # or `own`, or names of objects
     ground: str | None = None  # axis that points up from an added ground plane
-    bent_normal: bool = False
+    what: tuple[str, ...] = ("ao",)  # words of `--what`, in the order of `channels.whats`
     channel: str | None = None  # of 8-bit vertex colours
     split: bool = False  # vertices of a PLY
     seed: int = 0
@@ -42,7 +42,8 @@ class BakeSettings(Value):
 
     def as_data(self) -> dict[str, Any]:
         """The settings for JSON."""
-        return {**vars(self), "falloff": dict(self.falloff), "occluders": list(self.occluders)}
+        lists = {"occluders": list(self.occluders), "what": list(self.what)}
+        return {**vars(self), "falloff": dict(self.falloff), **lists}
 
 
 class BakeOptions(Value):

@@ -56,7 +56,7 @@ def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, s
     for placed, table in zip(geometry.placed, tables, strict=True):
         count = len(placed.mesh.corners)
         corners = slice(placed.first_corner, placed.first_corner + count)
-        baked_here = [column[corners].reshape(count, -1) for column in baked.corner_columns().values()]
+        baked_here = [values[corners].reshape(count, -1) for values in baked.corner_channels.values()]
         parts.append(split_vertices(placed.mesh, [*table.values(), *baked_here] if split else []))
 
     # The objects.
@@ -151,17 +151,15 @@ def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
 def split_values(baked: Baked, meshes: Sequence[Mesh], parts: Sequence[SplitVertices]) -> Baked:
     """Values of the split vertices of all meshes: those of their corners if there are any, otherwise of their
     vertices."""
-    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in baked.columns()}
-    at_corners = baked.corner_columns()
+    split: dict[str, list[NDArray[np.float32]]] = {name: [] for name in baked.channels}
     first_vertex = first_corner = 0
     for mesh, part in zip(meshes, parts, strict=True):
-        for name, column in baked.columns().items():
-            values = column[first_vertex + part.source]
-            if f"corner_{name}" in at_corners:
+        for name, at_vertices in baked.channels.items():
+            values = at_vertices[first_vertex + part.source]
+            if name in baked.corner_channels:
                 some = np.flatnonzero(part.corner >= 0)
-                values[some] = at_corners[f"corner_{name}"][first_corner + part.corner[some]]
-            columns[name].append(values)
+                values[some] = baked.corner_channels[name][first_corner + part.corner[some]]
+            split[name].append(values)
         first_vertex += len(mesh.vertices)
         first_corner += len(mesh.corners)
-    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in columns.items()}
-    return replace(baked, **joined)
+    return replace(baked, channels={name: np.concatenate(values) for name, values in split.items()})

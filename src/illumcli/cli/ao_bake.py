@@ -60,6 +60,21 @@ class _Distance(click.ParamType):
         return self.fail(f"'{text}' is no distance; write 0.2 for scene units, 0.5r for half the radius")
 
 
+class _What(click.ParamType):
+    name = "NAME[,NAME]..."
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        from illumcli.visibility.channels import whats
+
+        words = value.split(",") if isinstance(value, str) else value
+        unknown = [word for word in words if word not in whats()]
+        if unknown:
+            self.fail(f"'{unknown[0]}' is not one of {', '.join(whats())}")
+        return tuple(word for word in whats() if word in words)
+
+
 def _settings(options: dict[str, Any]) -> BakeSettings:
     """The `BakeSettings` among the options of the command."""
     from illumcli.baking.settings import BakeSettings
@@ -83,6 +98,8 @@ def _refuse_contradictions(options: dict[str, Any]) -> None:
         raise click.UsageError("--target-error works with --method vertex; give --samples")
     if options["reconstruct"] and options["method"] == "fit":
         raise click.UsageError("--reconstruct works with --method vertex")
+    if options["what"] != ("ao",) and options["method"] == "fit":
+        raise click.UsageError("--method fit computes ao alone; --what works with --method vertex")
 
 
 def _refuse_foreign_parameters(options: dict[str, Any]) -> None:
@@ -172,7 +189,13 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     help="Occluders of an object's vertices: the whole scene, itself, or itself and objects by name.",
 )
 @click.option("--ground", type=click.Choice(["x", "y", "z"]), help="Add a ground plane below; the up axis.")
-@click.option("--bent-normal", is_flag=True, help="Also compute the mean unoccluded direction.")
+@click.option(
+    "--what",
+    type=_What(),
+    default="ao",
+    show_default=True,
+    help="What is computed: ao, bent_normal (the mean unoccluded direction), or several: ao,bent_normal.",
+)
 @click.option(
     "--color",
     "channel",

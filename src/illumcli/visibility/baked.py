@@ -8,7 +8,7 @@ import os
 import struct
 import zipfile
 from collections.abc import Mapping
-from dataclasses import field, fields
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +20,30 @@ from illumcli.files.atomic import AtomicFile
 from illumcli.files.seal import BLANK, seal
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.records import Record
+from illumcli.visibility.channels import CHANNELS, Arrays
+
+CORNER = "corner_"
+"""Begins the names of arrays of corners in an npz."""
 
 
 class Baked(Record):
-    """Obscurance of V vertices, in their file's own order, and of C corners where a vertex has several."""
+    """Channels of V vertices, in their file's own order, and of C corners if a vertex has several values."""
 
-    obscurance: NDArray[np.float32]  # (V,) 1 where open
-    standard_error: NDArray[np.float32]  # (V,)
-    bent_normal: NDArray[np.float32] | None = None  # (V, 3) unit; 0 where nothing is open
+    channels: Arrays  # of vertices, by the names of `CHANNELS`
     about: Mapping[str, Any] = field(default_factory=dict)
     """Parameters, seed, error, hash of the mesh, version."""
-    corner_obscurance: NDArray[np.float32] | None = None  # (C,) polygon by polygon
-    corner_standard_error: NDArray[np.float32] | None = None  # (C,)
-    corner_bent_normal: NDArray[np.float32] | None = None  # (C, 3)
+    corner_channels: Arrays = field(default_factory=dict)
+    """The same channels at corners, polygon by polygon; none if each vertex has one value."""
+
+    @property
+    def obscurance(self) -> NDArray[np.float32]:
+        """(V,) 1 where open."""
+        return self.channels["obscurance"]
+
+    @property
+    def standard_error(self) -> NDArray[np.float32]:
+        """(V,) of `obscurance`."""
+        return self.channels["standard_error"]
 
     def of(self, name: str, count: int) -> NDArray[np.float32] | None:
         """(V,) values at the `count` vertices of a mesh; in a bake of several meshes, of the object `name`.
@@ -45,8 +56,8 @@ class Baked(Record):
         `corners` holds the vertex number of each, (C,); `count` is the number of vertices.
         """
         values, at_corners = self.of(name, count), None
-        if self.corner_obscurance is not None:
-            at_corners = self._part(self.corner_obscurance, "corners", name, len(corners))
+        if "obscurance" in self.corner_channels:
+            at_corners = self._part(self.corner_channels["obscurance"], "corners", name, len(corners))
         return values[corners] if at_corners is None and values is not None else at_corners
 
     def _part(
@@ -65,16 +76,6 @@ class Baked(Record):
         """Hashes of the meshes that were baked."""
         return list(dict(self.about.get("meshes", {})).values())
 
-    def columns(self) -> dict[str, NDArray[np.float32]]:
-        """The arrays of values per vertex, by name."""
-        columns = {"obscurance": self.obscurance, "standard_error": self.standard_error}
-        return columns if self.bent_normal is None else {**columns, "bent_normal": self.bent_normal}
-
-    def corner_columns(self) -> dict[str, NDArray[np.float32]]:
-        """The arrays of values per corner, by name; none if no vertex has several values."""
-        names = ("corner_obscurance", "corner_standard_error", "corner_bent_normal")
-        return {name: values for name in names if (values := getattr(self, name)) is not None}
-
 
 def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts: NDArray[np.int32]) -> str:
     """Hash of a mesh's geometry, 32 hexadecimal digits; the same for any file format it was read from."""
@@ -86,8 +87,9 @@ def mesh_hash(vertices: NDArray[np.float64], corners: NDArray[np.int32], starts:
 
 
 def write_npz(path: Path, baked: Baked) -> None:
-    """The arrays of `Baked.columns` and `Baked.corner_columns`, and `about`, JSON as text."""
-    arrays: dict[str, Any] = {**baked.columns(), **baked.corner_columns()}
+    """Channels of vertices, those of corners as `corner_obscurance` and so on, and `about` as JSON text."""
+    at_corners = {f"{CORNER}{name}": values for name, values in baked.corner_channels.items()}
+    arrays: dict[str, Any] = {**baked.channels, **at_corners}
     with AtomicFile(path) as part:
         with part.path.open("wb") as file:
             np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
@@ -115,17 +117,21 @@ def read_npz(path: Path) -> Baked:
     try:
         refuse_unpacked(path)
         with np.load(path, allow_pickle=False) as data:
-            names = [part.name for part in fields(Baked) if part.name != "about" and part.name in data]
-            arrays = {name: np.asarray(data[name], np.float32) for name in names}
+            at_vertices, at_corners = (
+                {name: np.asarray(data[mark + name], np.float32) for name in CHANNELS if mark + name in data}
+                for mark in ("", CORNER)
+            )
             about = json.loads(str(data["about"])) if "about" in data else {}
-            baked = Baked(**arrays, about=about)
+            baked = Baked(at_vertices, about, at_corners)
+            if not at_vertices:
+                raise ValueError("no values of vertices")
     except LimitError:
         raise
     except Exception as why:  # zipfile, numpy and json each have their own exceptions
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
-    values = [baked.obscurance, *(() if baked.corner_obscurance is None else (baked.corner_obscurance,))]
-    sound = all(w.ndim == 1 and np.isfinite(w).all() and (w >= 0).all() and (w <= 1).all() for w in values)
-    if not sound or baked.standard_error.shape != baked.obscurance.shape:
+    w = [each["obscurance"] for each in (at_vertices, at_corners) if "obscurance" in each]
+    sound = all(each.ndim == 1 and ((each >= 0) & (each <= 1)).all() for each in w)
+    if not sound or len({len(values) for values in at_vertices.values()}) > 1:
         raise InputError(f"{path}: obscurance must be one number from 0 to 1 per vertex; bake it again")
     return baked
 

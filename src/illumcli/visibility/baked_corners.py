@@ -49,6 +49,8 @@ def baked(files: tuple[tuple[str, Located | None], ...], geometry: SceneGeometry
         mesh = placed.mesh
         if file.path not in in_files:
             in_files[file.path] = read_npz(file.path)
+            if "obscurance" not in in_files[file.path].channels:
+                raise InputError(f"{file.path}: holds no obscurance; bake it with --what ao")
         in_file = in_files[file.path]
 
         # Values of a single mesh are those of every object that has it; of several, they go by name.

@@ -50,7 +50,7 @@ def main() -> None:
 def damaged(flips: int, truncations: int) -> int:
     """Pictures that differ after an entry was damaged."""
     from illumcli.cache import policy as artifacts
-    from illumcli.cache.store import open_store
+    from illumcli.cache.location import open_store
     from illumcli.commands.options import RenderJob, RenderOptions
     from illumcli.commands.render import render_scene
 
@@ -77,7 +77,7 @@ def damaged(flips: int, truncations: int) -> int:
 
 def shared(processes: int, runs: int) -> int:
     """Runs that failed and pictures that differ between processes."""
-    from illumcli.cache.store import open_store
+    from illumcli.cache.location import open_store
 
     open_store().prune(0)
     workers = [subprocess.Popen([sys.executable, "-c", WORKER, str(n), str(runs)]) for n in range(processes)]

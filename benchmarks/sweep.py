@@ -135,7 +135,8 @@ def moved() -> None:
 
 def stored() -> None:
     """Every artifact: bytes, seconds it took, seconds to load it, checksum included."""
-    from illumcli.cache.store import described, open_store
+    from illumcli.cache.entry import described
+    from illumcli.cache.location import open_store
     from illumcli.commands.options import RenderJob
     from illumcli.commands.render import render_scene
 

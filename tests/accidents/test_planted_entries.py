@@ -11,8 +11,9 @@ import sys
 import numpy as np
 import pytest
 
-from illumcli.cache import store as module
-from illumcli.cache.store import SUFFIX, Refused, Store, read_entry
+from illumcli.cache import entry as module
+from illumcli.cache.entry import Refused, read_entry
+from illumcli.cache.store import LIMIT, SUFFIX, Store
 
 KEY = "0123456789abcdef" * 2
 ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
@@ -21,7 +22,7 @@ PLACE = {"at": 0, "shape": [4], "dtype": "<f8"}
 
 def planted(path, text, payload=bytes(64)):
     """Write an entry that is sound to the last bit, whatever it says."""
-    head = module._HEADER.pack(module._MAGIC, module._FORMAT, len(text), len(payload), b"")[:24]
+    head = module.HEADER.pack(module.MAGIC, module.FORMAT, len(text), len(payload), b"")[:24]
     sum_ = module.checksum(head + text, [np.frombuffer(payload, np.uint8)])
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(head + sum_ + bytes(8) + text + payload)
@@ -89,7 +90,7 @@ DESCRIPTIONS = {
 def test_a_sound_entry_whose_description_is_none_is_a_miss(store, path, said):
     planted(path, said if isinstance(said, bytes) else json.dumps(said).encode())
     with pytest.raises(Refused):
-        read_entry(path, KEY)
+        read_entry(path, KEY, LIMIT)
     assert list(store.faults()) == [path]
     assert store.read(KEY) is None
     assert "it is computed again" in store.warning
@@ -99,14 +100,14 @@ def test_a_sound_entry_whose_description_is_none_is_a_miss(store, path, said):
 def test_an_entry_that_would_take_more_than_one_may_is_not_read(store, path):
     planted(path, json.dumps(entry()).encode())
     with path.open("r+b") as file:
-        file.write(module._HEADER.pack(module._MAGIC, module._FORMAT, 64, 1 << 40, b""))
-        file.truncate(module._HEADER.size + 64 + (1 << 40))
+        file.write(module.HEADER.pack(module.MAGIC, module.FORMAT, 64, 1 << 40, b""))
+        file.truncate(module.HEADER.size + 64 + (1 << 40))
     with pytest.raises(Refused, match="larger than an entry may be"):
         read_entry(path, KEY, store.largest)
     with path.open("r+b") as file:
-        file.write(module._HEADER.pack(module._MAGIC, module._FORMAT, 1 << 31, 64, b""))
-        file.truncate(module._HEADER.size + 64 + (1 << 31))
-    for look in (lambda: read_entry(path, KEY), lambda: module.described(path)):
+        file.write(module.HEADER.pack(module.MAGIC, module.FORMAT, 1 << 31, 64, b""))
+        file.truncate(module.HEADER.size + 64 + (1 << 31))
+    for look in (lambda: read_entry(path, KEY, LIMIT), lambda: module.described(path)):
         with pytest.raises(Refused, match="longer than any"):
             look()
 
@@ -318,8 +319,8 @@ def test_a_picture_is_the_same_whatever_the_descriptions_say(folder, how):
     assert len(entries) > 5
     for path in entries:
         data = path.read_bytes()
-        _, _, size, end, _ = module._HEADER.unpack(data[: module._HEADER.size])
-        said = json.loads(data[module._HEADER.size :][:size])
+        _, _, size, end, _ = module.HEADER.unpack(data[: module.HEADER.size])
+        said = json.loads(data[module.HEADER.size :][:size])
         planted(path, json.dumps(changed(said, how)).encode(), data[len(data) - end :])
     warm, told = render(folder)
     assert warm == cold

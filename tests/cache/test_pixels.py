@@ -7,9 +7,10 @@ import pytest
 
 from illumcli.cache import pixels, policy
 from illumcli.cache.codec import Misfit, codec_of, load_tile
+from illumcli.cache.entry import Stored
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.pixels import PixelRecorder, are_among, common_pixels, pixel_buffer, pixel_key
-from illumcli.cache.store import Store, Stored
+from illumcli.cache.store import Store
 from illumcli.film.tiles import Scattered
 from illumcli.film.view import View
 from illumcli.rays.interaction import Hits

@@ -10,17 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from illumcli.cache import store as module
-from illumcli.cache.store import (
-    SUFFIX,
-    Refused,
-    Store,
-    default_folder,
-    default_limit,
-    described,
-    read_entry,
-    size_of,
-)
+from illumcli.cache import entry as module
+from illumcli.cache.entry import Refused, described, read_entry
+from illumcli.cache.location import default_folder, default_limit, size_of
+from illumcli.cache.store import LIMIT, SUFFIX, Store
 from illumcli.files import atomic
 
 KEY = "0123456789abcdef" * 2
@@ -270,7 +263,7 @@ def test_an_entry_that_another_process_took_away_is_no_fault(store, monkeypatch)
 
 @pytest.mark.parametrize("text", [b"{", b"\xff", b"[" * 60_000])
 def test_a_description_that_cannot_be_read_is_refused(store, text):
-    head = module._HEADER.pack(module._MAGIC, module._FORMAT, len(text), 0, b"")
+    head = module.HEADER.pack(module.MAGIC, module.FORMAT, len(text), 0, b"")
     store.folder.mkdir()
     path_of(store).write_bytes(head + text)
     with pytest.raises(Refused, match="its description cannot be read"):
@@ -293,7 +286,7 @@ def test_an_entry_that_cannot_be_read_costs_time_alone(store):
 
 def test_what_was_read_outlives_its_file(store):
     store.save(KEY, {}, [np.ones(1 << 18)])
-    found = read_entry(path_of(store), KEY)
+    found = read_entry(path_of(store), KEY, LIMIT)
     store.prune(0)
     assert found.arrays[0].sum() == 1 << 18
 

@@ -60,9 +60,9 @@ def test_list_verify_prune_clear(illum, own):
 
 def entry(own, name, text, used):
     """A file of the cache with this description, last used so many seconds ago."""
-    from illumcli.cache import store
+    from illumcli.cache.entry import FORMAT, HEADER, MAGIC
 
-    head = store._HEADER.pack(store._MAGIC, store._FORMAT, len(text), 0, b"")
+    head = HEADER.pack(MAGIC, FORMAT, len(text), 0, b"")
     (own / "kept").mkdir(exist_ok=True)
     path = own / "kept" / f"{name}.illum"
     path.write_bytes(head + text)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.sampled import sampled_layer
+from illumcli.cache.location import default_folder
 from illumcli.cache.recorder import Cache
-from illumcli.cache.store import Store, default_folder
+from illumcli.cache.store import Store
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.plan import ScenePlan
 from illumcli.commands.render import render_scene

@@ -12,7 +12,7 @@ from illumcli import __version__
 from illumcli.accuracy.curves import Curve, Run, curve_through, point_of, rmse_of
 from illumcli.accuracy.reference import Reference, Vary, reference_image, run_content
 from illumcli.accuracy.sampled import SampledLayer, Sampling, sampled_layer
-from illumcli.cache.store import open_store
+from illumcli.cache.location import open_store
 from illumcli.errors import InputError
 from illumcli.progress import Progress, no_progress
 from illumcli.rays.sampling import stream

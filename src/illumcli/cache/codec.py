@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, take_or_all
-from illumcli.cache.store import Stored
+from illumcli.cache.entry import Stored
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
 from illumcli.geometry.bounds import ObjectBounds

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from illumcli.cache import policy
 from illumcli.cache.codec import BufferCodec, Misfit, codec_of, pack_tile
+from illumcli.cache.entry import Stored
 from illumcli.cache.fingerprint import digest
 from illumcli.cache.memory import MemoryCache
-from illumcli.cache.store import Store, Stored
+from illumcli.cache.store import Store
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
 from illumcli.graph import Buffers

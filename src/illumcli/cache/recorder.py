@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from illumcli.cache import policy
 from illumcli.cache.codec import codec_of, encode, pack_tile
+from illumcli.cache.entry_writer import Writer
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.speeds import SpeedRecorder
-from illumcli.cache.store import Store, Writer
+from illumcli.cache.store import Store
 from illumcli.film.tiles import Tile
 from illumcli.film.view import View
 from illumcli.graph import Buffers

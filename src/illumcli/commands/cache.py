@@ -6,17 +6,9 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from illumcli.cache.store import (
-    Entry,
-    Pruned,
-    Refused,
-    Store,
-    described,
-    distrust,
-    open_store,
-    removed,
-    size_of,
-)
+from illumcli.cache.entry import Refused, described
+from illumcli.cache.location import open_store, size_of
+from illumcli.cache.store import Entry, Pruned, Store, distrust, removed
 from illumcli.errors import InputError, OutputError
 from illumcli.records import Value
 

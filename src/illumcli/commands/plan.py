@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from illumcli.cache.location import open_store
 from illumcli.cache.recorder import Cache
 from illumcli.cache.speeds import by_stage, read_speeds
-from illumcli.cache.store import open_store
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.plan_variants import planned_variants
 from illumcli.commands.sweep_names import named

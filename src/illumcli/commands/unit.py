@@ -27,10 +27,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, overload
 
 from illumcli.cache.fingerprint import FileFingerprints
+from illumcli.cache.location import open_store
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.speeds import SpeedRecorder
-from illumcli.cache.store import Store, open_store
+from illumcli.cache.store import Store
 from illumcli.commands.options import RenderJob
 from illumcli.commands.work import Work, work_of
 from illumcli.progress import Progress, no_progress

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.mesh_files import ply
 from illumcli.mesh_files.gltf import write as gltf
+from illumcli.mesh_files.gltf.extend import extend_glb
 from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
 from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
@@ -44,12 +44,12 @@ def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, chan
     gltf.write_glb(path, meshes, _vertex_data(baked.channels, baked, channel))
 
 
-def add_baked_to_glb(
-    path: Path, source: tuple[dict[str, Any], bytes], counts: Sequence[tuple[int, int, int]], baked: Baked
-) -> None:
-    """Write a GLB that is a copy of another, with the same attributes added to each primitive; `source` and
-    `counts` are those of `gltf.add_to_glb`."""
-    gltf.add_to_glb(path, source, counts, _vertex_data(baked.channels, baked, None))
+def add_baked_to_glb(path: Path, source: Path, baked: Baked, channel: str | None) -> list[str]:
+    """Write a GLB with all that a glTF file has and the attributes of `write_baked_glb`.
+
+    Returns the parts of the source that it does not have.
+    """
+    return extend_glb(path, source, _vertex_data(baked.channels, baked, channel))
 
 
 def baked_contents(path: Path) -> list[str]:
@@ -71,7 +71,19 @@ def baked_contents(path: Path) -> list[str]:
 
 
 def _vertex_data(columns: Mapping[str, NDArray[np.float32]], baked: Baked, channel: str | None) -> VertexData:
+    at_corners = baked.corner_channels
     if channel is None:
-        return VertexData(columns, baked.about)
-    eight_bit = np.rint(baked.obscurance * 255).astype(np.uint8)
-    return VertexData(columns, baked.about, eight_bit, CHANNELS[channel])
+        return VertexData(columns, baked.about, corner_columns=at_corners)
+    of_corners = at_corners.get("obscurance")
+    return VertexData(
+        columns,
+        baked.about,
+        _eight_bit(baked.obscurance),
+        CHANNELS[channel],
+        at_corners,
+        None if of_corners is None else _eight_bit(of_corners),
+    )
+
+
+def _eight_bit(w: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return np.rint(w * 255).astype(np.uint8)

@@ -14,6 +14,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry
 from illumcli.geometry.transforms import cofactors
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
+from illumcli.mesh_files.split import SplitVertices, split_vertices
 from illumcli.records import Record
 from illumcli.visibility.baked import Baked
 
@@ -25,14 +26,6 @@ class OutputMeshes(Record):
     baked: Baked
     left_out: tuple[str, ...]
     """A line for each part of the meshes that is not written."""
-
-
-class SplitVertices(Record):
-    """N vertices: those of a mesh, then copies for further combinations of their corners' values."""
-
-    source: NDArray[np.int64]  # (N,) the vertex of the mesh that each one is, or is a copy of
-    corner: NDArray[np.int64]  # (N,) one of its corners, -1 for vertices of no polygon
-    of_corner: NDArray[np.int32]  # (C,) the vertex of each corner, among the N
 
 
 def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, split: bool) -> OutputMeshes:
@@ -57,7 +50,13 @@ def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, s
         count = len(placed.mesh.corners)
         corners = slice(placed.first_corner, placed.first_corner + count)
         baked_here = [values[corners].reshape(count, -1) for values in baked.corner_channels.values()]
-        parts.append(split_vertices(placed.mesh, [*table.values(), *baked_here] if split else []))
+        parts.append(
+            split_vertices(
+                placed.mesh.corners,
+                len(placed.mesh.vertices),
+                [*table.values(), *baked_here] if split else [],
+            )
+        )
 
     # The objects.
     outputs = [
@@ -116,36 +115,6 @@ def output_mesh(
     vertices = mesh.vertices @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
     triangles = part.of_corner[corner]
     return OutputMesh(name, vertices[part.source], part.of_corner, mesh.starts, triangles, attributes)
-
-
-def split_vertices(mesh: Mesh, tables: Sequence[NDArray[Any]]) -> SplitVertices:
-    """Each vertex, and a copy for every further combination of rows of `tables` at its corners.
-
-    Parameters
-    ----------
-    tables : sequence of (C, k)
-        Normals, uv or values of each corner.
-    """
-    # Number the combinations of a vertex and its rows.
-    key = mesh.corners.astype(np.int64)
-    for table in tables:
-        _, row = np.unique(table, axis=0, return_inverse=True)
-        _, key = np.unique(key * (len(table) + 1) + row.ravel(), return_inverse=True)
-        key = key.ravel()
-    _, first, key = np.unique(key, return_index=True, return_inverse=True)
-
-    # The first combination of each vertex keeps the vertex's index; the others follow after all vertices.
-    count = len(mesh.vertices)
-    order = np.argsort(first, kind="stable")
-    vertex = mesh.corners[first[order]]
-    is_first = np.zeros(len(order), bool)
-    is_first[np.unique(vertex, return_index=True)[1]] = True
-    number = np.empty(len(order), np.int32)
-    number[order] = np.where(is_first, vertex, count + np.cumsum(~is_first) - 1)
-    corner = np.full(count + int((~is_first).sum()), -1, np.int64)
-    corner[number] = first
-    source = np.concatenate([np.arange(count), vertex[~is_first]])
-    return SplitVertices(source, corner, number[key.ravel()])
 
 
 def split_values(baked: Baked, meshes: Sequence[Mesh], parts: Sequence[SplitVertices]) -> Baked:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ class VertexData(Record):
     about: Mapping[str, Any]  # JSON metadata
     color: NDArray[np.uint8] | None = None  # (V,) linear, written into the colour channels `channels`
     channels: tuple[int, ...] = ()  # of 0 red, 1 green, 2 blue, 3 alpha
+    corner_columns: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    """(C,) or (C, k) by the names of columns, where vertices have several values."""
+    corner_color: NDArray[np.uint8] | None = None  # (C,)
 
     def sealed_about(self) -> dict[str, Any]:
         """`about`, with a placeholder for the file's own hash."""

@@ -110,15 +110,6 @@ def _place(primitives: list[Part], vertices: list[int], faces: list[int], part: 
     return f": {where}, {part} {number - first[k] + 1}"
 
 
-def primitives_of(document: Document) -> list[tuple[int, int, int]]:
-    """(mesh, number of the primitive in it, vertices) for each run of vertices, in the order of `read`."""
-    return [
-        (part.mesh, part.primitive, len(part.vertices) // part.copies)
-        for part in parts(document)
-        for _ in range(part.copies)
-    ]
-
-
 def _joined(
     tables: list[NDArray[np.float64] | None], sizes: list[int], corners: Ints
 ) -> tuple[NDArray[np.float64] | None, Ints | None]:

@@ -41,6 +41,15 @@ def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bo
     InputError
         An accessor that does not exist, has another type, or whose data are missing.
     """
+    values = stored(document, index, widths)
+    entry = document.item("accessors", index)
+    if values.dtype.kind in "iu" and (fractions or entry.get("normalized") is True):
+        return np.maximum(values / np.iinfo(values.dtype).max, -1)
+    return values
+
+
+def stored(document: Document, index: Any, widths: tuple[int, ...]) -> NDArray[Any]:
+    """(count, width) values of an accessor as they are stored, not as fractions; errors as in `table`."""
     entry, where = document.item("accessors", index), f"accessors[{index}]"
     kind, shape = entry.get("componentType"), entry.get("type")
     width = _WIDTHS.get(shape) if isinstance(shape, str) else None
@@ -68,8 +77,6 @@ def table(document: Document, index: Any, widths: tuple[int, ...], fractions: bo
         rows, replaced = _sparse(document, entry["sparse"], values, where)
         values = values.copy() if has_rows else np.zeros((count, width), dtype)
         values[rows] = replaced
-    if dtype.kind in "iu" and (fractions or entry.get("normalized") is True):
-        return np.maximum(values / np.iinfo(dtype).max, -1)
     return values
 
 

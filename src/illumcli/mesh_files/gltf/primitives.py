@@ -27,10 +27,13 @@ Floats = NDArray[np.float64]
 class Part(Record):
     """One primitive at one node, with all of its instances one after the other."""
 
+    node: int
+    """Number of the node; -1 if the file has meshes but no nodes."""
     mesh: int
     primitive: int
     """Number of the primitive in its mesh."""
     copies: int
+    is_reversed: NDArray[np.bool_]  # (copies,) True for copies whose triangles are reversed
     vertices: Floats  # (V, 3) in world space
     triangles: Ints  # (T, 3)
     normals: Floats | None  # (V, 3) unit, or 0 if the file has 0
@@ -136,9 +139,11 @@ def _part(
 
     name = next((str(each) for each in (placed.node.get("name"), mesh.get("name")) if each), None)
     return Part(
+        node=placed.index,
         mesh=numbers[0],
         primitive=numbers[1],
         copies=copies,
+        is_reversed=reverse,
         vertices=vertices.reshape(-1, 3),
         triangles=(oriented + size * np.arange(copies)[:, None, None]).reshape(-1, 3),
         normals=normals,

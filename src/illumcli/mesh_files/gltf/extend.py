@@ -1,0 +1,125 @@
+"""Adds values to the meshes of a glTF document, of which nothing else changes, and writes it as a GLB."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from illumcli.mesh_files.gltf.document import Document, extensions, open_document
+from illumcli.mesh_files.gltf.embed import embedded
+from illumcli.mesh_files.gltf.glb_writer import VERTICES, GlbWriter
+from illumcli.mesh_files.gltf.instances import distinct_meshes, forget_extension
+from illumcli.mesh_files.gltf.placed_values import PrimitiveValues, placed_values
+from illumcli.mesh_files.gltf.reindex import reindex, vertex_colors
+from illumcli.mesh_files.output_mesh import VertexData
+from illumcli.mesh_files.split import split_vertices
+
+COMPRESSION = "KHR_draco_mesh_compression"
+
+
+def extend_glb(path: Path, source: Path, data: VertexData) -> list[str]:
+    """Write a glTF file as a GLB with `data` added to its primitives as attributes `_NAME`.
+
+    A mesh that several nodes have is copied for nodes with other values; copies share all other attributes.
+    Instances with different values become nodes. The vertices of a primitive are split if corners of one
+    vertex have different values.
+
+    Parameters
+    ----------
+    data : VertexData
+        Rows in the order of `gltf.read`.
+
+    Returns
+    -------
+    list of str
+        The parts of the document that the file does not have.
+    """
+    # The document in one chunk, with a mesh for each distinct set of values.
+    left_out: list[str] = []
+    document, writer = embedded(open_document(source), left_out)
+    asset = document.json["asset"]
+    extras = asset.get("extras")
+    asset["extras"] = {**(extras if isinstance(extras, dict) else {}), "illum": data.sealed_about()}
+    meshes = distinct_meshes(document, placed_values(document, data))
+
+    # Add the values.
+    owned = _replaceable(document)
+    for mesh, values_of_primitives in meshes.items():
+        for values in values_of_primitives:
+            primitive = document.json["meshes"][mesh]["primitives"][values.number]
+            if COMPRESSION in extensions(primitive):
+                del primitive["extensions"][COMPRESSION]
+                left_out.append(f"the compressed form of primitives ({COMPRESSION})")
+            left_out += _add_values(document, writer, primitive, values, data.channels, owned)
+    if not any(COMPRESSION in extensions(each) for each in _primitives(document)):
+        forget_extension(document.json, COMPRESSION)
+    writer.write(path)
+    return list(dict.fromkeys(left_out))
+
+
+def _add_values(
+    document: Document,
+    writer: GlbWriter,
+    primitive: dict[str, Any],
+    values: PrimitiveValues,
+    channels: tuple[int, ...],
+    owned: set[int],
+) -> list[str]:
+    """Add values to a primitive. Returns the attributes that it loses.
+
+    Parameters
+    ----------
+    channels
+        Of the colour that receive `COLOR_0` of the values.
+    owned
+        Accessors that may be replaced.
+    """
+    # Split the vertices if their corners differ.
+    left_out: list[str] = []
+    corners = values.triangles.ravel()
+    count = len(next(iter(values.columns.values())))
+    tables = [each.reshape(len(corners), -1) for each in values.at_corners.values()]
+    split = split_vertices(corners, count, tables)
+    attributes = primitive["attributes"]
+    former = {name: attributes.pop(name, None) for name in values.columns if name != "COLOR_0"}
+    if len(split.source) > count:
+        left_out += reindex(document, writer, primitive, split.source, split.of_corner)
+
+    # Add the columns.
+    for name, column in split.columns(values.columns, values.at_corners).items():
+        if name == "COLOR_0":
+            colors = vertex_colors(document, attributes, len(column))
+            colors[:, channels] = column[:, None] / 255
+            attributes[name] = writer.table(np.rint(255 * colors).astype(np.uint8), VERTICES, normalized=True)
+        elif (number := former[name]) in owned:
+            writer.replace_table(number, column.astype(np.float32), VERTICES)
+            attributes[name] = number
+        else:
+            attributes[name] = writer.table(column.astype(np.float32), VERTICES)
+    return left_out
+
+
+def _replaceable(document: Document) -> set[int]:
+    """Accessors that one attribute of one primitive refers to, alone with their buffer view."""
+    tables = [
+        each
+        for primitive in _primitives(document)
+        for each in (primitive.get("attributes", {}), *primitive.get("targets", []))
+    ]
+    uses = Counter(number for each in tables for number in each.values())
+    accessors = document.items("accessors")
+    views = Counter(each.get("bufferView") for each in accessors)
+    return {
+        number
+        for number, count in uses.items()
+        if count == 1
+        and views[accessors[number].get("bufferView")] == 1
+        and "sparse" not in accessors[number]
+    }
+
+
+def _primitives(document: Document) -> list[dict[str, Any]]:
+    return [primitive for mesh in document.items("meshes") for primitive in mesh.get("primitives", [])]

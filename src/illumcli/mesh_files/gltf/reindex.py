@@ -1,0 +1,69 @@
+"""Primitives of a glTF document with other vertices: copies of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.errors import InputError
+from illumcli.mesh_files.gltf.accessors import stored, table
+from illumcli.mesh_files.gltf.document import Document, printable
+from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter
+
+_ANY = (1, 2, 3, 4)
+_KEPT = ("normalized", "name", "extras", "extensions")
+"""Keys of an accessor that copies of its rows have, too."""
+
+
+def reindex(
+    document: Document,
+    writer: GlbWriter,
+    primitive: dict[str, Any],
+    source: NDArray[np.int64],
+    triangles: NDArray[np.int32],
+) -> list[str]:
+    """Give a primitive copies of its vertices. Returns the attributes that cannot be read and are left out.
+
+    Parameters
+    ----------
+    primitive : dict
+        Modified: its attributes, morph targets, indices and mode.
+    source : (N,) int64
+        The old vertex that each new one is a copy of.
+    triangles : (T, 3) int32
+        New vertices.
+    """
+    left_out: list[str] = []
+    for tables in (primitive["attributes"], *primitive.get("targets", [])):
+        for name, number in list(tables.items()):
+            try:
+                rows = stored(document, number, _ANY)[source]
+            except (InputError, IndexError):
+                del tables[name]
+                left_out.append(f"attribute {printable(name)}, which cannot be read")
+                continue
+            entry = document.item("accessors", number)
+            more = {key: entry[key] for key in _KEPT if key in entry}
+            if name == "POSITION":
+                more |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+            rows = rows[:, 0] if rows.shape[1] == 1 else rows
+            tables[name] = writer.table(rows, VERTICES, **more)
+    primitive["indices"] = writer.table(fitting(triangles.ravel(), len(source)), INDICES)
+    primitive.pop("mode", None)
+    return left_out
+
+
+def fitting(indices: NDArray[Any], count: int) -> NDArray[Any]:
+    """Indices into `count` vertices in a type whose largest value, which is reserved, is not in use."""
+    return indices.astype(np.uint16 if count < 65536 else np.uint32)
+
+
+def vertex_colors(document: Document, attributes: dict[str, Any], count: int) -> NDArray[np.float64]:
+    """(N, 4) linear colours of vertices, white and opaque if they have none."""
+    colors = np.ones((count, 4))
+    if "COLOR_0" in attributes:
+        rows = table(document, attributes["COLOR_0"], (3, 4), fractions=True)
+        colors[:, : rows.shape[1]] = rows
+    return colors

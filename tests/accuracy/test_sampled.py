@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from illumcli.accuracy.sampled import OF_SAMPLING, Sampling, sampled_layer
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run
 from illumcli.render_graph.keys import Keys
 from illumcli.render_graph.tile_nodes import RenderStats
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 from ring import RING
 
 SAMPLING = Sampling(2, 4, "spiral", 1)
@@ -69,7 +69,6 @@ def test_a_reconstructed_image_is_that_of_a_render(tmp_path, adaptive):
     counts = ("camera.samples=4", "obscurance.samples=2", "obscurance.reconstruct=true", "seed=3")
     stats = RenderStats()
     steps = planned(load(path, [own, *counts]), ["beauty"])
-    made = [band.layers["beauty"] for band in bands(steps, run_once(steps, Run()), Run(stats))]
-    assert values.tobytes() == np.concatenate(made).tobytes()
+    assert values.tobytes() == layers_of(steps, Run(stats))["beauty"].tobytes()
     assert rays == sum(stats.rays.values())
     assert (stats.refined > 0) == (adaptive == "null")

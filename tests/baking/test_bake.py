@@ -23,13 +23,12 @@ from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.progress import no_progress
 from illumcli.rays.sampling import compact_spiral_table
-from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
 from illumcli.visibility.baked import read_npz
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Method
 from illumcli.visibility.open_hemisphere import ClusterTree
-from planned import planned
+from planned import layers_of, planned
 
 CUBE = """
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
@@ -639,9 +638,7 @@ def test_a_picture_reads_the_values_of_corners(hard_cube, text_mesh, tmp_path):
         "objects: [{name: mesh, mesh: {file: mesh.obj, obscurance: cube.npz}}]\n"
     )
     scene = load(text_mesh(text, "scene.yaml"))
-    steps = planned(scene, ["obscurance"])
-    rows = bands(steps, run_once(steps, Run()), Run(threads=1))
-    w = np.concatenate([band.layers["obscurance"] for band in rows])
+    w = layers_of(planned(scene, ["obscurance"]))["obscurance"]
     np.testing.assert_allclose(w, 1, atol=1e-6)  # the top, whose vertices have 0.7 in the mean
 
 

@@ -9,14 +9,13 @@ import pytest
 
 from illumcli.accuracy.audit import Audit, audited_layer
 from illumcli.color import LUMINANCE
-from illumcli.commands import work
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render import render_scene
 from illumcli.errors import LimitError
 from illumcli.images.reader import read_image
 from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -47,10 +46,9 @@ def path(tmp_path_factory):
 def luminance(path, *overrides):
     """(H, W) luminance of the beauty over its background."""
     steps = planned(load(path, overrides), ["beauty"])
-    made = list(bands(steps, run_once(steps, Run()), Run(threads=2)))
-    rows = [{name: values.astype(float) for name, values in band.layers.items()} for band in made]
+    layers = {name: values.astype(float) for name, values in layers_of(steps, Run(threads=2)).items()}
     background = np.asarray(steps.graph.scene.film.background or (0, 0, 0))
-    return np.concatenate([row["beauty"] + (1 - row["alpha"]) * background for row in rows]) @ LUMINANCE
+    return (layers["beauty"] + (1 - layers["alpha"]) * background) @ LUMINANCE
 
 
 def errors(path, *overrides, threads=2, side=None):
@@ -141,7 +139,7 @@ def test_a_sweep_audits_for_it_alone(path, illum, tmp_path):
 
 
 def test_pictures_that_are_too_large_to_be_held_are_refused(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(work, "MOST_PIXELS", 160 * 120 - 1)
+    monkeypatch.setattr("illumcli.accuracy.sampled_blocks.MOST_PIXELS", 160 * 120 - 1)
     with pytest.raises(LimitError, match=r"camera main: the layer error .* obscurance\.reconstruct=false"):
         rendered(path, tmp_path, only=("error",))
     rendered(path, tmp_path, only=("beauty",))

@@ -14,11 +14,12 @@ from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
-from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.execute import RenderStats, Run
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
 from metamorphic.scenes import Case
+from planned import layers_of
 
 Pictures = dict[tuple[str, str], NDArray[np.float32]]
 """(camera, layer) -> (height, width, channels)."""
@@ -45,9 +46,7 @@ def pictures(
     out: Pictures = {}
     for view in graph.views:
         plan = plan_view(graph, outputs, view, run.cache)
-        rows = list(bands(plan, run_once(plan, run), run, side=side))
-        for name in rows[0].layers:
-            out[view.name, name] = np.concatenate([row.layers[name] for row in rows])
+        out |= {(view.name, name): values for name, values in layers_of(plan, run, side).items()}
     return out
 
 

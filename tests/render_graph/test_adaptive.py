@@ -16,12 +16,12 @@ from illumcli.commands.render import render_scene
 from illumcli.film.tiles import tiles
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
-from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.execute import RenderStats, Run
 from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.replicates import LUMINANCE
 from illumcli.render_graph.schedule import outputs_of, reached, shared_keys
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -55,8 +55,7 @@ def rendered(path, only=ALL, threads=1, side=None, overrides=()):
     loaded = load(path, overrides)
     steps = planned(loaded, only)
     tally = RenderStats()
-    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=threads), side=side))
-    return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally
+    return layers_of(steps, Run(tally, threads=threads), side), tally
 
 
 @pytest.fixture(scope="module")
@@ -337,8 +336,7 @@ def cached(path, *overrides, store=None, memory=None, only=ALL, threads=1, side=
     loaded = load(path, overrides)
     run = Run(RenderStats(), Cache(store, memory), threads)
     plan = planned(loaded, only, run.cache)
-    parts = list(bands(plan, run_once(plan, run), run, side=side))
-    layers = {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}
+    layers = layers_of(plan, run, side)
     others = plan.all_samples.lookup.reused if plan.all_samples else {}
     return layers, dict(run.stats.rays), {**plan.lookup.reused, **others}
 

@@ -12,11 +12,11 @@ from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.store import Store
 from illumcli.render_graph.build import build
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run
 from illumcli.render_graph.schedule import outputs_of, shared_keys
 from illumcli.render_graph.tile_nodes import RenderStats
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -50,8 +50,7 @@ def rendered(path, *overrides, only=LAYERS, threads=1, side=None, cache=None):
     stats = RenderStats()
     run = Run(stats, threads=threads) if cache is None else Run(stats, cache, threads)
     steps = planned(load(path, overrides), only, cache)
-    made = list(bands(steps, run_once(steps, run), run, side=side))
-    return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, stats
+    return layers_of(steps, run, side), stats
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from illumcli.render_graph.execute import Run, at_pixels, bands, run_once
+from illumcli.render_graph.execute import Run, at_pixels, run_once
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -24,10 +24,9 @@ def test_scattered_pixels_are_those_of_the_picture(tmp_path):
     loaded = load(path)
     steps = planned(loaded, ["beauty", "obscurance", "depth"])
     shared, run = run_once(steps, Run()), Run(threads=2)
-    whole = list(bands(steps, shared, run))
+    whole = layers_of(steps, run, shared=shared)
     x, y = np.array([23, 0, 11, 12, 3]), np.array([0, 17, 9, 9, 4])
     some = at_pixels(steps, shared, run, x, y)
     for name in ("beauty", "obscurance", "depth"):
-        picture = np.concatenate([band.layers[name] for band in whole])
-        np.testing.assert_array_equal(some[name], picture[y, x])
+        np.testing.assert_array_equal(some[name], whole[name][y, x])
     assert some["beauty"].any()

@@ -21,7 +21,7 @@ from illumcli.render_graph.known import with_known
 from illumcli.render_graph.pipeline import plan_view
 from illumcli.render_graph.schedule import outputs_of, shared_keys
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -96,8 +96,7 @@ def picture(path, *overrides, store=None, memory=None, only=ALL, threads=1, side
     loaded = load(path, overrides)
     run = Run(RenderStats(), Cache(store, memory), threads)
     plan = planned(loaded, only, run.cache)
-    parts = list(bands(plan, run_once(plan, run), run, side=side))
-    layers = {name: np.concatenate([part.layers[name] for part in parts]) for name in parts[0].layers}
+    layers = layers_of(plan, run, side)
     return layers, plan.computed, dict(run.stats.rays), plan.lookup.reused
 
 

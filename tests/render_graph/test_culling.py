@@ -21,7 +21,7 @@ from illumcli.images.reader import read_image
 from illumcli.layers import NAMES
 from illumcli.render_graph.build import build
 from illumcli.render_graph.culling import why_all
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run, run_once
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.schedule import outputs_of
 from illumcli.scene.load import load
@@ -36,6 +36,7 @@ from illumcli.visibility.culling import (
     outside_frustum,
     separated,
 )
+from planned import layers_of
 
 SCENE = """
 version: 1
@@ -73,9 +74,8 @@ def pictures(path, overrides=(), only=ALL, leave_out=True, store=None):
     for view in graph.views:
         plan = plan_view(graph, outputs, view, run.cache)
         shared = run_once(plan, run)
-        parts = list(bands(plan, shared, run))
-        for name in parts[0].layers:
-            out[view.name, name] = np.concatenate([part.layers[name] for part in parts])
+        layers = layers_of(plan, run, shared=shared)
+        out |= {(view.name, name): values for name, values in layers.items()}
     names = loaded.scene.object_names()
     triangles = len(shared["geometry"].triangles) if "geometry" in shared else None
     return out, [names[number] for number in graph.culled], triangles

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -31,9 +30,7 @@ def rendered(tmp_path):
     def render(*overrides):
         loaded = load(path, overrides)
         steps = planned(loaded)
-        made = list(bands(steps, run_once(steps, Run()), Run(threads=1)))
-        layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
-        return layers, {step.output for step in steps.tile}
+        return layers_of(steps), {step.output for step in steps.tile}
 
     return render
 

@@ -15,7 +15,7 @@ from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.render_graph.explain import expected_rays, why_not
 from illumcli.render_graph.schedule import Plan
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -272,10 +272,7 @@ def test_a_dark_light_a_black_ambient_and_no_obscurance_cost_nothing(tmp_path):
 )
 def test_worked_examples_of_the_texts(root, scene, overrides, value):
     loaded = load(root / "scenes" / f"{scene}.yaml", overrides)
-    steps = planned(loaded)
-    tally = RenderStats()
-    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=1)))
-    beauty = np.concatenate([band.layers["beauty"] for band in made])
+    beauty = layers_of(planned(loaded))["beauty"]
     centre = beauty[beauty.shape[0] // 2, beauty.shape[1] // 2]
     np.testing.assert_allclose(centre, value, rtol=1e-6)
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.scene.load import load
 from illumcli.shading.rates import RATES
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -30,11 +29,7 @@ def picture(folder, mesh, rate, *layers):
     """Layers of a mesh, given as the text of a PLY file."""
     (folder / "a.ply").write_text(mesh)
     (folder / "scene.yaml").write_text(SCENE.format(rate=rate))
-    loaded = load(folder / "scene.yaml")
-    steps = planned(loaded, layers)
-    tally = RenderStats()
-    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=1)))
-    return {name: np.concatenate([band.layers[name] for band in made]) for name in layers}
+    return layers_of(planned(load(folder / "scene.yaml"), layers))
 
 
 def ply(vertices, colors, normals, faces):
@@ -112,10 +107,8 @@ def test_the_winding_alone_says_where_computed_normals_point(tmp_path):
     (tmp_path / "a.ply").write_text(text)
     scene = SCENE.format(rate="phong").replace("file: a.ply", "file: a.ply, normals: {source: computed}")
     (tmp_path / "scene.yaml").write_text(scene)
-    loaded = load(tmp_path / "scene.yaml")
-    steps = planned(loaded, ("normal", "geometric_normal"))
-    made = list(bands(steps, run_once(steps, Run()), Run(threads=1)))
-    n, ng = (np.concatenate([band.layers[name] for band in made]) for name in ("normal", "geometric_normal"))
+    layers = layers_of(planned(load(tmp_path / "scene.yaml"), ("normal", "geometric_normal")))
+    n, ng = layers["normal"], layers["geometric_normal"]
     seen = np.linalg.norm(ng, axis=-1) > 0.99
     np.testing.assert_allclose(n[seen], ng[seen], atol=1e-5)
     seen_from_above = n[seen][:, 1] > 0

@@ -7,10 +7,10 @@ import pytest
 
 from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
-from illumcli.render_graph.execute import Run, at_pixels, bands, run_once
+from illumcli.render_graph.execute import Run, at_pixels, run_once
 from illumcli.render_graph.explain import expected_rays
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -36,9 +36,7 @@ def path(tmp_path_factory):
 
 def picture(path, *overrides, only=LAYERS, threads=1, side=None, cache=None):
     run = Run(threads=threads) if cache is None else Run(cache=cache, threads=threads)
-    steps = planned(load(path, overrides), only, cache)
-    made = list(bands(steps, run_once(steps, run), run, side=side))
-    return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
+    return layers_of(planned(load(path, overrides), only, cache), run, side)
 
 
 @pytest.mark.parametrize("samples", [1, 3])

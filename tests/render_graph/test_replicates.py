@@ -10,11 +10,11 @@ import pytest
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.plan_table import plan_table
 from illumcli.commands.render import render_scene
-from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
+from illumcli.render_graph.execute import RenderStats, Run
 from illumcli.render_graph.explain import expected_rays, plan_data
 from illumcli.render_graph.replicates import LUMINANCE
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -40,8 +40,7 @@ def layers(path, *overrides, only=("beauty", "error")):
     """Layer -> (H, W, channels), and the rays by step."""
     loaded = load(path, overrides)
     steps, tally = planned(loaded, only), RenderStats()
-    made = list(bands(steps, run_once(steps, Run(tally)), Run(tally, threads=2)))
-    return {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}, tally.rays
+    return layers_of(steps, Run(tally, threads=2)), tally.rays
 
 
 def shown(path, *overrides):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import Run, bands, run_once
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 SCENE = """
 version: 1
@@ -27,11 +26,7 @@ def highlight(tmp_path):
     def render(more, mesh="{shape: plane, size: [8, 8]}"):
         path = tmp_path / "scene.yaml"
         path.write_text(SCENE.format(more=more, mesh=mesh))
-        loaded = load(path)
-        steps = planned(loaded)
-        shared = run_once(steps, Run())
-        parts = [band.layers["beauty"] for band in bands(steps, shared, Run(threads=1))]
-        return np.concatenate(parts)[..., 0]
+        return layers_of(planned(load(path)))["beauty"][..., 0]
 
     return render
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from illumcli.geometry.repairs import NO_GRAIN, NORMALS_OF_FILE
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run, run_once
 from illumcli.render_graph.repairs import repairs
 from illumcli.scene.load import load
 from illumcli.scene.scene_file import unused_lines
-from planned import planned
+from planned import layers_of, planned
 
 BASE = """version: 1
 film: {width: 9, height: 8, samples: 2}
@@ -93,9 +93,7 @@ def lines(loaded):
 
 
 def pixels(loaded):
-    steps = planned(loaded)
-    made = bands(steps, run_once(steps, Run()), Run(threads=1))
-    return np.concatenate([band.layers["beauty"] for band in made])
+    return layers_of(planned(loaded))["beauty"]
 
 
 @pytest.mark.parametrize("name", CASES)

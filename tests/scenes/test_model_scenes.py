@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run
 from illumcli.scene.load import load
-from planned import planned
+from planned import layers_of, planned
 
 
 @pytest.fixture
@@ -18,9 +18,7 @@ def picture(root):
         loaded = load(
             root / "scenes" / f"{name}.yaml", ["film.samples=1", "film.background=null", *overrides]
         )
-        steps = planned(loaded, ["beauty", "object_id"], number=camera)
-        made = list(bands(steps, run_once(steps, Run()), Run(threads=2)))
-        return {layer: np.concatenate([band.layers[layer] for band in made]) for layer in made[0].layers}
+        return layers_of(planned(loaded, ["beauty", "object_id"], number=camera), Run(threads=2))
 
     return render
 

@@ -18,10 +18,10 @@ from illumcli.geometry.repairs import Repair
 from illumcli.images.writer import ImageWriter
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.models.oren_nayar import OrenNayar
-from illumcli.render_graph.execute import Run, bands, run_once
+from illumcli.render_graph.execute import Run, run_once
 from illumcli.scene.load import load
 from illumcli.shading.textures import Range, bilinear, nearest, parameter_range
-from planned import planned
+from planned import layers_of, planned
 
 F = np.float32
 FOUR = Texels(np.array([[[1.0], [2.0]], [[3.0], [4.0]]], F), (0,))  # the row of 3 and 4 is the bottom one
@@ -147,8 +147,7 @@ def picture():
         loaded = load(path, overrides)
         steps = planned(loaded, only)
         shared = run_once(steps, Run())
-        made = list(bands(steps, shared, Run(threads=1), side=side))
-        layers = {name: np.concatenate([band.layers[name] for band in made]) for name in made[0].layers}
+        layers = layers_of(steps, side=side, shared=shared)
         repairs = {}
         for buffer in shared.values():
             repairs |= getattr(buffer, "repairs", {})

@@ -158,6 +158,8 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
     if report.clamped:
         fact = f"{report.clamped} values beyond 65504, the largest of half precision, are written as that"
         say(f"{done.scene}: {fact}; outputs.colour: float keeps them")
+    for name, file in report.obscurance_files.items():
+        say(f"{done.scene}: {name}: obscurance from {file}, 0 rays")
     for camera, reused in report.reused.items():
         for name, where in reused.items():
             say(f"reused {name} of {camera}: from the {where}")

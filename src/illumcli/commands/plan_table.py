@@ -35,6 +35,7 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
         _row("tile", [name for name in part["tile"] if name not in reused]),
         _row("reused", list(reused)),
         _row("rays", [f"{name} {count:,}" for name, count in part["expected_rays"].items()]),
+        _row("baked", baked_lines(part["obscurance_files"])),
         _row("", [f"traced as {part['ray_loop']}"] if part["ray_loop"] else []),
         _row("memory", [f"{name} {size / 2**20:,.1f} MiB" for name, size in part["expected_bytes"].items()]),
         _time_row(part["expected_time"]),
@@ -47,6 +48,11 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
     if "variants" in part:
         lines += _lines_of_variants(part["variants"])
     return [line for line in lines if line.strip()]
+
+
+def baked_lines(files: Mapping[str, str]) -> list[str]:
+    """What is said of the files of obscurance, by object."""
+    return [f"{name}: obscurance from {file}, 0 rays" for name, file in files.items()]
 
 
 def _lines_of_variants(planned: Mapping[str, Any]) -> list[str]:

@@ -22,7 +22,7 @@ from illumcli.render_graph.build import Graph
 from illumcli.render_graph.culling import without_objects
 from illumcli.render_graph.execute import Run, run_once
 from illumcli.render_graph.expected_time import units_of
-from illumcli.render_graph.explain import why_not
+from illumcli.render_graph.explain import obscurance_files, why_not
 from illumcli.render_graph.framing import place_cameras
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.proportions import disproportion_lines
@@ -112,6 +112,7 @@ def rendered(
         skipped=skipped,
         repairs=repaired,
         reused=reused,
+        obscurance_files=obscurance_files(graph, outputs),
         warnings=tuple(warnings),
         clamped=clamped,
         standard_error=standard_error,

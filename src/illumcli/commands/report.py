@@ -42,6 +42,8 @@ class Report(Value):
     """Pixels that adaptive antialiasing gave all samples."""
     reused: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """Camera -> buffer -> where it was loaded from: `memory` or `store`."""
+    obscurance_files: Mapping[str, str] = field(default_factory=dict)
+    """Object -> the file that its obscurance is read from: it cast no obscurance rays."""
     warnings: tuple[str, ...] = ()
     clamped: int = 0
     error: Mapping[str, float] = field(default_factory=dict)

@@ -46,6 +46,8 @@ class Mesh(Record):
     begin with the mesh's folder; in a cached mesh they are relative to it."""
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
     """Material name -> key -> the colour that replaces its texture; white by default."""
+    occlusion: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Material name -> keys of a texture whose red channel is obscurance, and its `strength`."""
     material_repairs: Repairs = field(default_factory=dict)
     """Differences from the material library; reported if a scene uses the material."""
     repairs: Repairs = field(default_factory=dict)

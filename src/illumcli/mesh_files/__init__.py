@@ -63,6 +63,17 @@ def companions(path: Path) -> list[Path]:
     return files
 
 
+def holds_obscurance(path: Path) -> bool:
+    """True if the header of a mesh file announces obscurance, at vertices or in textures; False if it is
+    faulty, which its reader reports."""
+    name = _formats().get(path.suffix.lower())
+    holds = getattr(_module(name), "holds_obscurance", None) if name else None
+    try:
+        return bool(holds and holds(path))
+    except (InputError, OSError):
+        return False
+
+
 @cache
 def _formats() -> Mapping[str, str]:
     """Suffix -> module."""

@@ -41,6 +41,7 @@ class RawMesh(Record):
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # (V,) or (V, k) each
     materials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
+    occlusion: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     material_repairs: Repairs = field(default_factory=dict)
     repairs: Repairs = field(default_factory=dict)  # repairs of the reader
 
@@ -97,6 +98,7 @@ def checked_mesh(path: Path, raw: RawMesh, place: Place = numbered) -> Mesh:
         attributes={name: _finite(name, values, noted, place) for name, values in raw.attributes.items()},
         materials=raw.materials,
         substitutes=raw.substitutes,
+        occlusion=raw.occlusion,
         material_repairs=raw.material_repairs,
         repairs=noted,
     )

@@ -125,6 +125,17 @@ def companions(path: Path) -> list[Path]:
     return files_named(path, _TEXTURE.findall, most=_ply.LONGEST_HEADER)
 
 
+def holds_obscurance(path: Path) -> bool:
+    """True if vertices have baked obscurance, in a file with a sound header.
+
+    `quality` alone does not count: other programs write anything under this name.
+    """
+    with path.open("rb") as file:
+        data = file.read(_ply.LONGEST_HEADER)
+    vertex = [each for each in _ply.header(path, data, {}).elements if each.name == "vertex"]
+    return any(prop.name == "obscurance" for each in vertex for prop in each.properties)
+
+
 def _refuse_words(file: _File, vertices: NDArray[np.float64], corners: Ints) -> None:
     """Refuse the first used vertex whose coordinates are not numbers."""
     unknown: NDArray[np.bool_] = np.any(np.isnan(vertices), axis=1)

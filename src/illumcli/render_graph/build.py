@@ -16,6 +16,7 @@ from illumcli.film.view import View, depth, rays, samples, view_vectors
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import polygon_centres, scene_uvs, triangle_normals
 from illumcli.graph import Node, topological_order
+from illumcli.images.textures import Images
 from illumcli.rays.camera import framed
 from illumcli.rays.corner_weights import corner_weights
 from illumcli.rays.interaction import (
@@ -32,16 +33,18 @@ from illumcli.rays.interaction import (
 from illumcli.records import Value
 from illumcli.render_graph import needs, stages
 from illumcli.render_graph.build_adaptive import FITTED, adaptive_nodes
-from illumcli.render_graph.build_geometry import baked_files, geometry_nodes
+from illumcli.render_graph.build_geometry import baked_files, baked_mesh_nodes, geometry_nodes
 from illumcli.render_graph.build_lights import light_nodes, sum_nodes
 from illumcli.render_graph.build_materials import material_nodes
 from illumcli.render_graph.replicates import error_nodes
+from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Obscurance, Scene
 from illumcli.shading.grain import tangents
 from illumcli.shading.materials import material, material_id
+from illumcli.shading.occlusion_maps import mapped_obscurance, occlusion_maps
 from illumcli.shading.rates import RATES, normal, normals_of_points, obscurance_normals, point_weights, points
-from illumcli.visibility.baked_corners import baked, baked_obscurance
+from illumcli.visibility.baked_corners import Files, baked, baked_obscurance
 from illumcli.visibility.hemisphere import hemispheres
 from illumcli.visibility.object_pixels import object_pixels, obscurance_of_samples, pixel_pairs
 from illumcli.visibility.obscurance import baked_or_open, obscurance_method
@@ -182,6 +185,8 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) 
     """Nodes of obscurance, traced or baked."""
     # Which inputs w has.
     values = baked_files(scene, loaded, files)
+    of_meshes = baked_mesh_nodes(scene, loaded, files)
+    meshes = {"obscurance_meshes": "obscurance_meshes"} if of_meshes else {}
     some_baked = any(file for _, file in values)
     settings = scene.obscurance or Obscurance()
     settings = settings.model_copy(update={"reconstruct": None})  # no ray depends on it
@@ -211,9 +216,21 @@ def _obscurance_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) 
         Node.of(hemispheres, **axes),
         Node.of(open_triangles),
         Node.of(partial(known_open, settings.samples), "known_open"),
-        Node.of(partial(baked, values), "baked"),
-        Node.of(baked_obscurance),
+        *of_meshes,
+        Node.of(partial(baked, values), "baked", **meshes),
+        *_baked_nodes(scene, loaded, values, meshes),
         *nodes,
+    ]
+
+
+def _baked_nodes(scene: Scene, loaded: SceneFile, values: Files, meshes: Mapping[str, str]) -> list[Node]:
+    """Nodes of w from files; only mesh files and images may have textures."""
+    if not needs.may_have_occlusion_maps(scene):
+        return [Node.of(baked_obscurance)]
+    images = Images({}, partial(resolve, loaded))
+    return [
+        Node.of(partial(occlusion_maps, values, images), "occlusion_maps", **meshes),
+        Node.of(mapped_obscurance, "baked_obscurance"),
     ]
 
 

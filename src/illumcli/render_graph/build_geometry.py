@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 
 from illumcli.cache.fingerprint import FileFingerprint, FileFingerprints
 from illumcli.geometry.bounds import implied_widths
@@ -15,7 +16,7 @@ from illumcli.geometry.scene_geometry import (
 from illumcli.geometry.scene_repairs import repairs, undirected, unnamed
 from illumcli.geometry.shapes._base import Shape
 from illumcli.graph import Node
-from illumcli.mesh_files import companions
+from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.rays.embree import tracer
 from illumcli.rays.embree_library import embree_library
 from illumcli.render_graph import needs, stages
@@ -147,6 +148,24 @@ def baked_files(
     """The name of each object and the file of its baked obscurance, if any."""
     paths = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
     return tuple(
-        (name, None if path is None else files.of(path, partial(resolve, loaded)))
+        (name, None if path is None else files.of(path, partial(resolve, loaded), companions))
         for name, path in zip(scene.object_names(), paths, strict=True)
     )
+
+
+def baked_mesh_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> tuple[Node, ...]:
+    """Nodes of the mesh files that hold the obscurance of objects, and of the file of each object; none if no
+    object has one."""
+    paths = [source.obscurance if isinstance(source, MeshFile) else None for _, source in _sources(scene)]
+    names = [path if path is not None and is_mesh_file(Path(path)) else None for path in paths]
+    number = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name is not None))}
+    if not number:
+        return ()
+    which = tuple(None if name is None else number[name] for name in names)
+    of_file = {name: f"mesh:{needs.mesh_name(scene, MeshFile(file=name))}" for name in number}
+    nodes = [
+        Node.of(partial(stages.mesh, _content(loaded, files, MeshFile(file=name))), output)
+        for name, output in of_file.items()
+    ]
+    parts = {f"mesh{k}": of_file[name] for name, k in number.items()}
+    return *nodes, Node("obscurance_meshes", partial(stages.obscurance_meshes, which), parts)

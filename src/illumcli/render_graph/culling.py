@@ -131,10 +131,13 @@ def without_objects(graph: Graph, numbers: tuple[int, ...]) -> Graph:
             nodes[name] = replace(node, inputs={**node.inputs, "meshes": "every_mesh"})
 
     # No baked values of culled objects.
-    bound: Any = nodes["baked"].function
     culled = frozenset(numbers)
-    kept = tuple((name, None if k in culled else file) for k, (name, file) in enumerate(bound.args[0]))
-    nodes["baked"] = replace(nodes["baked"], function=partial(bound.func, kept))
+    for output in ("baked", "occlusion_maps"):
+        if output in nodes:
+            bound: Any = nodes[output].function
+            files, *others = bound.args
+            kept = tuple((name, None if k in culled else file) for k, (name, file) in enumerate(files))
+            nodes[output] = replace(nodes[output], function=partial(bound.func, kept, *others))
     known = dict(graph.known)
     if "meshes" in known:
         known["every_mesh"] = known.pop("meshes")

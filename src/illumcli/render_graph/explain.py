@@ -12,6 +12,7 @@ from illumcli.cache.codec import codec_of
 from illumcli.film.view import View
 from illumcli.layers import Layer
 from illumcli.rays.ray_loop import ray_loop_name
+from illumcli.render_graph import needs
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.build_adaptive import FITTED, OPEN, REFINED
 from illumcli.render_graph.culling import why_all
@@ -53,6 +54,11 @@ def why_not(graph: Graph, outputs: Sequence[Layer], plan: Plan | None = None) ->
         skipped = (name for name in order if name not in taken)
         reasons |= dict.fromkeys(skipped, CACHED)
     return reasons
+
+
+def obscurance_files(graph: Graph, outputs: Sequence[Layer]) -> dict[str, str]:
+    """The files that obscurance is read from, by object, if an output needs it."""
+    return needs.files_of_obscurance(graph.scene) if "obscurance" in reached(graph, outputs) else {}
 
 
 def which_objects(graph: Graph, outputs: Sequence[Layer]) -> str:
@@ -131,6 +137,7 @@ def plan_data(plan: Plan, expected: Mapping[str, int]) -> dict[str, Any]:
         "objects": which_objects(whole, plan.outputs),
         "once": [node.output for node in plan.once],
         "tile": [node.output for node in plan.tile],
+        "obscurance_files": obscurance_files(whole, plan.outputs),
         "skipped": why_not(whole, plan.outputs, plan),
         "expected_rays": rays,
         "ray_loop": ray_loop_name() if rays else None,

@@ -149,6 +149,17 @@ def is_baked(scene: Scene) -> list[bool]:
     return [getattr(source_of(scene, thing.mesh), "obscurance", None) is not None for thing in scene.objects]
 
 
+def may_have_occlusion_maps(scene: Scene) -> bool:
+    """True if a file of obscurance may have it in textures: all but .npz."""
+    return any(not file.lower().endswith(".npz") for file in files_of_obscurance(scene).values())
+
+
+def files_of_obscurance(scene: Scene) -> dict[str, str]:
+    """The file of the obscurance of each object that has one, by the object's name."""
+    files = [getattr(source_of(scene, thing.mesh), "obscurance", None) for thing in scene.objects]
+    return {name: file for name, file in zip(scene.object_names(), files, strict=True) if file is not None}
+
+
 def all_baked(scene: Scene) -> bool:
     """True if no object needs obscurance rays."""
     return bool(scene.objects) and all(is_baked(scene))

@@ -56,17 +56,26 @@ def mesh(source: FileFingerprint | Shape) -> Mesh:
 
     # A mesh is cached by its content: paths of textures become relative to its folder, wherever that is.
     folder = source.path.parent
-    libraries = {
-        name: textures_at(keys, lambda path: str(Path(path).relative_to(folder)))
-        for name, keys in from_file.materials.items()
-    }
-    return replace(from_file, materials=libraries)
+    libraries, occlusion = (
+        {
+            name: textures_at(keys, lambda path: str(Path(path).relative_to(folder)))
+            for name, keys in described.items()
+        }
+        for described in (from_file.materials, from_file.occlusion)
+    )
+    return replace(from_file, materials=libraries, occlusion=occlusion)
 
 
 def meshes(which: tuple[int, ...], **parts: Mesh) -> tuple[Mesh, ...]:
     """The mesh of every object; `which` holds the number of each object's mesh among `parts`."""
     sources = list(parts.values())
     return tuple(sources[k] for k in which)
+
+
+def obscurance_meshes(which: tuple[int | None, ...], **parts: Mesh) -> tuple[Mesh | None, ...]:
+    """The mesh in the file of every object's obscurance, if that is a mesh file; see `meshes`."""
+    sources = list(parts.values())
+    return tuple(None if k is None else sources[k] for k in which)
 
 
 def render_space(object_bounds: ObjectBounds) -> RenderSpace:

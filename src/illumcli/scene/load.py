@@ -10,7 +10,7 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from illumcli.errors import InputError
-from illumcli.mesh_files import is_mesh_file
+from illumcli.mesh_files import holds_obscurance, is_mesh_file
 from illumcli.records import Value
 from illumcli.scene.access import readable_folders
 from illumcli.scene.animation import AtFrame, Surroundings, TableFiles, at_frame, frames_of
@@ -129,8 +129,13 @@ def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> No
     studio_settings = _validated(Settings, AtFrame(given, 0), reader.problems)
     if tree is None or studio_settings is None:
         return tree
+    tree = arranged(tree, studio_settings.studio)
     mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
-    return assign(arranged(tree, studio_settings.studio), mesh, reader.problems)
+    tree = assign(tree, mesh, reader.problems) or tree
+    if not holds_obscurance(path):
+        return tree
+    baked = Override(("meshes", "subject", "obscurance"), Node(path.name, Place(str(STUDIO))), "")
+    return assign(tree, baked, reader.problems)
 
 
 def _validated(

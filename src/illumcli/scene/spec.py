@@ -89,7 +89,9 @@ class MeshFile(Description):
     materials: bool = False
     """True: import the materials of the file."""
     obscurance: str | None = None
-    """Path of an .npz file that `illum ao-bake` wrote for this mesh: no obscurance rays are cast from it."""
+    """Path of a file with the obscurance of this mesh, which casts no obscurance rays then: an .npz, .ply or
+    .glb that `illum ao-bake` wrote for it, or an image over its uv, whose red channel is read. The mesh's own
+    file may be named, too: of glTF, occlusion textures count where vertices have no obscurance."""
 
 
 def _mesh_kind(value: Any) -> str:

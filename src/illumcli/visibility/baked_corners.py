@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,24 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats
 from illumcli.errors import InputError
 from illumcli.files.located import Located
+from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.records import Record
+from illumcli.visibility.baked_meshes import (
+    User,
+    attribute_of,
+    file_vertices,
+    is_of_one_object,
+    obscurance_at_vertices,
+)
+
+if TYPE_CHECKING:
+    from illumcli.visibility.baked import Baked
+
+Files: TypeAlias = tuple[tuple[str, Located | None], ...]
+"""The name of each object, and the file of its obscurance, if any."""
 
 
 class BakedValues(Record):
@@ -25,15 +40,25 @@ class BakedValues(Record):
     repairs: Repairs
 
 
-def baked(files: tuple[tuple[str, Located | None], ...], geometry: SceneGeometry) -> BakedValues:
-    """The baked values of each object: at corners if its file has them, otherwise at vertices.
+def baked(
+    files: Files, geometry: SceneGeometry, obscurance_meshes: tuple[Mesh | None, ...] | None = None
+) -> BakedValues:
+    """The baked values of each object: at corners if its file has them, otherwise at vertices; none where the
+    file has textures.
+
+    Parameters
+    ----------
+    files
+        Name and file of each object.
+    obscurance_meshes
+        The meshes in those that are mesh files.
 
     Raises
     ------
     InputError
-        A file with values for another number of vertices.
+        A file of another mesh, or without obscurance.
     """
-    from illumcli.visibility.baked import Baked, mesh_hash, read_npz
+    from illumcli.visibility.baked import read_npz
 
     in_files: dict[Path, Baked] = {}
     tables: list[NDArray[np.float32]] = []
@@ -42,27 +67,29 @@ def baked(files: tuple[tuple[str, Located | None], ...], geometry: SceneGeometry
     repairs: dict[str, Repair] = {}
     count = 0
     for i, (name, file) in enumerate(files):
-        if file is None:
+        in_mesh = None if obscurance_meshes is None else obscurance_meshes[i]
+        if file is None or has_textures(file, in_mesh):
             continue
         number = int(geometry.placed_mesh[i])
         placed = geometry.placed[number]
-        mesh = placed.mesh
-        if file.path not in in_files:
+        if in_mesh is None and file.path not in in_files:
             in_files[file.path] = read_npz(file.path)
             if "obscurance" not in in_files[file.path].channels:
                 raise InputError(f"{file.path}: holds no obscurance; bake it with --what ao")
-        in_file = in_files[file.path]
 
         # Values of a single mesh are those of every object that has it; of several, they go by name.
-        key = file.path, number, "" if len(in_file.obscurance) == len(mesh.vertices) else name
+        if in_mesh is None:
+            is_single = len(in_files[file.path].obscurance) == len(placed.mesh.vertices)
+        else:
+            is_single = is_of_one_object(geometry, i, in_mesh)
+        key = file.path, number, "" if is_single else name
         if key not in rows:
-            at_corners = in_file.of_corners(name, mesh.corners, len(mesh.vertices))
-            if at_corners is None:
-                raise InputError(
-                    f"{file.path}: holds {len(in_file.obscurance)} values, the mesh of {name} has "
-                    f"{len(mesh.vertices)} vertices; bake it again"
-                )
-            is_other = mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in in_file.hashes()
+            if in_mesh is None:
+                at_corners, is_other = _values_of_npz(file.path, in_files[file.path], placed.mesh, name)
+            else:
+                users = tuple(k for k, (_, other) in enumerate(files) if other and other.path == file.path)
+                user = User(i, name, users)
+                at_corners, is_other = _values_of_mesh(file.path, in_mesh, geometry, user)
             rows[key] = count, is_other
             tables.append(at_corners)
             count += len(at_corners)
@@ -72,6 +99,41 @@ def baked(files: tuple[tuple[str, Located | None], ...], geometry: SceneGeometry
         first[i], has_values[i] = row - placed.first_corner, True
     values = np.concatenate([np.zeros(0, F), *tables]).astype(F)
     return BakedValues(values, first, has_values, repairs)
+
+
+def has_textures(file: Located, in_mesh: Mesh | None) -> bool:
+    """True if a file of obscurance has it in textures: images, and glTF without values at vertices."""
+    if in_mesh is None:
+        return file.path.suffix.lower() != ".npz"
+    return bool(in_mesh.occlusion) and attribute_of(in_mesh) is None
+
+
+def _values_of_npz(path: Path, in_file: Baked, mesh: Mesh, name: str) -> tuple[NDArray[np.float32], bool]:
+    """(C,) the values of an object at its mesh's corners, and whether they were baked for another mesh."""
+    from illumcli.visibility.baked import mesh_hash
+
+    at_corners = in_file.of_corners(name, mesh.corners, len(mesh.vertices))
+    if at_corners is None:
+        raise InputError(
+            f"{path}: holds {len(in_file.obscurance)} values, the mesh of {name} has "
+            f"{len(mesh.vertices)} vertices; bake it again"
+        )
+    return at_corners, mesh_hash(mesh.vertices, mesh.corners, mesh.starts) not in in_file.hashes()
+
+
+def _values_of_mesh(
+    path: Path, in_file: Mesh, geometry: SceneGeometry, user: User
+) -> tuple[NDArray[np.float32], bool]:
+    """The same, of a mesh file."""
+    values = obscurance_at_vertices(path, in_file)
+    found = file_vertices(geometry, user, in_file)
+    if found is None:
+        mesh = geometry.placed[geometry.placed_mesh[user.number]].mesh
+        raise InputError(
+            f"{path}: has {in_file.polygon_count} polygons of {len(in_file.vertices)} vertices, the mesh of "
+            f"{user.name} has {mesh.polygon_count} of {len(mesh.vertices)}, or others; bake it again"
+        )
+    return values[found.of_corner], found.is_other
 
 
 def baked_obscurance(geometry: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:

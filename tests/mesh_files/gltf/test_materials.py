@@ -251,7 +251,7 @@ def test_what_is_not_drawn_is_named(library: Any) -> None:
         MAPPED: 1,
         "textures of metal and roughness left out": 1,
         "normal textures left out": 1,
-        "occlusion textures left out": 1,
+        "occlusion textures left out (no TEXCOORD_0 to look them up by)": 1,
         "transparent materials made opaque": 1,
         "extension KHR_materials_clearcoat of materials left out": 1,
         "extension ACME_glitter of materials left out": 1,
@@ -334,3 +334,14 @@ def test_notes_on_materials_are_not_of_the_mesh(library: Any) -> None:
     mesh = library({"normalTexture": {"index": 0}})
     assert mesh.repairs == {}
     assert json.loads(json.dumps(told(mesh))) == {MAPPED: 1, "normal textures left out": 1}
+
+
+def test_occlusion_textures_have_their_coordinates_and_strength(library: Any) -> None:
+    transform = {"KHR_texture_transform": {"offset": [0.5, 0], "texCoord": 1}}
+    said = {"occlusionTexture": {"index": 1, "strength": 0.25, "extensions": transform}}
+    mesh = library(said, uv=True)
+    keys = mesh.occlusion["paint"]
+    assert (keys["strength"], keys["texture"].rpartition("/")[2]) == (0.25, "my wood.png")
+    np.testing.assert_allclose(mesh.attributes[keys["uv"]], [1, -1] * np.array(UV) / 2 + [0.5, 1])
+    assert library({"occlusionTexture": {"index": 0}}, uv=True).occlusion["paint"]["strength"] == 1
+    assert not library({}, uv=True).occlusion

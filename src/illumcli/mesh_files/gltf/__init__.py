@@ -21,14 +21,16 @@ from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh, starts_of
-from illumcli.mesh_files.gltf.document import Document, open_document, printable
+from illumcli.mesh_files.gltf.document import Document, dicts, open_document, printable
 from illumcli.mesh_files.gltf.materials import Library
 from illumcli.mesh_files.gltf.primitives import Part, parts
 
+OBSCURANCE = "_OBSCURANCE"
+"""Name of the attribute of baked obscurance."""
 _URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
-FILLED = {"color": 1.0, "alpha": 1.0}
-"""Values of attributes that a primitive lacks and others have: white and opaque (3.7.2.1)."""
+FILLED = {"color": 1.0, "alpha": 1.0, OBSCURANCE: 1.0}
+"""Values of attributes that a primitive lacks and others have: white and opaque (3.7.2.1), and open."""
 
 
 def read(path: Path) -> Mesh:
@@ -78,11 +80,22 @@ def read(path: Path) -> Mesh:
         attributes={**_shared(document, primitives), **library.coordinates()},
         materials=library.materials,
         substitutes=library.substitutes,
+        occlusion=library.occlusion,
         material_repairs=library.repairs,
         repairs=document.repairs,
     )
     place = partial(_place, primitives, firsts, starts_of(np.array(counts)).tolist())
     return checked_mesh(path, raw, place)
+
+
+def holds_obscurance(path: Path) -> bool:
+    """True if a primitive has baked obscurance, or a material an occlusion texture."""
+    document = open_document(path)
+    meshes, materials = (document.json.get(kind) for kind in ("meshes", "materials"))
+    primitives = [each for mesh in dicts(meshes) for each in dicts(mesh.get("primitives"))]
+    return any(OBSCURANCE in (each.get("attributes") or {}) for each in primitives) or any(
+        isinstance(each.get("occlusionTexture"), dict) for each in dicts(materials)
+    )
 
 
 def companions(path: Path) -> list[Path]:

@@ -265,6 +265,11 @@ def printable(name: Any) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in f"{name!s:.60}")
 
 
+def dicts(value: Any) -> list[dict[str, Any]]:
+    """The objects in a list of the JSON; none if it is no list."""
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+
+
 def is_inline(uri: str) -> bool:
     """True if a URI contains its data."""
     return uri[:5].lower() == "data:"

@@ -10,7 +10,7 @@ Ambient light is reflected by the base colour, of metals, too. KHR_materials_unl
 KHR_materials_pbrSpecularGlossiness gives diffuse and F0 directly, and alpha = (1 - glossiness)^2.
 
 The base colour is factor * texture (sRGB) * COLOR_0. Unsupported features (textures of roughness, metal,
-normals and occlusion; transparency; coats, sheen and so on) are counted, not approximated. With a texture of
+normals; transparency; coats, sheen and so on) are counted, not approximated. With a texture of
 metalness the material is not metallic.
 
 References
@@ -85,6 +85,12 @@ class Library:
             self._names[number] = f"{name} ({number})" if taken else name
         self.materials = {name: self._material(number) for number, name in self._names.items()}
         """Name -> keys of a scene's material."""
+        self.occlusion = {
+            name: keys
+            for number, name in self._names.items()
+            if number is not None and (keys := self._occlusion(number))
+        }
+        """Name -> keys of the occlusion texture, and its `strength`."""
         self.substitutes = {
             name: dict(_substitutes(self.materials[name], f": materials[{number}]"))
             for number, name in self._names.items()
@@ -148,9 +154,8 @@ class Library:
             count("textures of metal and roughness left out", where)
         if "specularGlossinessTexture" in extension(material, SPECULAR_GLOSSINESS):
             count("textures of specular and glossiness left out", where)
-        for name in ("normal", "occlusion"):
-            if f"{name}Texture" in material:
-                count(f"{name} textures left out", where)
+        if "normalTexture" in material:
+            count("normal textures left out", where)
         if material.get("alphaMode", "OPAQUE") != "OPAQUE":
             count("transparent materials made opaque", where)
         for name in extensions(material):
@@ -185,6 +190,21 @@ class Library:
             self._count(f"textures left out ({reason})", f"materials[{number}].{names[1]}")
             return factor
         return texture if factor == WHITE else {**texture, "factor": factor}
+
+    def _occlusion(self, number: int) -> dict[str, Any]:
+        """The keys of a material's occlusion texture and its `strength`; empty without a usable one."""
+        info = self._document.item("materials", number).get("occlusionTexture")
+        if info is None:
+            return {}
+        try:
+            texture = self._texture(number, info)
+        except _Missing:
+            return {}
+        except InputError as error:
+            where = f"materials[{number}].occlusionTexture"
+            self._count(f"occlusion textures left out ({self._document.reason(error)})", where)
+            return {}
+        return {**texture, "strength": min(max(_number(info, "strength", 1.0), 0.0), 1.0)}
 
     def _texture(self, number: int, info: Any) -> dict[str, Any]:
         """The keys of a texture; refused if it cannot be used."""

@@ -25,7 +25,7 @@ FOLDERS = (
     "visibility mesh_files",
     "film",
     "rays files",
-    "lights models geometry",
+    "lights models geometry atlas",
     "schema",
 )
 """From the top down: a folder imports from those below its line, and from single files beside them."""

@@ -439,7 +439,7 @@ def test_only_what_is_asked_for_is_written(text_mesh, tmp_path):
 def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
     path = text_mesh(STEP)
     for arguments, said in (
-        (["-o", "x.png"], "no writer"),
+        (["-o", "x.jpg"], "no writer"),
         (["-o", "x.npz", "--tau", "2"], "--tau belongs to"),
         (["-o", "x.npz", "--falloff", "linear"], "--max-distance"),
         (["-o", "x.npz", "--samples", "4", "--target-error", "0.1"], "exclude each other"),

@@ -1,4 +1,4 @@
-"""Bakes obscurance at every vertex of a mesh or scene, with its standard error, into files of its meshes."""
+"""Bakes channels at the vertices and texels of a mesh or scene, with their standard errors, into files."""
 
 from __future__ import annotations
 
@@ -9,29 +9,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from illumcli import __version__
+from illumcli.baking.at_texels import baked_texture, sampled_at_texels
 from illumcli.baking.at_vertices import sampled_at_vertices
-from illumcli.baking.context import BakeContext, PointChannels, SampleStatistics, VertexChannels
+from illumcli.baking.context import BakeContext, BakedChannels, SampleStatistics, VertexChannels
 from illumcli.baking.fit import fitted_to_surface
 from illumcli.baking.inputs import BakeWork, prepare_bake
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.outputs import write_outputs
 from illumcli.baking.report import BakeReport
 from illumcli.baking.resume import open_journal, write_beside
-from illumcli.baking.sampling import MAX_SAMPLES
 from illumcli.baking.settings import AS_USUAL, BakeJob, BakeOptions, BakeSettings
+from illumcli.baking.texture_files import write_texture
 from illumcli.baking.values import baked_values
+from illumcli.baking.warnings import journal_warnings, warnings_of
 from illumcli.files.journal import Journal, tidy
 from illumcli.files.outputs import refresh
 from illumcli.progress import Progress, no_progress
 from illumcli.rays.ray_loop import ray_loop_name
 from illumcli.visibility.obscurance import Method
-
-DARK, MOSTLY = 0.01, 0.9
-"""If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
 
 METHODS: dict[str, Callable[[BakeContext], VertexChannels]] = {
     "vertex": sampled_at_vertices,
@@ -66,24 +62,22 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
     work.clock.lap("read")
 
     # Compute the values, with a journal for a next run, and write the files.
-    values: VertexChannels | None = None
+    values = BakedChannels()
     left_out: Sequence[str] = ()
     warnings: list[str] = []
     if due:
         with closing(open_journal(work.outputs[0], work.content)) as journal:
-            values = vertex_channels(work, progress, journal)
-            baked = replace(baked_values(values), about=description(work, values.of_points.statistics))
-            write = partial(write_outputs, work, due, baked)
-            left_out = write_beside(journal, write)
-            warnings = [*warnings_of(work.settings, values.of_points), *journal_warnings(work, journal)]
+            values = baked_of(work, due, bake_context(work, progress, journal))
+            left_out = write_beside(journal, partial(write_files, work, due, values))
+            warnings = [*warnings_of(work.settings, values), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])
     return list(work.outputs), bake_report(work, due, values, left_out, warnings)
 
 
-def vertex_channels(work: BakeWork, progress: Progress, journal: Journal) -> VertexChannels:
-    """The channels of every point at a vertex, by the method of the settings."""
+def bake_context(work: BakeWork, progress: Progress, journal: Journal) -> BakeContext:
+    """What the methods of a bake need."""
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
     wanted = settings.obscurance()
@@ -92,8 +86,34 @@ def vertex_channels(work: BakeWork, progress: Progress, journal: Journal) -> Ver
     )
     work.clock.lap("build")
     threads, clock = work.job.threads, work.clock
-    context = BakeContext(work.surfaces, occluders, method, settings, threads, progress, clock, journal)
-    return METHODS[settings.method](context)
+    return BakeContext(work.surfaces, occluders, method, settings, threads, progress, clock, journal)
+
+
+def baked_of(work: BakeWork, due: Sequence[Path], context: BakeContext) -> BakedChannels:
+    """Values at vertices by the method of the settings, and at texels, as the files need them."""
+    at_vertices = at_texels = None
+    if any(path not in work.slot_of for path in due):
+        at_vertices = METHODS[work.settings.method](context)
+    if any(path in work.slot_of for path in due):
+        at_texels = sampled_at_texels(context, work.slots)
+    return BakedChannels(at_vertices, at_texels)
+
+
+def write_files(work: BakeWork, due: Sequence[Path], values: BakedChannels) -> Sequence[str]:
+    """Write the files `due`. Returns a line for each part of the input that they lack."""
+    left_out: Sequence[str] = ()
+    if values.at_vertices is not None:
+        about = description(work, values.at_vertices.of_points.statistics)
+        baked = replace(baked_values(values.at_vertices), about=about)
+        left_out = write_outputs(work, [path for path in due if path not in work.slot_of], baked)
+    if values.at_texels is not None:
+        about = description(work, values.at_texels.of_points.statistics)
+        for texture in values.at_texels.texels.textures:
+            baked_here = baked_texture(texture, values.at_texels.of_points)
+            for path in due:
+                if work.slot_of.get(path) == texture.slot:
+                    write_texture(path, baked_here, about, work.settings.bits)
+    return left_out
 
 
 def description(work: BakeWork, statistics: Mapping[str, SampleStatistics]) -> dict[str, Any]:
@@ -112,50 +132,20 @@ def description(work: BakeWork, statistics: Mapping[str, SampleStatistics]) -> d
     }
 
 
-def warnings_of(settings: BakeSettings, values: PointChannels) -> list[str]:
-    """Warnings about a target that was not reached, and about a mesh that seems to be inside out."""
-    warnings = []
-    target = settings.target_error
-    for name, statistics in values.statistics.items():
-        if target is None or statistics.rmse <= target:
-            continue
-        at_limit = max(statistics.samples, default=0) >= MAX_SAMPLES
-        reason = f"no vertex casts more than {MAX_SAMPLES} rays" if at_limit else "trials did not reach it"
-        warnings.append(f"error of {name} {statistics.rmse:.2g} is above the {target:g} asked for: {reason}")
-    w = values.channels.get("obscurance")
-    dark = 0.0 if w is None else dark_share(w)
-    if dark > MOSTLY:
-        warnings.append(
-            f"{dark:.0%} of the values are 0: the polygons seem to face inwards; turn their winding around, "
-            "or give the file outward normals"
-        )
-    return warnings
-
-
-def dark_share(w: NDArray[np.float32]) -> float:
-    """Share of values below `DARK`."""
-    return float(np.mean(w < DARK)) if len(w) else 0.0
-
-
-def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
-    """A warning if an interrupted bake could not be continued by a next run."""
-    if journal.refusal is None:
-        return []
-    output = work.outputs[0]
-    return [f"finished pieces are not kept beside {output} for a next run: {journal.refusal}"]
-
-
 def bake_report(
     work: BakeWork,
     due: Sequence[Path],
-    values: VertexChannels | None,
+    values: BakedChannels,
     left_out: Sequence[str],
     warnings: list[str],
 ) -> BakeReport:
-    """The report of a bake that wrote the files `due`; `values` are None if every output is kept."""
+    """The report of a bake that wrote the files `due`."""
     # If nothing was computed, the counts are 0.
-    statistics = {} if values is None else values.of_points.statistics
-    vertices = None if values is None else values.vertices
+    vertices = None if values.at_vertices is None else values.at_vertices.vertices
+    texels = None if values.at_texels is None else values.at_texels.texels
+    sampled = {} if values.at_vertices is None else values.at_vertices.of_points.statistics
+    sampled_texels = {} if values.at_texels is None else values.at_texels.of_points.statistics
+    statistics = [*sampled.values(), *sampled_texels.values()]
     return BakeReport(
         # The input.
         input=str(work.path),
@@ -168,9 +158,11 @@ def bake_report(
         without_normal=vertices.without_normal if vertices else 0,
         copies=vertices.copies if vertices else 0,
         # The values, their errors and rays.
-        sampled=statistics,
+        sampled=sampled,
+        textures=[each.as_data() for each in texels.textures] if texels else [],
+        sampled_texels=sampled_texels,
         target_error=work.settings.target_error,
-        ray_loop=ray_loop_name() if any(each.rays for each in statistics.values()) else None,
+        ray_loop=ray_loop_name() if any(each.rays for each in statistics) else None,
         # What was repaired, left out and written.
         repairs=work.repairs,
         left_out=list(left_out),

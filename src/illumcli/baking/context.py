@@ -14,6 +14,7 @@ from illumcli.arrays import Vectors
 from illumcli.baking.occluders import Occluders
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeSettings
+from illumcli.baking.texel_points import Texels
 from illumcli.baking.vertex_points import Vertices
 from illumcli.files.journal import Journal
 from illumcli.progress import Progress
@@ -100,3 +101,22 @@ class VertexChannels(Record):
 
     vertices: Vertices
     of_points: PointChannels
+
+
+class TexelChannels(Record):
+    """Channels at the points of texels."""
+
+    texels: Texels
+    of_points: PointChannels
+
+
+class BakedChannels(Record):
+    """What was computed for the files of a bake that are due."""
+
+    at_vertices: VertexChannels | None = None
+    at_texels: TexelChannels | None = None
+
+    @property
+    def of_points(self) -> list[PointChannels]:
+        """Of vertices and texels."""
+        return [each.of_points for each in (self.at_vertices, self.at_texels) if each is not None]

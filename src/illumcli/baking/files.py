@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.images.contents import image_contents
 from illumcli.mesh_files import ply
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
@@ -60,6 +61,8 @@ def baked_contents(path: Path) -> list[str]:
     InputError
         A file that illum did not write.
     """
+    if path.suffix.lower() in (".png", ".exr"):
+        return image_contents(path)
     readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
     try:
         content = readers[path.suffix.lower()](path)["content"]

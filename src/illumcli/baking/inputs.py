@@ -5,23 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.baking.context import StageClock
 from illumcli.baking.files import SUFFIXES, baked_contents
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
+from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
+from illumcli.baking.texture_slots import Slot, is_texture, texture_files, texture_slots
 from illumcli.errors import InputError
 from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
+from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import CornerVectors, corner_normals
+from illumcli.geometry.scene_geometry import corner_normals
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph.build import build
@@ -41,6 +45,12 @@ class BakeWork(Record):
     """A bake whose meshes have been read: its surfaces, and the files to write."""
 
     job: BakeJob
+    outputs: tuple[Path, ...]
+    """The files of the bake."""
+    slots: tuple[Slot, ...]
+    """The textures of the bake, if it has any."""
+    slot_of: Mapping[Path, Slot]
+    """File of a texture -> its slot."""
     scene: Scene
     surfaces: Surfaces
     hashes: tuple[str, ...]
@@ -54,11 +64,6 @@ class BakeWork(Record):
     def path(self) -> Path:
         """The input."""
         return self.job.path
-
-    @property
-    def outputs(self) -> tuple[Path, ...]:
-        """The files of the bake."""
-        return self.job.outputs
 
     @property
     def settings(self) -> BakeSettings:
@@ -104,6 +109,7 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     # Check the names of the outputs.
     path, outputs, settings, options = job.path, job.outputs, job.settings, job.options
     refuse_outputs(outputs)
+    refuse_textures(outputs, settings)
     if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
 
@@ -119,10 +125,15 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     surfaces, repairs = surfaces_of(loaded.scene, loaded)
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
-    content = content_hash(loaded.scene, hashes, surfaces.normals, settings)
+    content = content_hash(loaded.scene, hashes, surfaces, settings)
     if options.strict:
         refuse_repairs(str(path), repairs)
-    work = BakeWork(job, loaded.scene, surfaces, hashes, content, repairs, clock)
+    slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)
+    slot_of = texture_files(outputs, slots)
+    if settings.texture is not None:
+        refuse_missing_uv(str(path), slots, meshes)
+    outputs = (*(each for each in outputs if not is_texture(each)), *slot_of)
+    work = BakeWork(job, outputs, slots, slot_of, loaded.scene, surfaces, hashes, content, repairs, clock)
     work.due()
     return work
 
@@ -147,15 +158,38 @@ def bake_cost(job: BakeJob) -> int:
 
 def refuse_outputs(outputs: Sequence[Path]) -> None:
     """Raise InputError for unknown suffixes and files named twice."""
+    known = (*SUFFIXES, *TEXTURE_SUFFIXES)
     problems = [
-        f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(SUFFIXES)}"
+        f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(known)}"
         for each in outputs
-        if each.suffix.lower() not in SUFFIXES
+        if each.suffix.lower() not in known
     ]
     if len({os.path.abspath(each) for each in outputs}) < len(outputs):
         problems.append("an output is named twice; give each file once")
     if problems:
         raise InputError(problems)
+
+
+def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
+    """Raise InputError for textures without a size, and for a size without textures."""
+    files = [each for each in outputs if is_texture(each)]
+    if files and settings.texture is None:
+        raise InputError(f"{files[0]}: is a texture; give its size, as in --texture 1024")
+    if settings.texture is not None and not files:
+        raise InputError("--texture belongs to .png and .exr outputs; name one with -o")
+    if files and "ao" not in settings.what:
+        raise InputError(f"{files[0]}: textures hold ao; add it to --what")
+
+
+def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh]) -> None:
+    """Raise InputError for objects that textures are baked of and that have no uv."""
+    problems = [
+        f"{place}: {slot.object_name} has no uv, which textures need; unwrap it and export it again"
+        for slot in slots
+        if meshes[slot.object].uvs is None
+    ]
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
 
 
 def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
@@ -178,13 +212,20 @@ def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     return Surfaces(geometry, normals), buffers["repairs"].repairs
 
 
-def content_hash(scene: Scene, hashes: Sequence[str], normals: CornerVectors, settings: BakeSettings) -> str:
+def content_hash(scene: Scene, hashes: Sequence[str], surfaces: Surfaces, settings: BakeSettings) -> str:
     """Hash of everything that the values and files of a bake depend on."""
     transforms = [dict(each.transform) for each in scene.objects]
     text = json.dumps(
         [__version__, settings.as_data(), list(hashes), transforms, scene.object_names()], default=str
     )
     digest = hashlib.blake2b(text.encode(), digest_size=16)
-    for array in (normals.values, normals.index):
-        digest.update(np.ascontiguousarray(array.T).data)
+    arrays: list[NDArray[Any] | None] = [surfaces.normals.values, surfaces.normals.index]
+    if settings.texture is not None:
+        for placed in surfaces.geometry.placed:
+            mesh = placed.mesh
+            digest.update(repr(mesh.material_names).encode())
+            arrays += [mesh.uvs, mesh.corner_uvs, mesh.polygon_materials]
+    for array in arrays:
+        if array is not None:
+            digest.update(np.ascontiguousarray(array.T).data)
     return digest.hexdigest()

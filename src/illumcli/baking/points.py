@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,9 @@ class Surfaces(Record):
 
 class Points(Record):
     """M points that cast rays."""
+
+    kind: ClassVar[str] = ""
+    """Tells the units of work over points of one kind from those over others."""
 
     geometry: SceneGeometry
     n: Vectors  # (M, 3) float32 unit shading normals

@@ -26,6 +26,8 @@ class BakeReport(Record):
     without_normal: int  # vertices whose polygons all have area 0
     copies: int  # vertices and normals that share the value of another at the same place
     sampled: Mapping[str, SampleStatistics]  # of each value that rays estimate, by its channel
+    textures: list[dict[str, Any]]  # `TexturePoints.as_data` of each
+    sampled_texels: Mapping[str, SampleStatistics]
     target_error: float | None
     ray_loop: str | None  # how rays were traced, if any were
     repairs: Repairs
@@ -37,12 +39,21 @@ class BakeReport(Record):
 
     def as_data(self) -> dict[str, Any]:
         """The report as JSON holds it."""
-        sampled = {name: vars(each) for name, each in self.sampled.items()}
-        data = vars(self) | {"sampled": sampled} | repairs_data(self.repairs)
+        sampled, at_texels = (
+            {name: vars(each) for name, each in of.items()} for of in (self.sampled, self.sampled_texels)
+        )
+        data = vars(self) | {"sampled": sampled, "sampled_texels": at_texels} | repairs_data(self.repairs)
         return {"illum": __version__, **data, "peak_memory_bytes": peak_memory()}
 
     def summary(self) -> str:
-        """One line: the errors of the values, and what they took."""
-        return f"{self.vertices} vertices: " + "; ".join(
-            f"{name} {each.summary()}" for name, each in self.sampled.items()
-        )
+        """A line for vertices, and one for texels: the errors of the values, and what they took."""
+        texels = sum(each["texels"] for each in self.textures)
+        lines = [
+            f"{count} {of}: " + "; ".join(f"{name} {each.summary()}" for name, each in sampled.items())
+            for count, of, sampled in (
+                (self.vertices, "vertices", self.sampled),
+                (texels, "texels", self.sampled_texels),
+            )
+            if sampled
+        ]
+        return "\n".join(lines)

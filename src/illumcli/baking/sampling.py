@@ -262,7 +262,8 @@ class BakeSampler(Record):
             count = int(samples[group[0]])
             size = max(1, UNIT_RAYS // count)
             for first in range(0, len(group), size):
-                yield WorkUnit(group[first : first + size], count, int(self.points.objects[group[0]]))
+                owner = int(self.points.objects[group[0]])
+                yield WorkUnit(group[first : first + size], count, owner, self.points.kind)
 
     def _run(
         self, purpose: str, units: Sequence[WorkUnit], compute: Compute[Result]

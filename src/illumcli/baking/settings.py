@@ -15,8 +15,8 @@ from illumcli.scene.spec import Obscurance
 class BakeSettings(Value):
     """Everything that baked values and files depend on, apart from the meshes and their places."""
 
-    samples: int = 256  # rays per vertex
-    target_error: float | None = None  # root mean square over all vertices, instead of `samples`
+    samples: int = 256  # rays per vertex or texel
+    target_error: float | None = None  # root mean square over all vertices or texels, instead of `samples`
     reconstruct: bool = False  # values of few rays from those around, with an audited error
     falloff: Mapping[str, Any] = field(default_factory=lambda: {"falloff": "step"})  # as scenes have it
     sampler: str = "spiral"
@@ -27,6 +27,8 @@ class BakeSettings(Value):
     what: tuple[str, ...] = ("ao",)  # words of `--what`, in the order of `channels.whats`
     channel: str | None = None  # of 8-bit vertex colours
     split: bool = False  # vertices of a PLY
+    texture: tuple[int, int] | None = None  # width and height of textures [texels]
+    bits: int = 8  # of textures as PNG
     seed: int = 0
 
     def obscurance(self) -> Obscurance:

@@ -24,6 +24,7 @@ class WorkUnit(Record):
     points: NDArray[np.int64]
     samples: int
     object: int
+    kind: str = ""  # of the points
 
     @property
     def rays(self) -> int:
@@ -33,6 +34,7 @@ class WorkUnit(Record):
     def key(self) -> bytes:
         """16 bytes that tell it from every other unit of its bake."""
         digest = hashlib.blake2b(struct.pack("<qq", self.samples, self.object), digest_size=16)
+        digest.update(self.kind.encode())
         digest.update(np.ascontiguousarray(self.points).data)
         return digest.digest()
 

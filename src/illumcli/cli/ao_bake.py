@@ -46,6 +46,10 @@ Examples:
 """
 
 
+LARGEST_TEXTURE = 16384
+"""Texels of a side."""
+
+
 class _Distance(click.ParamType):
     name = "D|Dr"
 
@@ -73,6 +77,24 @@ class _What(click.ParamType):
         if unknown:
             self.fail(f"'{unknown[0]}' is not one of {', '.join(whats())}")
         return tuple(word for word in whats() if word in words)
+
+
+class _TextureSize(click.ParamType):
+    name = "SIZE|WxH"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        width, _, height = value.partition("x")
+        try:
+            size = int(width), int(height or width)
+        except ValueError:
+            size = 0, 0
+        if not (min(size) >= 1 and max(size) <= LARGEST_TEXTURE):
+            self.fail(f"'{value}' is no size; write 1024, or 2048x1024, at most {LARGEST_TEXTURE} a side")
+        return size
 
 
 def _settings(options: dict[str, Any]) -> BakeSettings:
@@ -207,6 +229,12 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     is_flag=True,
     help="In .ply, too, split vertices with several normals, uv or values, as in .glb; copies come last.",
 )
+@click.option(
+    "--texture",
+    type=_TextureSize(),
+    help="Bake textures of this size over the uv of the meshes, for .png and .exr outputs.",
+)
+@click.option("--bits", type=click.Choice([8, 16]), default=8, show_default=True, help="Of textures as .png.")
 @seed_option("Random seed.", default=0)
 @threads_option
 @overrides_option

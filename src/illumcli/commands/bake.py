@@ -8,12 +8,13 @@ from pathlib import Path
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.report import BakeReport
 from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
+from illumcli.baking.texture_slots import is_texture
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import Shard
 from illumcli.commands.runner import PlannedPieces, Runner
 from illumcli.commands.unit import Worker
-from illumcli.files.names import check_unique, expand
+from illumcli.files.names import check_unique, expand, expand_some
 from illumcli.progress import Progress
 from illumcli.records import Value
 
@@ -32,7 +33,10 @@ class BakeRequest(Value):
     def outputs(self, path: Path) -> list[Path]:
         """The files of one input."""
         fields = {"name": path.stem, "scene": path.stem}
-        return [Path(expand(pattern, fields)) for pattern in self.patterns]
+        return [
+            Path((expand_some if is_texture(Path(pattern)) else expand)(pattern, fields))
+            for pattern in self.patterns
+        ]
 
     def refuse_shared_outputs(self, inputs: Sequence[Path]) -> None:
         """Raise InputError for all files that several inputs would write; an input may be given twice."""

@@ -1,0 +1,163 @@
+"""Points at texels: one for each texel and triangle that covers its centre, or the nearest place of a chart.
+
+A texel whose centre several triangles cover, because uv overlap, has a point on each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats, Ids, column_major, cross, length, row_blocks, take_rows
+from illumcli.atlas.centres import TexelsOnTriangles, joined
+from illumcli.atlas.overlaps import Overlaps, overlaps
+from illumcli.atlas.texels import texels_of
+from illumcli.atlas.triangles import AtlasTriangles, TextureSize, atlas_triangles
+from illumcli.baking.baked_texture import TextureUvs
+from illumcli.baking.points import Points, Surfaces
+from illumcli.baking.texture_slots import Slot
+from illumcli.geometry.planar import planar_polygons
+from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
+from illumcli.rays.corner_weights import corner_weights
+from illumcli.rays.interaction import Hits, ShadingContext, interact, interpolated
+from illumcli.rays.offsets import offset_ray_origins
+from illumcli.records import Record
+from illumcli.visibility.hemisphere import Hemispheres
+
+
+class TexelPoints(Points):
+    """M points on triangles."""
+
+    kind = "texel"
+
+    triangle: Ids  # (M,)
+    u: NDArray[np.float32]  # (M,) weight of corner 1
+    v: NDArray[np.float32]  # (M,) weight of corner 2
+
+    def hemispheres(
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+    ) -> Hemispheres:
+        objects, triangle = self.objects[index], self.triangle[index]
+        zero = np.zeros((len(index), 3), F)
+        surface = interact(self.geometry, objects, triangle, self.u[index], self.v[index], zero)
+        origins = offset_ray_origins(surface.position, surface.ng, surface.edge)
+        return Hemispheres(column_major(take_rows(self.n, index)), origins, surface.ng)
+
+    def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return open_triangles[self.triangle]
+
+
+class TexturePoints(Record):
+    """A texture, and which points its texels take their values from."""
+
+    slot: Slot
+    triangles: AtlasTriangles
+    overlaps: Overlaps
+    texel: NDArray[np.int32]  # (K,) texel of each of its points
+    first: int  # of its points among those of the bake
+
+    @property
+    def points(self) -> slice:
+        """Its points among those of the bake."""
+        return slice(self.first, self.first + len(self.texel))
+
+    def as_data(self) -> dict[str, Any]:
+        """Its name and counts, for JSON."""
+        return {
+            "texture": self.slot.name,
+            "triangles": len(self.triangles.triangle),
+            "texels": self.overlaps.read,
+            "overlapping": self.overlaps.several,
+            "overlapping_mirrored": self.overlaps.mirrored,
+            "without_uv": self.triangles.without_uv,
+            "without_uv_area": self.triangles.without_area,
+            "tiles": self.triangles.tiles,
+        }
+
+
+class Texels(Record):
+    """The points of a bake of textures, and the textures that take their values from them."""
+
+    points: TexelPoints
+    textures: tuple[TexturePoints, ...]
+
+
+def texel_points(
+    surfaces: Surfaces,
+    slots: Sequence[Slot],
+    size: TextureSize,
+    unwrapped: Mapping[int, TextureUvs],
+    threads: int,
+) -> Texels:
+    """The points of all textures."""
+    # the places of the texels of each texture on its triangles
+    geometry = surfaces.geometry
+    textures: list[TexturePoints] = []
+    places: list[TexelsOnTriangles] = []
+    first = 0
+    for slot in slots:
+        triangles = _triangles(geometry, slot, size, unwrapped.get(slot.object))
+        texels = texels_of(triangles)
+        textures.append(TexturePoints(slot, triangles, overlaps(triangles, texels), texels.texel, first))
+        places.append(replace(texels, number=triangles.triangle[texels.number]))
+        first += len(texels.texel)
+    every = joined(places)
+
+    # their positions and normals, in blocks
+    position, n = np.empty((first, 3), F, order="F"), np.empty((first, 3), F, order="F")
+    objects = geometry.objects.take(every.number)
+    planar = planar_polygons(geometry, surfaces.normals)
+
+    def interpolate(rows: slice) -> None:
+        hits = Hits(
+            np.arange(rows.start, rows.stop, dtype=np.int32),
+            objects[rows],
+            every.number[rows],
+            every.u[rows],
+            every.v[rows],
+        )
+        zero = np.zeros((rows.stop - rows.start, 3), F)
+        surface = interact(geometry, hits.objects, hits.triangle, hits.u, hits.v, zero)
+        context = ShadingContext(geometry, corner_weights(geometry, hits, planar), surface, surfaces.normals)
+        position[rows], n[rows] = surface.position, interpolated(context)
+
+    with ThreadPoolExecutor(threads, thread_name_prefix="texels") as pool:
+        list(pool.map(interpolate, row_blocks(first)))
+    points = TexelPoints(
+        geometry,
+        n,
+        position,
+        np.arange(first, dtype=np.uint32),
+        objects,
+        np.ones(first, bool),
+        every.number,
+        every.u,
+        every.v,
+    )
+    return Texels(points, tuple(textures))
+
+
+def _triangles(
+    geometry: SceneGeometry, slot: Slot, size: TextureSize, unwrapped: TextureUvs | None
+) -> AtlasTriangles:
+    """The triangles of a slot that have an area, on its texture."""
+    placed = geometry.placed[slot.object]
+    mesh = placed.mesh
+    own = np.flatnonzero(geometry.objects == slot.object).astype(np.int32)
+    if mesh.polygon_materials is not None:
+        material = mesh.polygon_materials[geometry.polygons[own] - placed.first_polygon]
+        own = own[material == slot.material]
+    a, b, c = triangle_corners(geometry.vertices, geometry.triangles[own])
+    own = own[length(cross(b - a, c - a)) > 0]
+    uvs, corner_uvs = (
+        (mesh.uvs, mesh.corner_uvs) if unwrapped is None else (unwrapped.uvs, unwrapped.corner_uvs)
+    )
+    if uvs is None or corner_uvs is None:
+        uvs, corner_uvs = np.zeros((0, 2)), np.full(len(mesh.corners), -1, np.int32)
+    corner = geometry.corners[own] - np.int32(placed.first_corner)
+    return atlas_triangles(size, uvs, corner_uvs[corner], own)

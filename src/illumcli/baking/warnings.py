@@ -1,0 +1,76 @@
+"""Warnings about the values of a bake."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.baking.context import BakedChannels, PointChannels
+from illumcli.baking.inputs import BakeWork
+from illumcli.baking.sampling import MAX_SAMPLES
+from illumcli.baking.settings import BakeSettings
+from illumcli.baking.texel_points import TexturePoints
+from illumcli.files.journal import Journal
+
+DARK, MOSTLY = 0.01, 0.9
+"""If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
+
+
+def warnings_of(settings: BakeSettings, values: BakedChannels) -> list[str]:
+    """Warnings about targets that were not reached, a mesh that seems to be inside out, and uv."""
+    warnings = [line for each in values.of_points for line in _of_points(settings, each)]
+    textures = () if values.at_texels is None else values.at_texels.texels.textures
+    return list(dict.fromkeys([*warnings, *(line for each in textures for line in uv_warnings(each))]))
+
+
+def _of_points(settings: BakeSettings, values: PointChannels) -> list[str]:
+    warnings = []
+    target = settings.target_error
+    for name, statistics in values.statistics.items():
+        if target is None or statistics.rmse <= target:
+            continue
+        at_limit = max(statistics.samples, default=0) >= MAX_SAMPLES
+        reason = f"no point casts more than {MAX_SAMPLES} rays" if at_limit else "trials did not reach it"
+        warnings.append(f"error of {name} {statistics.rmse:.2g} is above the {target:g} asked for: {reason}")
+    w = values.channels.get("obscurance")
+    dark = 0.0 if w is None else dark_share(w)
+    if dark > MOSTLY:
+        warnings.append(
+            f"{dark:.0%} of the values are 0: the polygons seem to face inwards; turn their winding around, "
+            "or give the file outward normals"
+        )
+    return warnings
+
+
+def dark_share(w: NDArray[np.float32]) -> float:
+    """Share of values below `DARK`."""
+    return float(np.mean(w < DARK)) if len(w) else 0.0
+
+
+def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:
+    """A warning if an interrupted bake could not be continued by a next run."""
+    if journal.refusal is None:
+        return []
+    output = work.outputs[0]
+    return [f"finished pieces are not kept beside {output} for a next run: {journal.refusal}"]
+
+
+def uv_warnings(texture: TexturePoints) -> list[str]:
+    """Warnings about the uv of a texture: what covers texels several times, or none."""
+    name, triangles, overlaps = texture.slot.name, texture.triangles, texture.overlaps
+    warnings = []
+    if triangles.without_uv:
+        warnings.append(f"{name}: {triangles.without_uv} triangles have no uv: no texel belongs to them")
+    if triangles.without_area:
+        fact = f"the uv of {triangles.without_area} triangles have no area"
+        warnings.append(f"{name}: {fact}: lookups on them read texels of others")
+    if triangles.tiles > 1:
+        fact = f"the uv reach into {triangles.tiles} tiles"
+        warnings.append(f"{name}: {fact}, which are baked into one texture that repeats")
+    if overlaps.several:
+        share = overlaps.several / overlaps.read
+        fact = f"{overlaps.several} texels ({share:.1%}) belong to several places of the surface"
+        if overlaps.mirrored:
+            fact += f", {overlaps.mirrored} of them to mirrored charts"
+        warnings.append(f"{name}: {fact}: each has the mean of their values; --unwrap makes uv of their own")
+    return warnings

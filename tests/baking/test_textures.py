@@ -1,0 +1,195 @@
+"""Bakes of textures, from the command to the files."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from illumcli.baking.bake import bake_mesh
+from illumcli.baking.settings import BakeOptions, BakeSettings
+from illumcli.cli import illum
+from illumcli.errors import InputError
+from illumcli.images.png import read_texts
+from illumcli.images.reader import read_image, read_metadata
+
+SETTINGS = BakeSettings(texture=(16, 16), samples=16)
+
+# a floor and a wall at its edge x = 1, charts side by side
+CORNER = """\
+v 0 0 0
+v 1 0 0
+v 1 0 -1
+v 0 0 -1
+v 1 1 0
+v 1 1 -1
+vt 0.1 0.2
+vt 0.4 0.2
+vt 0.4 0.8
+vt 0.1 0.8
+vt 0.6 0.2
+vt 0.9 0.2
+vt 0.9 0.8
+vt 0.6 0.8
+f 1/1 2/2 3/3 4/4
+f 2/5 5/6 6/7 3/8
+"""
+
+
+@pytest.fixture
+def text_mesh(tmp_path):
+    def make(text):
+        path = tmp_path / "mesh.obj"
+        path.write_text(text)
+        return path
+
+    return make
+
+
+def bake(path, out, settings=SETTINGS, **options):
+    return bake_mesh(path, [out], settings, BakeOptions(**options))
+
+
+def texels(path):
+    """(H, W) obscurance; row 0 is the top."""
+    return read_image(path).channels["Y"]
+
+
+def column(u, v=0.5, size=16):
+    return int((1 - v) * size), int(u * size)
+
+
+def test_texels_beside_a_wall_are_darker_and_gutters_are_filled(text_mesh, tmp_path):
+    out = tmp_path / "a.png"
+    _, report = bake(text_mesh(CORNER), out, BakeSettings(texture=(32, 32), samples=256))
+    w = texels(out)
+    # u = 0.39 is the floor beside the wall: half is hidden
+    assert w[column(0.39, size=32)] == pytest.approx(0.5, abs=0.1)
+    assert w[column(0.12, size=32)] > 0.8
+    # gutters have values of charts, from 0.5 on
+    assert w.min() > 0.35
+    assert not report.warnings
+    assert report.textures[0]["texels"] > 0
+
+
+def test_texels_agree_with_vertices(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    settings = BakeSettings(texture=(64, 64), samples=1024)
+    bake(path, tmp_path / "a.exr", settings)
+    w = texels(tmp_path / "a.exr")
+    _, _ = bake_mesh(path, [tmp_path / "a.npz"], BakeSettings(samples=1024))
+    at_vertices = np.load(tmp_path / "a.npz")["corner_obscurance"][:4]
+    # v upwards: the floor's first corner is at the lower left of its chart
+    for (u, v), value in zip(((0.1, 0.2), (0.4, 0.2), (0.4, 0.8), (0.1, 0.8)), at_vertices, strict=True):
+        inside = 0.25 + (u - 0.25) * 0.97, 0.5 + (v - 0.5) * 0.97
+        # w is steep at the ends of the wall
+        assert w[column(*inside, size=64)] == pytest.approx(value, abs=0.02 if u < 0.2 else 0.1)
+
+
+def test_files_say_what_they_are(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    bake(path, tmp_path / "a.png")
+    texts = read_texts(tmp_path / "a.png")
+    assert texts["illum:encoding"] == "linear"
+    assert json.loads(texts["illum:about"])["parameters"]["texture"] == [16, 16]
+    bake(path, tmp_path / "a.exr")
+    assert read_metadata(tmp_path / "a.exr")["illum:encoding"] == "linear"
+
+
+def test_exr_has_the_error_map_and_the_coverage(text_mesh, tmp_path):
+    out = tmp_path / "a.exr"
+    bake(text_mesh(CORNER), out)
+    channels = read_image(out).channels
+    assert set(channels) == {"Y", "coverage.Y", "error.Y"}
+    assert 0 < channels["coverage.Y"].mean() < 1
+    assert channels["error.Y"].max() > 0
+
+
+def test_16_bits_round_finer(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    bake(path, tmp_path / "8.png")
+    bake(path, tmp_path / "16.png", BakeSettings(texture=(16, 16), samples=16, bits=16))
+    bake(path, tmp_path / "a.exr")
+    exact = texels(tmp_path / "a.exr")
+    assert np.abs(texels(tmp_path / "8.png") - exact).max() < 0.51 / 255
+    assert np.abs(texels(tmp_path / "16.png") - exact).max() < 0.51 / 65535
+
+
+def test_values_depend_on_no_thread_count(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    settings = BakeSettings(texture=(48, 48), target_error=0.02, reconstruct=True)
+    bake(path, tmp_path / "1.exr", settings, threads=1)
+    bake(path, tmp_path / "3.exr", settings, threads=3)
+    one, three = (read_image(tmp_path / name).channels for name in ("1.exr", "3.exr"))
+    for name in one:
+        np.testing.assert_array_equal(one[name], three[name])
+
+
+def test_overlapping_uv_have_the_mean_and_are_told(text_mesh, tmp_path):
+    # the wall's chart moved onto the floor's, and there mirrored
+    moved = CORNER.replace("f 2/5 5/6 6/7 3/8", "f 2/1 5/2 6/3 3/4")
+    _, report = bake(text_mesh(moved), tmp_path / "a.exr", BakeSettings(texture=(32, 32), samples=256))
+    assert any("belong to several places of the surface" in line for line in report.warnings)
+    assert report.textures[0]["overlapping_mirrored"] == 0
+    mirrored = CORNER.replace("f 2/5 5/6 6/7 3/8", "f 2/2 5/1 6/4 3/3")
+    out = tmp_path / "b.exr"
+    _, report = bake(text_mesh(mirrored), out, BakeSettings(texture=(32, 32), samples=256))
+    facts = report.textures[0]
+    assert facts["overlapping"] == facts["overlapping_mirrored"] > 100
+    assert any("to mirrored charts" in line for line in report.warnings)
+    # beside the edge both are half hidden, far from it both are open
+    assert texels(out)[column(0.39, size=32)] == pytest.approx(0.5, abs=0.1)
+
+
+def test_each_material_has_a_texture(text_mesh, tmp_path):
+    path = text_mesh(CORNER.replace("f 1/1", "usemtl red\nf 1/1").replace("f 2/5", "usemtl blue\nf 2/5"))
+    with pytest.raises(InputError, match=r"as in .*a\.\{material\}\.png"):
+        bake(path, tmp_path / "a.png")
+    paths, _ = bake(path, tmp_path / "{material}.png")
+    assert [each.name for each in paths] == ["red.png", "blue.png"]
+    # the charts of the other material are no part of it
+    assert texels(tmp_path / "blue.png").min() > 0.4
+
+
+def test_the_command_names_textures_by_material(text_mesh, tmp_path):
+    path = text_mesh(CORNER.replace("f 1/1", "usemtl red\nf 1/1").replace("f 2/5", "usemtl blue\nf 2/5"))
+    pattern = str(tmp_path / "{name}.{material}.ao.png")
+    arguments = ["ao-bake", str(path), "--texture", "16x8", "--samples", "4", "-o", pattern]
+    done = CliRunner().invoke(illum, arguments)
+    assert done.exit_code == 0, done.output
+    names = sorted(each.name for each in tmp_path.glob("*.png"))
+    assert names == [f"{path.stem}.blue.ao.png", f"{path.stem}.red.ao.png"]
+    assert texels(tmp_path / names[0]).shape == (8, 16)
+    assert "kept, its content is the same" in CliRunner().invoke(illum, arguments).output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-o", "x.png"], "give its size, as in --texture 1024"),
+        (["-o", "x.npz", "--texture", "64"], "--texture belongs to"),
+        (["-o", "x.png", "--texture", "0"], "is no size"),
+        (["-o", "x.png", "--texture", "8", "--what", "bent_normal"], "textures hold ao"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(text_mesh, arguments, said):
+    done = CliRunner().invoke(illum, ["ao-bake", str(text_mesh(CORNER)), *arguments])
+    assert done.exit_code != 0
+    assert said in done.output + str(done.exception)
+
+
+def test_meshes_without_uv_are_refused(text_mesh, tmp_path):
+    path = text_mesh("v 0 0 0\nv 1 0 0\nv 0 0 -1\nf 1 2 3\n")
+    with pytest.raises(InputError, match="has no uv"):
+        bake(path, tmp_path / "a.png")
+
+
+def test_a_changed_uv_is_another_texture(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    out = tmp_path / "a.png"
+    bake(path, out)
+    assert bake(path, out)[1].kept == [str(out)]
+    path.write_text(CORNER.replace("vt 0.9 0.2", "vt 0.8 0.2"))
+    assert bake(path, out, force=True)[1].written == [str(out)]

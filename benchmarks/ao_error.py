@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeSettings
@@ -44,7 +45,7 @@ def caster(
     method = Method(256, settings.obscurance().falloff, geometry.render_space.radius, sampler)
     threads = len(os.sched_getaffinity(0))
     made = BakeSampler(
-        vertices.points, occluders_of(scene, geometry, settings), method, seed, threads, no_progress
+        vertices.points, occluders_of(scene, geometry, settings), Measure(method), seed, threads, no_progress
     )
     return made, np.flatnonzero(~made.open_points())
 

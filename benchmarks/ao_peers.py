@@ -160,7 +160,7 @@ def starts(own: BakeSampler) -> np.ndarray:
     for is_flat in (False, True):
         some = np.flatnonzero(own.points.is_flat == is_flat)
         if some.size:
-            over = own.points.hemispheres(some, np.zeros(len(some)), PACKET, own.method.sampler)
+            over = own.points.hemispheres(some, np.zeros(len(some)), PACKET, own.measure.method.sampler)
             out[some] = over.origins[:: over.origins_per_point]
     return out
 

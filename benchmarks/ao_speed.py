@@ -44,7 +44,7 @@ def main() -> None:
     at_once = max(1, obscurance.RAYS_AT_ONCE // SAMPLES)
 
     def prepared(order: np.ndarray, at_once: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        calls, sampler, flat = [], bake.method.sampler, bake.points.is_flat[order]
+        calls, sampler, flat = [], bake.measure.method.sampler, bake.points.is_flat[order]
         parts = [
             some[first : first + at_once]
             for some in (order[~flat], order[flat])

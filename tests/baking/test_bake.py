@@ -12,6 +12,7 @@ from plyfile import PlyData, PlyElement
 
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeOptions, BakeSettings
@@ -444,7 +445,7 @@ def test_the_command_says_what_is_wrong_at_once(text_mesh, tmp_path):
         (["-o", "x.npz", "--falloff", "linear"], "--max-distance"),
         (["-o", "x.npz", "--samples", "4", "--target-error", "0.1"], "exclude each other"),
         (["-o", "x.npz", "--max-distance", "2m"], "is no distance"),
-        (["-o", "x.npz", "--what", "ao,bend"], "'bend' is not one of ao, bent_normal"),
+        (["-o", "x.npz", "--what", "ao,bend"], "'bend' is not one of ao, bent_normal, thickness"),
         (["-o", "x.npz", "--what", "ao,bent_normal", "--method", "fit"], "--method fit computes ao alone"),
     ):
         done = CliRunner().invoke(illum, ["ao-bake", str(path), *arguments])
@@ -526,7 +527,7 @@ def test_errors_at_a_hollow_edge_keep_falling_with_the_rays(text_mesh, tmp_path)
     points = vertex_points(surfaces).points
     assert not points.is_flat.any()
     occluders = occluders_of(loaded.scene, points.geometry, BakeSettings())
-    sampler = BakeSampler(points, occluders, Method(1, Step(), 1.0), 0, 1, no_progress)
+    sampler = BakeSampler(points, occluders, Measure(Method(1, Step(), 1.0)), 0, 1, no_progress)
 
     def rmse(samples):
         counts = RayCounts(np.arange(len(points.key)), np.full(len(points.key), samples))
@@ -681,5 +682,5 @@ def test_an_object_without_open_triangles_is_not_searched_for_them(text_mesh, tm
         ClusterTree, "is_open", lambda self, count, planes: tested.append(count) or whole(self, count, planes)
     )
     report = bake(scene, tmp_path / "out.npz", samples=8, occluders=("own",))[1]
-    assert report.open > 0
+    assert report.sampled["obscurance"].open > 0
     assert sum(tested) == report.triangles - 2 * 19 * 19

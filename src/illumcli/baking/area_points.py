@@ -6,33 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, length, take_rows, unit
-from illumcli.baking.points import Points, Surfaces
+from illumcli.baking.points import PointsOnTriangles, Surfaces
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry, triangle_corners
 from illumcli.rays.interaction import interact, or_geometric
-from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.sampling import PLASTIC, hashed, stream, unit_interval
-from illumcli.visibility.hemisphere import Hemispheres
 
 
-class AreaPoints(Points):
+class AreaPoints(PointsOnTriangles):
     """Points distributed evenly over triangles."""
 
-    origins: Vectors  # (M, 3) float32 offset from the surface, in radii
-    ng: Vectors  # (M, 3) float32 unit normals of their triangles
-    triangle: Ids  # (M,)
-    u: NDArray[np.float64]  # (M,) barycentric weight of corner 1
-    v: NDArray[np.float64]  # (M,) barycentric weight of corner 2
     area: NDArray[np.float64]  # (M,) area of the surface that each point represents, in radii^2
 
-    def hemispheres(
-        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
-    ) -> Hemispheres:
-        return Hemispheres(self.n, self.origins, self.ng).take(index)
-
-    def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        return open_triangles[self.triangle]
-
-    def barycentric(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def barycentric(self) -> tuple[Floats, Floats, Floats]:
         """Three (M,) weights of the corners of each point's triangle."""
         return 1 - self.u - self.v, self.u, self.v
 
@@ -70,8 +55,6 @@ def area_points(surfaces: Surfaces, count: int, seed: int) -> AreaPoints:
         np.arange(len(triangle), dtype=np.uint32),
         objects,
         np.ones(len(triangle), bool),
-        offset_ray_origins(interaction.position, interaction.ng, interaction.edge),
-        interaction.ng,
         triangle,
         a,
         b,

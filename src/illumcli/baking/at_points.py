@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F
 from illumcli.baking.context import BakeContext, PointChannels, SampledValues, SampleStatistics
+from illumcli.baking.measures import Measure
 from illumcli.baking.points import Points
 from illumcli.baking.reconstructed import reconstructed_values
 from illumcli.baking.sampling import BakeSampler, ChosenSamples, RayCounts
@@ -18,9 +19,21 @@ FINAL_PAIRS = 1 << 20
 
 def channels_at(context: BakeContext, points: Points) -> PointChannels:
     """The channels that the settings ask for."""
+    arrays: dict[str, NDArray[np.float32]] = {}
+    statistics: dict[str, SampleStatistics] = {}
+    for measure in context.measures:
+        sampled, statistics[measure.channel] = _channels_of(context, points, measure)
+        arrays |= sampled
+    return PointChannels(chosen(arrays, context.settings.what), statistics)
+
+
+def _channels_of(
+    context: BakeContext, points: Points, measure: Measure
+) -> tuple[dict[str, NDArray[np.float32]], SampleStatistics]:
+    """The channels of one measure, and what they took."""
     settings, clock = context.settings, context.clock
     sampler = BakeSampler(
-        points, context.occluders, context.method, settings.seed, context.threads, context.progress
+        points, context.occluders, measure, settings.seed, context.threads, context.progress
     )
     clock.lap("points")
 
@@ -31,22 +44,36 @@ def channels_at(context: BakeContext, points: Points) -> PointChannels:
 
     # values of the others
     sampled = (reconstructed_values if settings.reconstruct else raw_values)(context, sampler, closed)
-    w, error, bent = np.ones(len(is_open), F), np.zeros(len(is_open), F), points.n.copy()
-    w[closed], error[closed] = sampled.w, sampled.error
+    mean, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
+    mean[closed], error[closed] = sampled.w, sampled.error
+    scale = F(measure.scale)
+    channels = {measure.channel: scale * mean, measure.error: scale * error}
     if sampled.bent is not None:
-        bent[closed] = sampled.bent
+        channels["bent_normal"] = points.n.copy()
+        channels["bent_normal"][closed] = sampled.bent
+    return channels, _statistics(sampled, measure, len(is_open), settings.target_error)
+
+
+def _statistics(
+    sampled: SampledValues, measure: Measure, points: int, target: float | None
+) -> SampleStatistics:
+    """What the values of so many points took, in units of the channel."""
+    scale, reconstruction = measure.scale, sampled.reconstruction
+    if reconstruction is not None:
+        audit = reconstruction["audit"]
+        scaled = {name: scale * audit[name] for name in ("low", "high")}
+        reconstruction = {**reconstruction, "audit": {**audit, **scaled}}
     count, number = np.unique(sampled.samples, return_counts=True)
-    statistics = SampleStatistics(
-        int(is_open.sum()),
-        len(closed),
-        sampled.rmse,
-        {purpose: cast for purpose, cast in sampled.rays.items() if cast},
-        sampled.resumed,
-        dict(zip(count.tolist(), number.tolist(), strict=True)),
-        sampled.reconstruction,
+    return SampleStatistics(
+        open=points - len(sampled.samples),
+        cast=len(sampled.samples),
+        rmse=scale * sampled.rmse,
+        target=None if target is None else scale * target,
+        rays={purpose: cast for purpose, cast in sampled.rays.items() if cast},
+        resumed=sampled.resumed,
+        samples=dict(zip(count.tolist(), number.tolist(), strict=True)),
+        reconstruction=reconstruction,
     )
-    arrays = {"obscurance": w, "standard_error": error, "bent_normal": bent}
-    return PointChannels(chosen(arrays, settings.what), {"obscurance": statistics})
 
 
 def raw_values(context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64]) -> SampledValues:
@@ -64,7 +91,7 @@ def raw_values(context: BakeContext, sampler: BakeSampler, closed: NDArray[np.in
         clock.lap("pilot")
 
     # their values, and the error of these from other rays
-    estimates = sampler.estimate("values", counts, 0, "bent_normal" in settings.what, context.journal)
+    estimates = sampler.estimate("values", counts, 0, sampler.measure.with_bent, context.journal)
     clock.lap("cast")
     errors = sampler.errors(counts, FINAL_PAIRS)
     clock.lap("errors")

@@ -15,6 +15,7 @@ from illumcli.baking.at_vertices import sampled_at_vertices
 from illumcli.baking.context import BakeContext, BakedChannels, SampleStatistics, VertexChannels
 from illumcli.baking.fit import fitted_to_surface
 from illumcli.baking.inputs import BakeWork, prepare_bake
+from illumcli.baking.measures import measures
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.outputs import write_outputs
 from illumcli.baking.report import BakeReport
@@ -27,7 +28,6 @@ from illumcli.files.journal import Journal, tidy
 from illumcli.files.outputs import refresh
 from illumcli.progress import Progress, no_progress
 from illumcli.rays.ray_loop import ray_loop_name
-from illumcli.visibility.obscurance import Method
 
 METHODS: dict[str, Callable[[BakeContext], VertexChannels]] = {
     "vertex": sampled_at_vertices,
@@ -69,7 +69,7 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
         with closing(open_journal(work.outputs[0], work.content)) as journal:
             values = baked_of(work, due, bake_context(work, progress, journal))
             left_out = write_beside(journal, partial(write_files, work, due, values))
-            warnings = [*warnings_of(work.settings, values), *journal_warnings(work, journal)]
+            warnings = [*warnings_of(values), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])
@@ -80,13 +80,10 @@ def bake_context(work: BakeWork, progress: Progress, journal: Journal) -> BakeCo
     """What the methods of a bake need."""
     geometry, settings = work.surfaces.geometry, work.settings
     occluders = occluders_of(work.scene, geometry, settings)
-    wanted = settings.obscurance()
-    method = Method(
-        settings.samples, wanted.falloff, geometry.render_space.radius, wanted.sampler, wanted.faces
-    )
+    wanted = measures(settings, geometry.render_space.radius)
     work.clock.lap("build")
     threads, clock = work.job.threads, work.clock
-    return BakeContext(work.surfaces, occluders, method, settings, threads, progress, clock, journal)
+    return BakeContext(work.surfaces, occluders, wanted, settings, threads, progress, clock, journal)
 
 
 def baked_of(work: BakeWork, due: Sequence[Path], context: BakeContext) -> BakedChannels:
@@ -161,7 +158,6 @@ def bake_report(
         sampled=sampled,
         textures=[each.as_data() for each in texels.textures] if texels else [],
         sampled_texels=sampled_texels,
-        target_error=work.settings.target_error,
         ray_loop=ray_loop_name() if any(each.rays for each in statistics) else None,
         # What was repaired, left out and written.
         repairs=work.repairs,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors
+from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import Occluders
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeSettings
@@ -20,7 +20,6 @@ from illumcli.files.journal import Journal
 from illumcli.progress import Progress
 from illumcli.records import Record
 from illumcli.visibility.channels import Arrays
-from illumcli.visibility.obscurance import Method
 
 
 class StageClock:
@@ -38,11 +37,11 @@ class StageClock:
 
 
 class BakeContext(Record):
-    """The surfaces of a bake, what occludes them, and how to sample."""
+    """The surfaces of a bake, what occludes them, and what to sample."""
 
     surfaces: Surfaces
     occluders: Sequence[Occluders]  # per object
-    method: Method
+    measures: Sequence[Measure]
     settings: BakeSettings
     threads: int
     progress: Progress
@@ -51,15 +50,16 @@ class BakeContext(Record):
 
 
 class SampleStatistics(Record):
-    """What the values of a bake took."""
+    """What the values of a bake took. Errors have the unit of the values."""
 
-    open: int = 0  # points with no geometry above their tangent plane: no rays
-    cast: int = 0  # points that cast rays
-    rmse: float = 0.0  # root mean square error over all points
-    rays: Mapping[str, int] = field(default_factory=dict)  # purpose -> rays
-    resumed: int = 0  # of these, rays that an earlier run cast
-    samples: Mapping[int, int] = field(default_factory=dict)  # rays per point -> points
-    reconstruction: Mapping[str, Any] | None = None  # how values were reconstructed, and their audit
+    open: int  # points with no geometry on that side of their triangles: no rays
+    cast: int  # points that cast rays
+    rmse: float  # root mean square error over all points
+    target: float | None  # the error that was asked for
+    rays: Mapping[str, int]  # purpose -> rays
+    resumed: int  # of these, rays that an earlier run cast
+    samples: Mapping[int, int]  # rays per point -> points
+    reconstruction: Mapping[str, Any] | None  # how values were reconstructed, and their audit
 
     def as_data(self) -> dict[str, Any]:
         """What files say of their values: the same whether or not the bake was interrupted."""

@@ -46,8 +46,9 @@ def fitted_to_surface(context: BakeContext) -> VertexChannels:
     per_point = min(RAYS_PER_POINT, settings.samples)
     count = len(vertices.points.key) * settings.samples // per_point
     area = area_points(context.surfaces, max(count, PARTS), settings.seed)
-    method = replace(context.method, samples=per_point, triangle_normals=None)
-    sampler = BakeSampler(area, context.occluders, method, settings.seed, context.threads, context.progress)
+    (measure,) = context.measures
+    measure = replace(measure, method=replace(measure.method, samples=per_point))
+    sampler = BakeSampler(area, context.occluders, measure, settings.seed, context.threads, context.progress)
     is_open = sampler.open_points()
     closed = np.flatnonzero(~is_open)
     estimates = sampler.estimate("values", RayCounts(closed, np.full(len(closed), per_point)), 0)
@@ -69,14 +70,17 @@ def fitted_to_surface(context: BakeContext) -> VertexChannels:
         value, error = np.ones_like(value), np.zeros_like(error)
     context.clock.lap("cast")
     statistics = SampleStatistics(
-        int(is_open.sum()),
-        len(closed),
-        float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))) if len(error) else 0.0,
-        {"values": estimates.rays} if estimates.rays else {},
+        open=int(is_open.sum()),
+        cast=len(closed),
+        rmse=float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))) if len(error) else 0.0,
+        target=None,
+        rays={"values": estimates.rays} if estimates.rays else {},
+        resumed=0,
         samples={settings.samples: len(closed)},
+        reconstruction=None,
     )
-    channels = {"obscurance": value, "standard_error": error}
-    return VertexChannels(vertices, PointChannels(channels, {"obscurance": statistics}))
+    channels = {measure.channel: value, measure.error: error}
+    return VertexChannels(vertices, PointChannels(channels, {measure.channel: statistics}))
 
 
 class NormalEquations(Record):

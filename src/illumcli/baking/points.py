@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Ids, Vectors
+from illumcli.arrays import F, Floats, Ids, Vectors, take_rows
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
+from illumcli.rays.interaction import interact
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.records import Record
 from illumcli.visibility.hemisphere import Hemispheres
+
+Side: TypeAlias = Literal[1, -1]
+"""Of a surface: 1 outside, where its normals point, -1 inside."""
 
 
 class Surfaces(Record):
@@ -34,7 +39,7 @@ class Points(Record):
     is_flat: NDArray[np.bool_]  # (M,) True where the triangles around a point are nearly in one plane
 
     def hemispheres(
-        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str, side: Side = 1
     ) -> Hemispheres:
         """Origins and axes of the rays of some points.
 
@@ -48,6 +53,8 @@ class Points(Record):
             Rays of each point.
         sampler : str
             Name of their pattern.
+        side : {1, -1}
+            -1 for rays into the surface, about -n, which start below it.
         """
         raise NotImplementedError
 
@@ -57,6 +64,27 @@ class Points(Record):
         Parameters
         ----------
         open_triangles : (T,) bool
-            True where no geometry is above the triangle's plane.
+            True where no geometry is on that side of the triangle's plane into which rays go.
         """
         raise NotImplementedError
+
+
+class PointsOnTriangles(Points):
+    """M points on triangles; their rays start at one place each."""
+
+    triangle: Ids  # (M,)
+    u: Floats  # (M,) barycentric weight of corner 1
+    v: Floats  # (M,) barycentric weight of corner 2
+
+    def hemispheres(
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str, side: Side = 1
+    ) -> Hemispheres:
+        objects, triangle = self.objects[index], self.triangle[index]
+        zero = np.zeros((len(index), 3), F)
+        surface = interact(self.geometry, objects, triangle, self.u[index], self.v[index], zero)
+        ng = F(side) * surface.ng
+        origins = offset_ray_origins(surface.position, ng, surface.edge)
+        return Hemispheres(F(side) * take_rows(self.n, index), origins, ng)
+
+    def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return open_triangles[self.triangle]

@@ -97,8 +97,7 @@ class ReconstructedBake(Record):
         counts = RayCounts(closed, samples)
 
         # raw values and their errors
-        with_bent = "bent_normal" in context.settings.what
-        raw = sampler.estimate("values", counts, 0, with_bent, context.journal)
+        raw = sampler.estimate("values", counts, 0, sampler.measure.with_bent, context.journal)
         clock.lap("cast")
         errors = sampler.errors(counts, PAIRS + (number << 10))
         clock.lap("errors")

@@ -28,7 +28,6 @@ class BakeReport(Record):
     sampled: Mapping[str, SampleStatistics]  # of each value that rays estimate, by its channel
     textures: list[dict[str, Any]]  # `TexturePoints.as_data` of each
     sampled_texels: Mapping[str, SampleStatistics]
-    target_error: float | None
     ray_loop: str | None  # how rays were traced, if any were
     repairs: Repairs
     left_out: list[str]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, cross, dot
+from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import Occluders
 from illumcli.baking.points import Points
 from illumcli.baking.resume import load_unit, store_unit
@@ -21,7 +22,7 @@ from illumcli.geometry.spatial_order import compact
 from illumcli.progress import Progress
 from illumcli.rays.sampling import hashed, stream, unit_interval
 from illumcli.records import Record
-from illumcli.visibility.obscurance import Method, estimates
+from illumcli.visibility.obscurance import estimates
 from illumcli.visibility.obscurance_error import Errors, Estimates
 from illumcli.visibility.open_hemisphere import trial_planes, triangle_planes
 
@@ -73,11 +74,11 @@ class ChosenSamples(Record):
 
 
 class BakeSampler(Record):
-    """Estimates obscurance at the points of a bake."""
+    """Estimates a mean over hemispheres at the points of a bake."""
 
     points: Points
     occluders: Sequence[Occluders]  # per object
-    method: Method
+    measure: Measure
     seed: int
     threads: int
     progress: Progress
@@ -88,7 +89,7 @@ class BakeSampler(Record):
         return compact(self.points.position)
 
     def open_points(self) -> NDArray[np.bool_]:
-        """(M,) True for points with no geometry above the triangles that their rays leave."""
+        """(M,) True for points with no geometry on that side of the triangles that their rays leave."""
         geometry = self.points.geometry
         a, b, c = triangle_corners(geometry.vertices, geometry.triangles)
         area = cross(b - a, c - a)
@@ -99,7 +100,8 @@ class BakeSampler(Record):
 
         def planes_of(triangle: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
             of = triangle.astype(np.int32)
-            return triangle_planes(geometry, geometry.objects.take(of), of, np.zeros(len(of), bool))
+            is_inside = np.full(len(of), self.measure.side < 0)
+            return triangle_planes(geometry, geometry.objects.take(of), of, is_inside)
 
         # Units of neighbouring triangles of the objects where some seem to be open.
         units = []
@@ -143,18 +145,19 @@ class BakeSampler(Record):
         journal
             Units in it are not computed, and finished units are added to it.
         """
-        count = len(self.points.key)
+        count, side = len(self.points.key), self.measure.side
         out = Estimates(np.ones(count, F), np.zeros(count, F), np.zeros((count, 3), F) if bent else None)
         keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase", "share")]
 
         def compute(unit: WorkUnit, stop: threading.Event) -> tuple[Estimates, int]:
             key = self.points.key[unit.points]
             draws = np.stack([unit_interval(hashed(stream_key, key)) for stream_key in keys])
-            sampler = self.method.sampler
-            hemispheres = self.points.hemispheres(unit.points, draws[2], unit.samples, sampler)
+            sampler = self.measure.method.sampler
+            hemispheres = self.points.hemispheres(unit.points, draws[2], unit.samples, sampler, side)
             occluders = self.occluders[unit.object]
             tracer = occluders.tracer.counting(stop)
-            method = replace(self.method, samples=unit.samples, triangle_normals=occluders.normals)
+            normals = None if occluders.normals is None else F(side) * occluders.normals
+            method = replace(self.measure.method, samples=unit.samples, triangle_normals=normals)
             return estimates(tracer, hemispheres, draws[:2], method, bent=bent), tracer.rays
 
         # Copy the units that an earlier run finished from the journal.
@@ -249,6 +252,7 @@ class BakeSampler(Record):
 
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
         """Units of neighbouring points of one object that cast the same number of rays in one way."""
+        purpose = f"{self.points.kind} {self.measure.channel}"
         samples = np.zeros(len(self.order), np.int64)
         samples[counts.points] = counts.samples
         # Group them, along their order.
@@ -263,7 +267,7 @@ class BakeSampler(Record):
             size = max(1, UNIT_RAYS // count)
             for first in range(0, len(group), size):
                 owner = int(self.points.objects[group[0]])
-                yield WorkUnit(group[first : first + size], count, owner, self.points.kind)
+                yield WorkUnit(group[first : first + size], count, owner, purpose)
 
     def _run(
         self, purpose: str, units: Sequence[WorkUnit], compute: Compute[Result]

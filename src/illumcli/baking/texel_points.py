@@ -13,43 +13,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Ids, column_major, cross, length, row_blocks, take_rows
+from illumcli.arrays import F, cross, length, row_blocks
 from illumcli.atlas.centres import TexelsOnTriangles, joined
 from illumcli.atlas.overlaps import Overlaps, overlaps
 from illumcli.atlas.texels import texels_of
 from illumcli.atlas.triangles import AtlasTriangles, TextureSize, atlas_triangles
 from illumcli.baking.baked_texture import TextureUvs
-from illumcli.baking.points import Points, Surfaces
+from illumcli.baking.points import PointsOnTriangles, Surfaces
 from illumcli.baking.texture_slots import Slot
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
 from illumcli.rays.corner_weights import corner_weights
 from illumcli.rays.interaction import Hits, ShadingContext, interact, interpolated
-from illumcli.rays.offsets import offset_ray_origins
 from illumcli.records import Record
-from illumcli.visibility.hemisphere import Hemispheres
 
 
-class TexelPoints(Points):
-    """M points on triangles."""
+class TexelPoints(PointsOnTriangles):
+    """Points at texels."""
 
     kind = "texel"
-
-    triangle: Ids  # (M,)
-    u: NDArray[np.float32]  # (M,) weight of corner 1
-    v: NDArray[np.float32]  # (M,) weight of corner 2
-
-    def hemispheres(
-        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
-    ) -> Hemispheres:
-        objects, triangle = self.objects[index], self.triangle[index]
-        zero = np.zeros((len(index), 3), F)
-        surface = interact(self.geometry, objects, triangle, self.u[index], self.v[index], zero)
-        origins = offset_ray_origins(surface.position, surface.ng, surface.edge)
-        return Hemispheres(column_major(take_rows(self.n, index)), origins, surface.ng)
-
-    def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        return open_triangles[self.triangle]
 
 
 class TexturePoints(Record):

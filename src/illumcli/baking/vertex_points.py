@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
-from illumcli.baking.points import Points, Surfaces
+from illumcli.baking.points import Points, Side, Surfaces
 from illumcli.baking.wedges import CornerWedges, Triangles, corner_wedges, polygon_corners, triangles_of
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.offsets import offset_ray_origins
@@ -56,7 +56,7 @@ class VertexPoints(Points):
     triangles: Triangles
 
     def hemispheres(
-        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str
+        self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str, side: Side = 1
     ) -> Hemispheres:
         if self.is_flat[index].all():
             origin_of_ray = packet_of_ray(sampler, samples)
@@ -86,17 +86,16 @@ class VertexPoints(Points):
         # where it starts; of the wedges, only those that are needed if these are few
         if len(holder) < len(wedge):
             wedge, holder = wedge[holder], np.arange(len(holder))
-        base, ahead, aside, ng = self._insets(wedge)
+        base, ahead, aside, ng = self._insets(wedge, side)
         starts = take_rows(base, holder)
         starts += np.cos(turn)[:, None] * take_rows(ahead, holder)
         starts += np.sin(turn)[:, None] * take_rows(aside, holder)
-        return Hemispheres(
-            take_rows(self.n, index), starts, take_rows(ng, holder), origin_of_ray=origin_of_ray
-        )
+        n = F(side) * take_rows(self.n, index)
+        return Hemispheres(n, starts, take_rows(ng, holder), origin_of_ray=origin_of_ray)
 
-    def _insets(self, wedge: NDArray[np.int64]) -> tuple[Vectors, Vectors, Vectors, Vectors]:
+    def _insets(self, wedge: NDArray[np.int64], side: Side) -> tuple[Vectors, Vectors, Vectors, Vectors]:
         """Of some wedges, (K, 3) float32 each: the corner, offset from its triangle; the step inwards along
-        the next edge, and the one at right angles to it; the triangle's normal."""
+        the next edge, and the one at right angles to it; the triangle's normal on that side."""
         vertex, triangle = self.wedges.vertex[wedge], self.wedges.triangle[wedge]
         corner, following, last = (
             column_major(take_rows(self.geometry.vertices, vertex[:, k]), np.float64) for k in range(3)
@@ -108,10 +107,10 @@ class VertexPoints(Points):
         normal = ng.astype(np.float64)
         along = unit(ahead - dot(ahead, normal)[:, None] * normal) * reach[:, None]
         return (
-            offset_ray_origins(corner, ng, edge),
+            offset_ray_origins(corner, F(side) * ng, edge),
             column_major(along, F),
             column_major(cross(normal, along), F),
-            ng,
+            F(side) * ng,
         )
 
     def open_points(self, open_triangles: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from illumcli.baking.context import BakedChannels, PointChannels
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.sampling import MAX_SAMPLES
-from illumcli.baking.settings import BakeSettings
 from illumcli.baking.texel_points import TexturePoints
 from illumcli.files.journal import Journal
 
@@ -16,17 +15,17 @@ DARK, MOSTLY = 0.01, 0.9
 """If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
 
 
-def warnings_of(settings: BakeSettings, values: BakedChannels) -> list[str]:
+def warnings_of(values: BakedChannels) -> list[str]:
     """Warnings about targets that were not reached, a mesh that seems to be inside out, and uv."""
-    warnings = [line for each in values.of_points for line in _of_points(settings, each)]
+    warnings = [line for each in values.of_points for line in _of_points(each)]
     textures = () if values.at_texels is None else values.at_texels.texels.textures
     return list(dict.fromkeys([*warnings, *(line for each in textures for line in uv_warnings(each))]))
 
 
-def _of_points(settings: BakeSettings, values: PointChannels) -> list[str]:
+def _of_points(values: PointChannels) -> list[str]:
     warnings = []
-    target = settings.target_error
     for name, statistics in values.statistics.items():
+        target = statistics.target
         if target is None or statistics.rmse <= target:
             continue
         at_limit = max(statistics.samples, default=0) >= MAX_SAMPLES

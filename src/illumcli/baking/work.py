@@ -19,12 +19,12 @@ Result = TypeVar("Result")
 
 
 class WorkUnit(Record):
-    """Points of one object that cast equally many rays; its result depends on nothing else."""
+    """Points of one object that cast equally many rays for a purpose; its result depends on nothing else."""
 
     points: NDArray[np.int64]
     samples: int
     object: int
-    kind: str = ""  # of the points
+    purpose: str = ""
 
     @property
     def rays(self) -> int:
@@ -34,7 +34,7 @@ class WorkUnit(Record):
     def key(self) -> bytes:
         """16 bytes that tell it from every other unit of its bake."""
         digest = hashlib.blake2b(struct.pack("<qq", self.samples, self.object), digest_size=16)
-        digest.update(self.kind.encode())
+        digest.update(self.purpose.encode())
         digest.update(np.ascontiguousarray(self.points).data)
         return digest.digest()
 

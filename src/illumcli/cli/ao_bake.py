@@ -216,7 +216,8 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     type=_What(),
     default="ao",
     show_default=True,
-    help="What is computed: ao, bent_normal (the mean unoccluded direction), or several: ao,bent_normal.",
+    help="What is computed: ao, bent_normal (the mean unoccluded direction), thickness (the mean distance "
+    "inwards, scene units), or several: ao,thickness.",
 )
 @click.option(
     "--color",

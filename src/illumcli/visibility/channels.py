@@ -32,9 +32,11 @@ CHANNELS: Mapping[str, Channel] = {
     "obscurance": Channel("ao", "value", ("obscurance", "quality"), 1.0),
     "standard_error": Channel("ao", "error", ("standard_error",)),
     "bent_normal": Channel("bent_normal", "direction", ("nx_bent", "ny_bent", "nz_bent")),
+    "thickness": Channel("thickness", "value", ("thickness",)),
+    "thickness_error": Channel("thickness", "error", ("thickness_error",)),
 }
-"""By name; glTF attributes are called `_OBSCURANCE` and so on. Directions are unit vectors in scene space, or
-0 where there is none."""
+"""By name; glTF attributes are called `_OBSCURANCE` and so on. Directions are unit vectors in scene space.
+Thickness and its standard error are in scene units."""
 
 
 def whats() -> tuple[str, ...]:

@@ -157,7 +157,7 @@ def estimates(
         if errors and traced.mu is not None:
             variation[points] = SAMPLERS[method.sampler].variation(traced.mu)
         if bent_normal is not None and traced.mu is not None and traced.directions is not None:
-            bent_normal[points] = mean_open_direction(traced.directions, traced.mu)
+            bent_normal[points] = mean_open_direction(traced.directions, traced.mu, batch.n)
     return Estimates(w, variation, bent_normal, count - casting)
 
 
@@ -199,11 +199,11 @@ def openness(tracer: Tracer, rays: PatternRays, method: Method, each_ray: bool, 
     return Openness(mu.mean(axis=1, dtype=np.float64).astype(F), mu, d)
 
 
-def mean_open_direction(directions: NDArray[np.float32], mu: NDArray[Any]) -> NDArray[np.float32]:
-    """(M, 3) float32 unit mean of (3, M, N) directions, weighted by mu, (M, N); 0 if all are occluded."""
+def mean_open_direction(directions: NDArray[np.float32], mu: NDArray[Any], n: Vectors) -> Vectors:
+    """(M, 3) float32 unit mean of (3, M, N) directions, weighted by mu, (M, N); `n` if all are occluded."""
     total = np.matmul(directions.transpose(1, 0, 2), mu.astype(F)[:, :, None])[:, :, 0]
     size = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.divide(total, size, out=np.zeros_like(total), where=size > 0)
+    return np.divide(total, size, out=np.array(n, F), where=size > 0)
 
 
 def front_face_distance(tracer: Tracer, o: Vectors, d: Vectors, method: Method) -> Floats:

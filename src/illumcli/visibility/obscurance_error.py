@@ -26,7 +26,7 @@ class Estimates(Record):
 
     w: NDArray[np.float32]  # (M,) in [0, 1]
     neighbor_variation: NDArray[np.float32]  # (M,) sum of squared differences of mu between neighbouring rays
-    bent: Vectors | None = None  # (M, 3) float32 bent normal: unit mean unoccluded direction, or 0
+    bent: Vectors | None = None  # (M, 3) float32 bent normal: unit mean unoccluded direction
     skipped: int = 0  # points known to be open, which cast no rays
 
 

@@ -17,6 +17,7 @@ from illumcli.render_graph.schedule import outputs_of, shared_keys
 from illumcli.render_graph.tile_nodes import RenderStats
 from illumcli.scene.load import load
 from planned import layers_of, planned
+from tetrahedron import baked_object
 
 SCENE = """
 version: 1
@@ -119,12 +120,7 @@ def test_an_open_scene_stays_exactly_open(tmp_path):
 
 def test_baked_objects_keep_their_values(path, tmp_path, illum):
     scene = tmp_path / "scene.yaml"
-    (tmp_path / "ball.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    )
-    illum("ao-bake", "ball.obj", "-o", "ball.npz", "--samples", "8", cwd=tmp_path)
-    baked = "  - {mesh: {file: ball.obj, obscurance: ball.npz}, transform: {translate: [-1, 0, 0]}}\n"
-    scene.write_text(SCENE.replace("lights:", f"{baked}lights:"))
+    scene.write_text(SCENE.replace("lights:", f"{baked_object(tmp_path, illum)}lights:"))
     raw, after = (
         rendered(scene, f"obscurance.reconstruct={on}", only=("obscurance", "object_id"))[0]
         for on in ("false", "true")

@@ -11,6 +11,7 @@ from illumcli.render_graph.execute import Run, at_pixels, run_once
 from illumcli.render_graph.explain import expected_rays
 from illumcli.scene.load import load
 from planned import layers_of, planned
+from tetrahedron import baked_object
 
 SCENE = """
 version: 1
@@ -91,13 +92,7 @@ def test_an_open_scene_stays_exactly_open(tmp_path):
 
 def test_baked_objects_keep_their_values(path, tmp_path, illum):
     scene = tmp_path / "scene.yaml"
-    (tmp_path / "ball.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    )
-    illum("ao-bake", "ball.obj", "-o", "ball.npz", "--samples", "8", cwd=tmp_path)
-    scene.write_text(
-        SCENE + "  - {mesh: {file: ball.obj, obscurance: ball.npz}, transform: {translate: [-1, 0, 0]}}\n"
-    )
+    scene.write_text(SCENE + baked_object(tmp_path, illum))
     raw, after = (
         picture(scene, f"obscurance.reconstruct={on}", only=("obscurance", "object_id"))
         for on in ("false", "true")

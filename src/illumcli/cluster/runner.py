@@ -8,12 +8,12 @@ happens to workers or to the scheduler, only pieces without a result are given o
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from illumcli.cache.fingerprint import digest
 from illumcli.cluster.address import Address
@@ -88,30 +88,83 @@ class ClusterRunner:
             return
         session = Session(self._address, self._is_mixed, self._tell)
         try:
+            tasks = _Tasks(batch, pieces, due, len(session.workers()))
             of_batch = BatchProgress(batch, due, self._progress)
             of_batch.start()
-            for number, result in _Blocks(session, batch, pieces.unit, due).results():
-                yield number, result
-                of_batch.finished(number)
+            for task, result in _Blocks(session, tasks).results():
+                number = tasks.number(task)
+                if whole := tasks.taken(task, result):
+                    yield number, whole
+                    of_batch.finished(number)
+                else:
+                    of_batch.of_piece("bands", *tasks.progress(number))
         finally:
             session.close()
 
 
-class _Blocks:
-    """The blocks of a batch: those left, those that are to be done again, those given out."""
+class _Tasks(Generic[R]):
+    """The units of the pieces that are due, numbered from 0; a piece that is cut has several."""
 
-    def __init__(
-        self, session: Session, batch: Batch, unit_of: Callable[[int], Unit], due: list[int]
-    ) -> None:
-        self._session, self._batch, self._unit_of = session, batch, unit_of
-        self._left, self._again = deque(due), deque[Block]()
-        self._given: dict[Future, Block] = {}
+    def __init__(self, batch: Batch, pieces: Pieces[R], due: Sequence[int], workers: int) -> None:
+        self._batch, self._pieces = batch, pieces
+        self._cut = pieces.cut() if pieces.cut else None
+        self._parts = self._cut.parts(due, workers) if self._cut else {}
+        self._places = [
+            (number, part) for number in due for part in range(len(self._parts.get(number, (number,))))
+        ]
+        self._results: dict[int, dict[int, Callable[[], R]]] = defaultdict(dict)
         # What the pieces of one scene share is made by the first, before the others start.
-        ends = [scene_of(unit_of(number)) for number in (due[0], due[-1])]
-        self._is_first_alone = len(due) > 1 and ends[0] == ends[1]
+        ends = [scene_of(self.unit(task)) for task in (0, len(self) - 1)]
+        self.is_first_alone = len(self) > 1 and ends[0] == ends[1] and not self._parts
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def number(self, task: int) -> int:
+        """The number of a unit's piece."""
+        return self._places[task][0]
+
+    def unit(self, task: int) -> Unit:
+        """A unit."""
+        number, part = self._places[task]
+        return self._parts[number][part] if number in self._parts else self._pieces.unit(number)
+
+    def is_due(self, task: int) -> bool:
+        """False for a unit of a piece that need not be done any more."""
+        return self._batch.is_due(self.number(task))
+
+    def taken(self, task: int, result: Callable[[], R]) -> Callable[[], R] | None:
+        """A function that returns the result of a unit's piece, if all of its units are done."""
+        number, part = self._places[task]
+        if number not in self._parts:
+            return result
+        results = self._results[number]
+        results[part] = _settled(result)
+        if len(results) < len(self._parts[number]):
+            return None
+        return partial(self._joined, number)
+
+    def progress(self, number: int) -> tuple[int, int]:
+        """How many units of a piece are done, and how many it has."""
+        return len(self._results[number]), len(self._parts[number])
+
+    def _joined(self, number: int) -> R:
+        assert self._cut is not None
+        results = self._results.pop(number)
+        return self._cut.join(number, [results[part]() for part in sorted(results)])
+
+
+class _Blocks:
+    """The blocks of units: those left, those that are to be done again, those given out."""
+
+    def __init__(self, session: Session, tasks: _Tasks[Any]) -> None:
+        self._session, self._tasks, self._unit_of = session, tasks, tasks.unit
+        self._left, self._again = deque(range(len(tasks))), deque[Block]()
+        self._given: dict[Future, Block] = {}
+        self._is_first_alone = tasks.is_first_alone
 
     def results(self) -> Iterator[tuple[int, Callable[[], Any]]]:
-        """The index of each piece, and a function that returns its result or raises its error."""
+        """The number of each unit, and a function that returns its result or raises its error."""
         while self._left or self._again or self._given:
             self._take_back()
             self._give_out()
@@ -151,7 +204,7 @@ class _Blocks:
         most = 1 if self._is_first_alone else HELD * len(workers)
         while (self._left or self._again) and len(self._given) < most:
             block = self._again.popleft() if self._again else self._next(len(workers))
-            due = tuple(number for number in block.numbers if self._batch.is_due(number))
+            due = tuple(number for number in block.numbers if self._tasks.is_due(number))
             if not due:
                 continue
             others = workers - block.failed_on if block.failed_on else frozenset[str]()
@@ -231,5 +284,14 @@ def _result(done: UnitResult) -> Any:
     return done.result
 
 
-def _raise(error: IllumError) -> None:
+def _settled(result: Callable[[], R]) -> Callable[[], R]:
+    """A function that returns a result, whose files are written now, or raises its error."""
+    try:
+        value = result()
+    except IllumError as error:
+        return partial(_raise, error)
+    return lambda: value
+
+
+def _raise(error: IllumError) -> Any:
     raise error

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from illumcli import __version__
+from illumcli.commands.work import Work
 from illumcli.film.develop import Target, how_to_read
 from illumcli.render_graph.needs import reconstructs
 from illumcli.render_space import RenderSpace
-from illumcli.scene.spec import Scene
 
 
-def metadata(scene: Scene, target: Target, space: RenderSpace) -> dict[str, Any]:
-    """The metadata of a file."""
-    return {
+def metadata(work: Work, target: Target, space: RenderSpace) -> dict[str, Any]:
+    """The metadata of a file; that of a band tells what its picture has."""
+    scene = work.scene
+    of_file = {
         "Software": f"illum {__version__}",
         "illum:version": __version__,
         "illum:content": target.content,
@@ -26,3 +27,11 @@ def metadata(scene: Scene, target: Target, space: RenderSpace) -> dict[str, Any]
         "illum:obscurance_reconstructed": int(reconstructs(scene)),
         **how_to_read(target, space),
     }
+    if target.rows is None:
+        return of_file
+    from illumcli.images.picture_bands import PICTURE, picture_text
+
+    of_picture = {**of_file, "illum:content": target.picture}
+    is_light = target.layers[0].kind == "light"
+    channels = work.development.channels(target)
+    return {**of_file, PICTURE: picture_text(target.view.height, channels, of_picture, is_light)}

@@ -60,5 +60,7 @@ class RenderJob(Value):
     """The frame of an animation; by default the scene's first, or none."""
     cameras: tuple[str, ...] = ()
     """Names of the cameras whose images are rendered; by default all."""
+    rows: tuple[int, int] | None = None
+    """The rows of these images that are rendered, into files of their own; by default all."""
     fields: Mapping[str, Any] = field(default_factory=dict)
     """Further fields for the names of its files."""

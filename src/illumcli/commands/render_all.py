@@ -12,7 +12,7 @@ from illumcli.commands.batch import Batch, BatchReport, Tell
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
-from illumcli.commands.runner import PlannedPieces, Runner
+from illumcli.commands.runner import Cut, PlannedPieces, Runner
 from illumcli.files.names import check_unique
 from illumcli.progress import Progress
 from illumcli.records import Value
@@ -72,7 +72,12 @@ def render_scenes(
         ending = jobs.worker.finish() if following is None else ()
         return paths, replace(done, warnings=(*done.warnings, *ending))
 
-    for number, result in runner.results(batch, planned.pieces(jobs.unit, run)):
+    def cut() -> Cut[tuple[list[Path], Report]]:
+        from illumcli.commands.bands import CutJobs  # for several workers
+
+        return CutJobs(jobs)
+
+    for number, result in runner.results(batch, planned.pieces(jobs.unit, run, cut)):
         with batch.piece(number, jobs.label(number)):
             paths, done = result()
             job = jobs.unit(number)

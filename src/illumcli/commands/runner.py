@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
@@ -21,6 +21,16 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
+class Cut(Protocol[R]):
+    """Cuts large pieces of a batch into units for several workers."""
+
+    def parts(self, due: Sequence[int], workers: int) -> Mapping[int, Sequence[Unit]]:
+        """Number of a piece that is cut -> its units."""
+
+    def join(self, number: int, results: Sequence[R]) -> R:
+        """The result of a piece, from those of its units."""
+
+
 class Pieces(Value, Generic[R]):
     """The pieces of a batch, by index."""
 
@@ -32,6 +42,8 @@ class Pieces(Value, Generic[R]):
     """Does a piece in this process, and tells how far it is."""
     kept: frozenset[int]
     """Those of which all files exist already: nothing is computed."""
+    cut: Callable[[], Cut[R]] | None = None
+    """How large pieces are shared among workers; by default they are not."""
 
 
 class PlannedPieces:
@@ -57,9 +69,14 @@ class PlannedPieces:
             self._claims[number] = None
             self._kept.add(number)
 
-    def pieces(self, unit: Callable[[int], Unit], run: Callable[[int, Progress], R]) -> Pieces[R]:
+    def pieces(
+        self,
+        unit: Callable[[int], Unit],
+        run: Callable[[int, Progress], R],
+        cut: Callable[[], Cut[R]] | None = None,
+    ) -> Pieces[R]:
         """The pieces, each done by `run`."""
-        return Pieces(unit, self._claims.__getitem__, run, frozenset(self._kept))
+        return Pieces(unit, self._claims.__getitem__, run, frozenset(self._kept), cut)
 
 
 class Runner(Protocol):

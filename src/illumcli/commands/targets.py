@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.options import RenderJob
 from illumcli.errors import InputError
-from illumcli.files.names import check_unique, expand, frame_field, with_forms
+from illumcli.files.names import band_path, check_unique, expand, frame_field, with_forms
 from illumcli.film.develop import Target
 from illumcli.film.view import View
 from illumcli.layers import Layer
@@ -44,9 +45,16 @@ def image_set(job: RenderJob, loaded: SceneFile, graph: Graph, outputs: tuple[La
                 path = expanded(pattern, job, loaded, view, name)
                 if not given:
                     refuse_outside(loaded, number, path)
-                targets.append(Target(path, view, layers, file_content(graph, view, layers, suffix)))
+                whole = Target(path, view, layers, file_content(graph, view, layers, suffix))
+                targets.append(whole if job.rows is None else band_of(whole, job.rows))
     check_unique([str(target.path) for target in targets])
     return targets
+
+
+def band_of(whole: Target, rows: tuple[int, int]) -> Target:
+    """The file of some rows of a picture."""
+    path, content = band_path(whole.path, rows), digest((whole.content, rows))
+    return replace(whole, path=path, content=content, rows=rows, picture=whole.content)
 
 
 def file_patterns(job: RenderJob, loaded: SceneFile, scene: Scene) -> tuple[str, ...]:

@@ -135,9 +135,10 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
     """Raise LimitError if memory or disk cannot hold the files that are due; reads and writes nothing."""
     values = sum(len(layer.channels) for layer in work.outputs) + 1
     expected = expected_memory(work.loaded, work.scene) if due else {}
+    is_held = error_is_audited(work.scene, work.outputs)  # until the audit
     for target in due:
         view = target.view
-        rows = view.height if error_is_audited(work.scene, work.outputs) else BAND_ROWS  # held for the audit
+        rows = target.height if is_held else BAND_ROWS
         refuse_memory(rows, view.width, values, expected, str(work.loaded.path))
         types = work.development.channels(target).values()
-        refuse_disk(target.path, view.width * view.height * sum(BYTES[kind] for kind in types))
+        refuse_disk(target.path, view.width * target.height * sum(BYTES[kind] for kind in types))

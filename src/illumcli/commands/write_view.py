@@ -51,7 +51,7 @@ def write_view(
     view, space, development = plan.view, shared["render_space"], work.development
 
     # Called after each tile: report the progress.
-    done, pixels = 0, view.width * view.height
+    done, pixels = 0, view.width * targets[0].height
 
     def advance(count: int) -> None:
         nonlocal done
@@ -81,9 +81,9 @@ def write_view(
                 ImageWriter(
                     target.path,
                     view.width,
-                    view.height,
+                    target.height,
                     development.channels(target),
-                    metadata(work.scene, target, space) | _room(target, stated),
+                    metadata(work, target, space) | _room(target, stated),
                     srgb=target.layers[0].kind == "light",
                 )
             )
@@ -101,7 +101,7 @@ def write_view(
             if "error" in band.layers:
                 sums.add(band.layers["error"])
             for target, writer in zip(targets, writers, strict=True):
-                writer.write_band(band.y, band.layers[str(target.path)])
+                writer.write_band(band.y - (target.rows or (0,))[0], band.layers[str(target.path)])
             run.stats.add({"write": time.perf_counter() - start}, {})
 
         # Measure the error of reconstructed obscurance, and write it beside the layer.

@@ -8,6 +8,7 @@ import re
 import unicodedata
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from illumcli.errors import InputError
@@ -161,3 +162,8 @@ def _safe(text: str) -> str:
     """`text` as a part of a file name that is valid on any system; never empty, never a folder."""
     text = re.sub(r"[^\w.+-]+", "_", text)
     return re.sub(r"^\.+|\.+$", "_", text) or "_"
+
+
+def band_path(picture: Path, rows: tuple[int, int]) -> Path:
+    """The file of some rows of a picture, from the first to before the second."""
+    return picture.with_name(f"{picture.stem}.rows-{rows[0]:05d}-{rows[1] - 1:05d}{picture.suffix}")

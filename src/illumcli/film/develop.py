@@ -29,6 +29,16 @@ class Target(Value):
     layers: tuple[Layer, ...]
     content: str
     """Hash of everything that its pixels depend on."""
+    rows: tuple[int, int] | None = None
+    """The rows of the picture that it holds, from the first to before the second; by default all."""
+    picture: str = ""
+    """The content of the whole picture, if it holds some rows."""
+
+    @property
+    def height(self) -> int:
+        """Number of its rows."""
+        first, end = self.rows or (0, self.view.height)
+        return end - first
 
     @property
     def is_png(self) -> bool:

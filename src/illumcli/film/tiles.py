@@ -61,8 +61,9 @@ class Tile(Value):
         return slice(y, y + self.height), slice(x, x + self.width)
 
 
-def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
-    """The tiles of an image, row by row: squares, except at the end of the last row.
+def tiles(width: int, height: int, side: int, samples: int, first: int = 0) -> list[list[Tile]]:
+    """The tiles of an image of this size, or of `height` rows of one from its row `first` on, row by row:
+    squares, except at the end of the last row.
 
     There each tile is half of the remaining width, down to `MIN_TILE_SAMPLES`, so that all threads finish at
     about the same time.
@@ -74,7 +75,7 @@ def tiles(width: int, height: int, side: int, samples: int) -> list[list[Tile]]:
         while rest := width - x:
             half = min(-(-rest // 16) * 8, rest)
             ending = last and rest <= 2 * side and half * tile_height * samples >= MIN_TILE_SAMPLES
-            row.append(Tile(x, y, half if ending else min(side, rest), tile_height))
+            row.append(Tile(x, first + y, half if ending else min(side, rest), tile_height))
             x += row[-1].width
         out.append(row)
     return out

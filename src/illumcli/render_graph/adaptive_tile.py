@@ -218,6 +218,6 @@ def _show(
 def pixel_recorder_of(plan: Plan, cache: Cache) -> PixelRecorder | None:
     """What keeps the pixels of an adaptive picture that have all samples, where something is kept."""
     others = plan.all_samples
-    if others is None or (cache.store is None and cache.memory is None):
+    if others is None or plan.rows is not None or (cache.store is None and cache.memory is None):
         return None
     return PixelRecorder(cache.store, cache.memory, others.lookup.keeps, others.lookup.pixels, others.view)

@@ -106,7 +106,8 @@ def bands(
     side: int | None = None,
     develop: Develop = _unchanged,
 ) -> Iterator[Band]:
-    """The image of a view as bands of rows from the top, each as soon as its tiles are finished.
+    """The image of a view, or the plan's rows of it, as bands from the top, each as soon as its tiles are
+    finished.
 
     Bands hold the layers, or the arrays that `develop` computes from them tile by tile. The pixels do not
     depend on the number of threads, the `side` of tiles or the cache; buffers that are worth it are cached.
@@ -118,10 +119,18 @@ def bands(
         The buffers of the whole scene, from `run_once`.
     done : callable
         Called with the number of pixels of each finished tile.
+
+    Raises
+    ------
+    ValueError
+        Some rows of a plan whose pixels read those around them.
     """
     view = plan.view
-    rows = tiles(view.width, view.height, plan.tile_side(view, side), plan.samples_per_pixel)
-    keeps = plan.lookup.keeps
+    if plan.before and plan.rows is not None:
+        raise ValueError("pictures of which pixels read those around them are rendered whole")
+    first, end = plan.rows or (0, view.height)
+    rows = tiles(view.width, end - first, plan.tile_side(view, side), plan.samples_per_pixel, first)
+    keeps = plan.lookup.keeps if plan.rows is None else {}  # buffers of tiles are kept of whole pictures
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
     common = TileContext(
         plan, shared, run.stats, stop, recorder, develop, pixel_recorder_of(plan, run.cache), run.cache

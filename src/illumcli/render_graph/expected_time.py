@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 from illumcli.cache.speeds import ELAPSED, Speeds
@@ -34,7 +35,8 @@ class ExpectedTime(Value):
 def units_of(plan: Plan) -> dict[str, float]:
     """`units` of the buffers that a plan computes."""
     once = {node.output for node in plan.once}
-    return units(plan.graph.scene, plan.view, plan.computed, once)
+    first, end = plan.rows or (0, plan.view.height)
+    return units(plan.graph.scene, replace(plan.view, height=end - first), plan.computed, once)
 
 
 def units(scene: Scene, view: View, computed: Collection[str], once: Collection[str]) -> dict[str, float]:

@@ -52,6 +52,8 @@ class Plan(Value):
     """The nodes that run for those pixels."""
     replicates: Plan | None = None
     """The nodes that run for the replicates of an adaptive picture whose error is asked for."""
+    rows: tuple[int, int] | None = None
+    """The rows of the picture that are computed, from the first to before the second; by default all."""
 
     @property
     def buffers(self) -> set[str]:

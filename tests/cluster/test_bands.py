@@ -1,0 +1,65 @@
+"""A picture that is large beside the share of a worker, in bands on several workers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from illumcli.cluster.address import address_of
+from illumcli.cluster.runner import ClusterRunner
+from illumcli.commands import bands
+from illumcli.commands.options import RenderOptions
+from illumcli.commands.render_all import render_scenes
+from illumcli.commands.runner import Here
+from illumcli.progress import no_progress
+
+FILES = "outputs.files=['{scene}.exr', '{scene}.{layer}.png']"
+LARGE = ("film.width=96", "film.height=200", FILES)
+
+
+def rendered(options, runner, report=None):
+    done = []
+    render_scenes([Path("s.yaml")], options, report, runner, done.append, print)
+    (only,) = done
+    return only
+
+
+def test_bands_make_the_picture_of_one_process(scene, monkeypatch):
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.setattr(bands, "LEAST", 1)
+    options = RenderOptions(LARGE, cache=False)
+    whole = rendered(options, Here())
+    expected = {path: path.read_bytes() for path in whole.paths}
+    for path in expected:
+        path.unlink()
+    told = []
+    runner = ClusterRunner(address_of("local:2"), False, told.append, lambda what, *_: told.append(what))
+    done = rendered(options, runner, Path("r.json"))
+    assert {path: path.read_bytes() for path in done.paths} == expected
+    assert "bands" in told
+    assert list(Path().glob("*rows*")) == []
+    assert done.report.written == whole.report.written
+    assert done.report.scene_hash == whole.report.scene_hash
+    assert done.report.rays["obscurance"] == whole.report.rays["obscurance"]
+    assert json.loads(Path("r.json").read_text())["written"] == list(whole.report.written)
+
+    # A file that is missing is made again, the others stay.
+    whole.paths[0].unlink()
+    again = rendered(options, ClusterRunner(address_of("local:2"), False, print, no_progress))
+    assert again.report.written == (str(whole.paths[0]),)
+    assert again.report.kept == tuple(map(str, whole.paths[1:]))
+    assert whole.paths[0].read_bytes() == expected[whole.paths[0]]
+
+
+@pytest.mark.parametrize("why", ["obscurance.reconstruct=true", "target_error"])
+def test_pictures_that_need_their_surroundings_stay_whole(scene, monkeypatch, why):
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.setattr(bands, "LEAST", 1)
+    options = RenderOptions((*LARGE, why)) if "=" in why else RenderOptions(LARGE, target_error=0.1)
+    from illumcli.commands.render_jobs import RenderJobs
+
+    jobs = RenderJobs([Path("s.yaml")], options)
+    assert bands.CutJobs(jobs).parts([0], 2) == {}
+    assert bands.whole_because(jobs.work(0))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
-from illumcli.images.contents import image_contents
+from illumcli.images.contents import image_contents, image_texts
 from illumcli.mesh_files import ply
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
@@ -63,14 +65,27 @@ def baked_contents(path: Path) -> list[str]:
     """
     if path.suffix.lower() in (".png", ".exr"):
         return image_contents(path)
-    readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
     try:
-        content = readers[path.suffix.lower()](path)["content"]
+        content = baked_about(path)["content"]
     except Exception as why:  # zipfile, numpy and json each have their own
         raise InputError(f"{path}: is no baked obscurance ({why}); bake it with illum ao-bake") from why
     if not isinstance(content, str):
         raise InputError(f"{path}: names no content; bake it with illum ao-bake")
     return [content]
+
+
+def baked_about(path: Path) -> dict[str, Any]:
+    """The description of its bake in a file written here.
+
+    Raises
+    ------
+    Exception
+        Not such a file; zipfile, numpy and json each have their own exceptions.
+    """
+    if path.suffix.lower() in (".png", ".exr"):
+        return dict(json.loads(image_texts(path)["illum:about"]))
+    readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
+    return readers[path.suffix.lower()](path)
 
 
 def _vertex_data(columns: Mapping[str, NDArray[np.float32]], baked: Baked, channel: str | None) -> VertexData:

@@ -71,6 +71,13 @@ class BakeJob(Value):
     outputs: tuple[Path, ...]
     settings: BakeSettings
     options: BakeOptions = AS_USUAL
+    preview: Path | None = None
+    """The picture of the result, if one is wanted."""
+
+    @property
+    def previews(self) -> tuple[Path, ...]:
+        """The preview, if there is one."""
+        return () if self.preview is None else (self.preview,)
 
     @property
     def threads(self) -> int:

@@ -236,6 +236,11 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     help="Bake textures of this size over the uv of the meshes, for .png and .exr outputs.",
 )
 @click.option("--bits", type=click.Choice([8, 16]), default=8, show_default=True, help="Of textures as .png.")
+@click.option(
+    "--preview",
+    metavar="PNG",
+    help="Also draw the result from four sides, w alone and in light, with a histogram; may hold {name}.",
+)
 @seed_option("Random seed.", default=0)
 @threads_option
 @overrides_option

@@ -25,6 +25,8 @@ class BakeRequest(Value):
     settings: BakeSettings
     patterns: tuple[str, ...]
     """Patterns of the outputs' names; `{name}` and `{scene}` are the input's name without its suffix."""
+    preview: str | None = None
+    """Pattern of the previews' names."""
     options: BakeOptions = BakeOptions()
     keep_going: bool = True
     shard: Shard | None = None
@@ -40,12 +42,15 @@ class BakeRequest(Value):
 
     def refuse_shared_outputs(self, inputs: Sequence[Path]) -> None:
         """Raise InputError for all files that several inputs would write; an input may be given twice."""
-        files = [(str(each), str(path)) for path in dict.fromkeys(inputs) for each in self.outputs(path)]
+        jobs = [self.job(path) for path in dict.fromkeys(inputs)]
+        files = [(str(each), str(job.path)) for job in jobs for each in (*job.outputs, *job.previews)]
         check_unique(*zip(*files, strict=True))
 
     def job(self, path: Path) -> BakeJob:
         """The unit of work of one input."""
-        return BakeJob(path, tuple(self.outputs(path)), self.settings, self.options)
+        fields = {"name": path.stem, "scene": path.stem}
+        preview = None if self.preview is None else Path(expand(self.preview, fields))
+        return BakeJob(path, tuple(self.outputs(path)), self.settings, self.options, preview)
 
 
 def bake_inputs(

@@ -90,7 +90,12 @@ class Worker:
             return work_of(unit, loaded, shared.files)
         from illumcli.baking.inputs import prepare_bake
 
-        return prepare_bake(unit)
+        work = prepare_bake(unit)
+        if unit.preview is not None:
+            from illumcli.baking.preview import refuse_preview
+
+            refuse_preview(work)
+        return work
 
     @overload
     def run(
@@ -108,7 +113,12 @@ class Worker:
         if not isinstance(work, Work):
             from illumcli.baking.bake import bake_prepared
 
-            return bake_prepared(work, progress)
+            baked = bake_prepared(work, progress)
+            if work.job.preview is None:
+                return baked
+            from illumcli.baking.preview import with_preview
+
+            return with_preview(work, *baked)
         store = self._store if work.job.options.cache else None
         if work.job.options.target_error is not None:
             from illumcli.commands.target import rendered_to_target

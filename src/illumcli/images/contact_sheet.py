@@ -72,7 +72,7 @@ def _band(row: Row, width: int, pictures: Pictures) -> NDArray[np.uint8]:
     for each in row.pictures:
         picture = _read_scaled(pictures[each.picture], each)
         band[each.y : each.y + each.height, each.x : each.x + each.width] = picture
-    buffer = _display_buffer(band)
+    buffer = display_buffer(band)
     for text in row.texts:
         oiio.ImageBufAlgo.render_text(buffer, text.x, text.y, text.text, TEXT, "", (0.0, 0.0, 0.0))
     return np.asarray(buffer.get_pixels(oiio.UINT8))
@@ -83,12 +83,12 @@ def _read_scaled(read: Callable[[], NDArray[np.uint8]], place: Placed) -> NDArra
     picture = read()
     if picture.shape[:2] == (place.height, place.width):
         return np.broadcast_to(picture, (place.height, place.width, 3))
-    source = _display_buffer(np.broadcast_to(picture, (*picture.shape[:2], 3)))
+    source = display_buffer(np.broadcast_to(picture, (*picture.shape[:2], 3)))
     scaled = oiio.ImageBufAlgo.resize(source, roi=oiio.ROI(0, place.width, 0, place.height, 0, 1, 0, 3))
     return np.asarray(scaled.get_pixels(oiio.UINT8))
 
 
-def _display_buffer(pixels: NDArray[np.uint8]) -> oiio.ImageBuf:
+def display_buffer(pixels: NDArray[np.uint8]) -> oiio.ImageBuf:
     """A buffer of (H, W, 3) display values, on which OpenImageIO computes without conversion."""
     buffer = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.UINT8))
     buffer.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels))

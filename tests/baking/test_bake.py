@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from plyfile import PlyData, PlyElement
 
+from gltf_validator import faults
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.inputs import mesh_alone, surfaces_of
 from illumcli.baking.measures import Measure
@@ -20,6 +21,7 @@ from illumcli.baking.vertex_points import vertex_points
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
 from illumcli.geometry.corner_normals import corner_normals
+from illumcli.images.embedded import png_bytes
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.progress import no_progress
@@ -291,6 +293,37 @@ def test_a_glb_that_is_written_oddly_keeps_all_it_has(text_mesh, tmp_path):
     whole, apart = (read_mesh(tmp_path / f"{name}.glb") for name in ("whole", "apart"))
     assert open_document(tmp_path / "whole.glb").json["extras"] == {"mine": 1}
     np.testing.assert_array_equal(whole.vertices, apart.vertices)
+
+
+def test_an_obj_goes_to_glb_with_its_groups_materials_and_images(text_mesh, tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl clay\nKd 1 0 0\nmap_Kd brick.png\nmap_Ks brick.png\n")
+    (tmp_path / "brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))
+    lines = CUBE.replace("f ", "usemtl clay\nf ", 1).replace("f 5", "g side\nusemtl lost\nf 5")
+    path = text_mesh(f"mtllib a.mtl\nvt 0.25 0.75\no cube\n{lines.replace('f 1 ', 'f 1/1 ')}v 9 9 9\n")
+    _, report = bake(path, tmp_path / "out.glb", samples=16)
+    assert report.left_out == [
+        "out.glb: map_ks of material clay",
+        "out.glb: vertices of mesh that no polygon uses, 1",
+    ]
+    json = open_document(tmp_path / "out.glb").json
+    mesh, made = read_mesh(path), read_mesh(tmp_path / "out.glb")
+    assert made.group_names == mesh.group_names
+    assert [each["name"] for each in json["materials"]] == list(made.material_names) == ["clay", "lost"]
+    assert "baseColorTexture" in json["materials"][0]["pbrMetallicRoughness"]
+    assert len(json["images"]) == 1
+    assert faults(tmp_path / "out.glb") == []
+
+
+def test_an_asset_is_written_again_if_an_image_or_material_changes(text_mesh, tmp_path):
+    library = tmp_path / "a.mtl"
+    library.write_text("newmtl clay\nKd 1 0 0\n")
+    path = text_mesh("mtllib a.mtl\nusemtl clay\n" + CUBE)
+    bake(path, tmp_path / "out.glb", samples=4)
+    bake(path, tmp_path / "out.npz", samples=4)
+    library.write_text("newmtl clay\nKd 0 1 0\n")
+    with pytest.raises(OutputError, match="a different file is there"):
+        bake(path, tmp_path / "out.glb", samples=4)
+    assert bake(path, tmp_path / "out.npz", samples=4)[1].kept
 
 
 def test_copies_of_a_vertex_with_one_normal_get_the_same_value(tmp_path):
@@ -607,7 +640,7 @@ def test_a_vertex_on_a_hard_edge_has_a_value_for_each_normal(hard_cube, tmp_path
         mesh.corners
     )  # all right angles
     np.testing.assert_allclose(baked.obscurance, mean, rtol=1e-6)
-    assert report.left_out == ["out.ply: mesh: normals that differ between the polygons of a vertex"]
+    assert report.left_out == ["out.ply: normals of mesh that differ between the polygons of a vertex"]
 
     # GLB: the file's own vertices first, then a copy for every other normal
     glb, ply = read_mesh(outs[1]), read_mesh(outs[2])

@@ -17,7 +17,7 @@ from illumcli.baking.fit import fitted_to_surface
 from illumcli.baking.inputs import BakeWork, prepare_bake
 from illumcli.baking.measures import measures
 from illumcli.baking.occluders import occluders_of
-from illumcli.baking.outputs import write_outputs
+from illumcli.baking.outputs import pose_warnings, write_outputs
 from illumcli.baking.report import BakeReport
 from illumcli.baking.resume import open_journal, write_beside
 from illumcli.baking.settings import AS_USUAL, BakeJob, BakeOptions, BakeSettings
@@ -69,7 +69,7 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
         with closing(open_journal(work.outputs[0], work.content)) as journal:
             values = baked_of(work, due, bake_context(work, progress, journal))
             left_out = write_beside(journal, partial(write_files, work, due, values))
-            warnings = [*warnings_of(values), *journal_warnings(work, journal)]
+            warnings = [*warnings_of(values), *pose_warnings(work.path), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.images.contents import image_contents, image_texts
+from illumcli.images.embedded import embedded_image
 from illumcli.mesh_files import ply
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
@@ -20,7 +21,9 @@ from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
 from illumcli.visibility.channels import ply_columns
 
-SUFFIXES = (".npz", ".ply", ".glb")
+ASSETS = (".ply", ".glb")
+"""Files that have everything of the input that their format can hold."""
+SUFFIXES = (".npz", *ASSETS)
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
 """Option -> the channels of red, green, blue, alpha that obscurance is written to."""
 
@@ -42,9 +45,9 @@ def write_baked_ply(
 
 
 def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, channel: str | None) -> None:
-    """Write a GLB with a node per mesh, with an attribute for each channel: `_OBSCURANCE` and so on;
-    `COLOR_0` only if a `channel` is given."""
-    gltf.write_glb(path, meshes, _vertex_data(baked.channels, baked, channel))
+    """Write a GLB with an attribute for each channel: `_OBSCURANCE` and so on; `COLOR_0` only if a `channel`
+    is given, or the meshes have colours."""
+    gltf.write_glb(path, meshes, _vertex_data(baked.channels, baked, channel), embedded_image)
 
 
 def add_baked_to_glb(path: Path, source: Path, baked: Baked, channel: str | None) -> list[str]:

@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 
 from illumcli import __version__
 from illumcli.baking.context import StageClock
-from illumcli.baking.files import SUFFIXES, baked_contents
+from illumcli.baking.files import ASSETS, SUFFIXES, baked_contents
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
 from illumcli.baking.texture_slots import Slot, is_texture, texture_files, texture_slots
+from illumcli.cache.fingerprint import FileFingerprint, digest
 from illumcli.errors import InputError
 from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import corner_normals
-from illumcli.mesh_files import is_mesh_file
+from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph.build import build
 from illumcli.render_graph.costs import BYTES
@@ -126,6 +127,8 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
     content = content_hash(loaded.scene, hashes, surfaces, settings)
+    if is_mesh and any(each.suffix.lower() in ASSETS for each in outputs):
+        content = digest((content, FileFingerprint(lambda: path, companions)))
     if options.strict:
         refuse_repairs(str(path), repairs)
     slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)

@@ -2,44 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
 
 from illumcli.baking.files import add_baked_to_glb, write_baked_glb, write_baked_ply
 from illumcli.baking.inputs import BakeWork
-from illumcli.baking.split import OutputMeshes, output_meshes
+from illumcli.baking.split import split_meshes, whole_meshes, with_materials
+from illumcli.mesh_files import is_mesh_file
+from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
+from illumcli.mesh_files.gltf.document import open_document
+from illumcli.mesh_files.gltf.write import fits_attribute
+from illumcli.mesh_files.materials import pbr_materials
+from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.visibility.baked import Baked, write_npz
+
+GLTF = (".glb", ".gltf")
 
 
 def write_outputs(work: BakeWork, due: Sequence[Path], baked: Baked) -> tuple[str, ...]:
     """Write the files `due`. Returns a line for each part of the input that one of them lacks."""
-
-    @cache
-    def meshes(split: bool) -> OutputMeshes:
-        return output_meshes(work.scene.object_names(), work.surfaces.geometry, baked, split)
-
-    return tuple(f"{path.name}: {what}" for path in due for what in _write(path, work, baked, meshes))
+    writer = _Writer(work, baked)
+    return tuple(f"{path.name}: {what}" for path in due for what in writer.write(path))
 
 
-def _write(path: Path, work: BakeWork, baked: Baked, meshes: Callable[[bool], OutputMeshes]) -> Sequence[str]:
-    """Write one file: the input with the values if both have one format, otherwise a new file.
+def pose_warnings(path: Path) -> list[str]:
+    """A line if the meshes of a glTF file are deformed: their values are those of one pose."""
+    if path.suffix.lower() not in GLTF:
+        return []
+    deformers = [name for name in beside_mesh(open_document(path)) if name in DEFORMERS]
+    if not deformers:
+        return []
+    return [f"meshes are deformed by {' and '.join(deformers)}: the values are those of the rest pose"]
 
-    Returns the parts of the input that it lacks.
-    """
-    source, channel, split = work.path, work.settings.channel, work.settings.split
-    source_kind, kind = source.suffix.lower(), path.suffix.lower()
-    if kind == ".npz":
-        write_npz(path, baked)
-        return ()
-    if kind == ".glb" and source_kind in (".glb", ".gltf"):
-        return add_baked_to_glb(path, source, baked, channel)
-    if kind == ".ply" and source_kind == ".ply" and not split:
-        write_baked_ply(path, [], baked, source, channel)
-        return ()
-    written = meshes(split or kind == ".glb")
-    if kind == ".ply":
-        write_baked_ply(path, written.meshes, written.baked, None, channel)
-    else:
-        write_baked_glb(path, written.meshes, written.baked, channel)
-    return written.left_out
+
+class _Writer:
+    """Writes the files of one bake."""
+
+    def __init__(self, work: BakeWork, baked: Baked) -> None:
+        self._work, self._baked = work, baked
+        self._source, self._channel, self._split = work.path, work.settings.channel, work.settings.split
+        self._is_mesh = is_mesh_file(work.path)
+        self._names = (work.path.stem,) if self._is_mesh else work.scene.object_names()
+
+    def write(self, path: Path) -> Sequence[str]:
+        """Write one file: the input with the values if both have one format, otherwise a new file.
+
+        Returns the parts of the input that it lacks.
+        """
+        source_kind, kind = self._source.suffix.lower(), path.suffix.lower()
+        if kind == ".npz":
+            write_npz(path, self._baked)
+            return ()
+        if kind == ".glb":
+            if source_kind in GLTF:
+                return add_baked_to_glb(path, self._source, self._baked, self._channel)
+            return self._write_glb(path)
+        if source_kind == ".ply" and not self._split:
+            write_baked_ply(path, [], self._baked, self._source, self._channel)
+            return ()
+        return self._write_ply(path)
+
+    def _write_glb(self, path: Path) -> list[str]:
+        """Write a new GLB with the materials of the mesh file."""
+        split = split_meshes(self._names, self._work.surfaces, self._baked, fill=True)
+        meshes = split.meshes
+        left_out = []
+        if self._is_mesh:
+            materials = pbr_materials(self._source, self._work.surfaces.geometry.placed[0].mesh)
+            meshes = [with_materials(mesh, materials) for mesh in meshes]
+            left_out += [each for mesh in meshes for material in mesh.materials for each in material.left_out]
+        elif self._has_materials(meshes):
+            left_out.append("materials")
+        write_baked_glb(path, meshes, split.baked, self._channel)
+        for mesh in meshes:
+            wide = [name for name, values in mesh.attributes.items() if not fits_attribute(values)]
+            left_out += [f"the vertex property {name} of {mesh.name}" for name in wide]
+            if unused := len(mesh.vertices) - len(np.unique(mesh.triangles)):
+                left_out.append(f"vertices of {mesh.name} that no polygon uses, {unused}")
+        return left_out
+
+    def _write_ply(self, path: Path) -> list[str]:
+        """Write a new PLY."""
+        surfaces, baked = self._work.surfaces, self._baked
+        if self._split:
+            written = split_meshes(self._names, surfaces, baked, fill=False)
+        else:
+            written = whole_meshes(self._names, surfaces, baked)
+        write_baked_ply(path, written.meshes, written.baked, None, self._channel)
+
+        # What a PLY has no place for.
+        left_out = list(written.left_out)
+        names = Counter(name for mesh in written.meshes for name in mesh.attributes)
+        left_out += [
+            f"the vertex property {name}, which some objects lack"
+            for name, count in sorted(names.items())
+            if count < len(written.meshes)
+        ]
+        if self._has_materials(written.meshes):
+            left_out.append("materials")
+        if any(mesh.group_names for mesh in written.meshes):
+            left_out.append("groups")
+        if self._source.suffix.lower() in GLTF:
+            left_out += beside_mesh(open_document(self._source))
+        return left_out
+
+    def _has_materials(self, meshes: Sequence[OutputMesh]) -> bool:
+        """True if mesh files or the scene have materials."""
+        return bool(self._work.scene.materials) or any(mesh.materials for mesh in meshes)

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.baking.points import Surfaces
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import PlacedMesh, SceneGeometry
 from illumcli.geometry.transforms import cofactors
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
+from illumcli.mesh_files.pbr import PbrMaterial
 from illumcli.mesh_files.split import SplitVertices, split_vertices
 from illumcli.records import Record
 from illumcli.visibility.baked import Baked
@@ -24,58 +25,65 @@ class OutputMeshes(Record):
 
     meshes: list[OutputMesh]
     baked: Baked
-    left_out: tuple[str, ...]
-    """A line for each part of the meshes that is not written."""
+    left_out: tuple[str, ...] = ()
+    """The parts of the meshes that they lack."""
 
 
-def output_meshes(names: Sequence[str], geometry: SceneGeometry, baked: Baked, split: bool) -> OutputMeshes:
-    """The objects to write; with `split`, vertices with several normals, uv or values are split."""
-    # The tables to write. Without splitting, the corners of each vertex must agree.
-    tables: list[dict[str, NDArray[np.float64]]] = []
-    left_out: list[str] = []
-    for name, placed in zip(names, geometry.placed, strict=True):
-        kept: dict[str, NDArray[np.float64]] = {}
-        for kind, values in corner_tables(placed).items():
-            if values is None:
-                left_out.append(f"{name}: {kind}s, which some corners lack")
-            elif not split and not is_per_vertex(placed.mesh, values):
-                left_out.append(f"{name}: {kind}s that differ between the polygons of a vertex")
-            else:
-                kept[kind] = values
-        tables.append(kept)
-
-    # Split the vertices.
-    parts = []
-    for placed, table in zip(geometry.placed, tables, strict=True):
-        count = len(placed.mesh.corners)
-        corners = slice(placed.first_corner, placed.first_corner + count)
-        baked_here = [values[corners].reshape(count, -1) for values in baked.corner_channels.values()]
-        parts.append(
-            split_vertices(
-                placed.mesh.corners,
-                len(placed.mesh.vertices),
-                [*table.values(), *baked_here] if split else [],
-            )
-        )
-
-    # The objects.
-    outputs = [
-        output_mesh(name, geometry, index, tables[index], parts[index]) for index, name in enumerate(names)
-    ]
-    meshes = [placed.mesh for placed in geometry.placed]
-    return OutputMeshes(outputs, split_values(baked, meshes, parts) if split else baked, tuple(left_out))
+def whole_meshes(names: Sequence[str], surfaces: Surfaces, baked: Baked) -> OutputMeshes:
+    """The objects with the vertices of their meshes; normals and uv only where each vertex has one."""
+    outputs, left_out = [], []
+    for index, name in enumerate(names):
+        mesh = surfaces.geometry.placed[index].mesh
+        tables = corner_tables(surfaces, index, fill=False)
+        for kind in [kind for kind, values in tables.items() if not is_per_vertex(mesh, values)]:
+            del tables[kind]
+            left_out.append(f"{kind}s of {name} that differ between the polygons of a vertex")
+        same = split_vertices(mesh.corners, len(mesh.vertices), [])
+        outputs.append(output_mesh(name, surfaces, index, tables, same))
+    return OutputMeshes(outputs, baked, tuple(left_out))
 
 
-def corner_tables(placed: PlacedMesh) -> dict[str, NDArray[np.float64] | None]:
-    """Normals, in scene directions, and uv of the corners of an object's file, (C, k) each, by name; None if
-    a corner lacks them."""
+def split_meshes(names: Sequence[str], surfaces: Surfaces, baked: Baked, fill: bool) -> OutputMeshes:
+    """The objects with vertices split where corners have several normals, uv or values; `fill` as of
+    `corner_tables`."""
+    outputs, parts = [], []
+    meshes = [placed.mesh for placed in surfaces.geometry.placed]
+    for index, (name, mesh) in enumerate(zip(names, meshes, strict=True)):
+        tables = corner_tables(surfaces, index, fill)
+        first = surfaces.geometry.placed[index].first_corner
+        values = [
+            each[first : first + len(mesh.corners)].reshape(len(mesh.corners), -1)
+            for each in baked.corner_channels.values()
+        ]
+        parts.append(split_vertices(mesh.corners, len(mesh.vertices), [*tables.values(), *values]))
+        outputs.append(output_mesh(name, surfaces, index, tables, parts[-1]))
+    return OutputMeshes(outputs, split_values(baked, meshes, parts))
+
+
+def corner_tables(surfaces: Surfaces, index: int, fill: bool) -> dict[str, NDArray[np.float64]]:
+    """Normals, in scene directions, and uv of the corners of an object's file, (C, k) each, by name.
+
+    Corners without uv have (0, 0), and without a normal the one that the bake shades with.
+
+    Parameters
+    ----------
+    fill
+        True: an object whose file has no normals has those that the bake shades with.
+    """
+    placed = surfaces.geometry.placed[index]
     mesh, linear = placed.mesh, placed.matrix[:3, :3]
-    tables: dict[str, NDArray[np.float64] | None] = {}
+    tables: dict[str, NDArray[np.float64]] = {}
+    in_file = mesh.normals is not None and mesh.corner_normals is not None
+    if in_file or fill:
+        rows = surfaces.normals.index[placed.first_corner : placed.first_corner + len(mesh.corners)]
+        tables["normal"] = surfaces.normals.values[rows].astype(np.float64)
     if mesh.normals is not None and mesh.corner_normals is not None:
         normals = mesh.normals @ cofactors(linear).T * (-1 if placed.mirrored else 1)
-        tables["normal"] = normals[mesh.corner_normals] if (mesh.corner_normals >= 0).all() else None
+        has_normal = mesh.corner_normals >= 0
+        tables["normal"][has_normal] = normals[mesh.corner_normals[has_normal]]
     if mesh.uvs is not None and mesh.corner_uvs is not None:
-        tables["uv"] = mesh.uvs[mesh.corner_uvs] if (mesh.corner_uvs >= 0).all() else None
+        has_uv = mesh.corner_uvs[:, None] >= 0
+        tables["uv"] = np.where(has_uv, mesh.uvs[np.maximum(mesh.corner_uvs, 0)], 0.0)
     return tables
 
 
@@ -88,13 +96,14 @@ def is_per_vertex(mesh: Mesh, values: NDArray[np.float64]) -> bool:
 
 def output_mesh(
     name: str,
-    geometry: SceneGeometry,
+    surfaces: Surfaces,
     index: int,
     tables: Mapping[str, NDArray[np.float64]],
     part: SplitVertices,
 ) -> OutputMesh:
     """An object in its place, with the attributes of its vertices."""
     # The attributes of the file, and the tables of corners.
+    geometry = surfaces.geometry
     placed = geometry.placed[index]
     mesh = placed.mesh
     attributes: dict[str, NDArray[Any]] = {}
@@ -109,26 +118,45 @@ def output_mesh(
     # The triangles. Reversed polygons regain the order of corners in their file.
     of_object = geometry.objects == index
     corner = geometry.corners[of_object] - np.int32(placed.first_corner)
+    polygons = geometry.polygons[of_object] - placed.first_polygon
     if placed.reversed is not None:
-        is_reversed = placed.reversed[geometry.polygons[of_object] - placed.first_polygon]
+        is_reversed = placed.reversed[polygons]
         corner[is_reversed] = corner[is_reversed, ::-1]
     vertices = mesh.vertices @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
-    triangles = part.of_corner[corner]
-    return OutputMesh(name, vertices[part.source], part.of_corner, mesh.starts, triangles, attributes)
+    return OutputMesh(
+        name,
+        vertices[part.source],
+        part.of_corner,
+        mesh.starts,
+        part.of_corner[corner],
+        attributes,
+        mesh.group_names,
+        None if mesh.polygon_groups is None else mesh.polygon_groups[polygons],
+        tuple(PbrMaterial(each) for each in mesh.material_names),
+        None if mesh.polygon_materials is None else mesh.polygon_materials[polygons],
+    )
+
+
+def with_materials(mesh: OutputMesh, materials: Mapping[str, PbrMaterial]) -> OutputMesh:
+    """The object with those of its materials that are known by name."""
+    return replace(mesh, materials=tuple(materials.get(each.name, each) for each in mesh.materials))
 
 
 def split_values(baked: Baked, meshes: Sequence[Mesh], parts: Sequence[SplitVertices]) -> Baked:
     """Values of the split vertices of all meshes: those of their corners if there are any, otherwise of their
     vertices."""
     split: dict[str, list[NDArray[np.float32]]] = {name: [] for name in baked.channels}
-    first_vertex = first_corner = 0
+    vertex = corner = 0
     for mesh, part in zip(meshes, parts, strict=True):
-        for name, at_vertices in baked.channels.items():
-            values = at_vertices[first_vertex + part.source]
-            if name in baked.corner_channels:
-                some = np.flatnonzero(part.corner >= 0)
-                values[some] = baked.corner_channels[name][first_corner + part.corner[some]]
+        vertices, corners = (
+            slice(vertex, vertex + len(mesh.vertices)),
+            slice(corner, corner + len(mesh.corners)),
+        )
+        columns = part.columns(
+            {name: each[vertices] for name, each in baked.channels.items()},
+            {name: each[corners] for name, each in baked.corner_channels.items()},
+        )
+        for name, values in columns.items():
             split[name].append(values)
-        first_vertex += len(mesh.vertices)
-        first_corner += len(mesh.corners)
+        vertex, corner = vertices.stop, corners.stop
     return replace(baked, channels={name: np.concatenate(values) for name, values in split.items()})

@@ -75,7 +75,7 @@ def read(path: Path, folder: Path) -> Library:
     library = Library()
     name = path.relative_to(folder).as_posix()
     try:
-        lines = list(_statements(content(path)))
+        lines = list(statements(content(path)))
     except IllumError:
         note(library.repairs, "material libraries that are empty or cannot be read", name)
         return library
@@ -97,13 +97,41 @@ def read(path: Path, folder: Path) -> Library:
     return library
 
 
-def _statements(data: bytes) -> Iterator[tuple[int, str, str]]:
+def statements(data: bytes) -> Iterator[tuple[int, str, str]]:
     """Line number, keyword in lower case and the rest of each statement."""
     lines = data.removeprefix(b"\xef\xbb\xbf").rstrip(b"\0\x1a").splitlines()
     for number, line in enumerate(lines, start=1):
         word, *rest = decoded(line).split(None, 1)[:2] or ("",)
         if word and not word.startswith("#"):
             yield number, word.lower(), rest[0].rstrip() if rest else ""
+
+
+class MapImage(Value):
+    """The image of a map statement."""
+
+    file: Path | None  # None if it is not there
+    fault: str  # as from `nearby`
+    is_clamped: bool
+    has_options: bool  # options other than `-clamp on`
+
+
+def image_of(library: Path, folder: Path, text: str) -> MapImage:
+    """The image that a map statement of a library names, with options before the name."""
+    # Options precede the name, which may contain blanks.
+    at, is_clamped, has_options = 0, False, False
+    while option := _OPTION.match(text, at):
+        at = option.end()
+        if (option["name"] or "").lower() == "clamp" and option["word"].lower() == "on":
+            is_clamped = True
+        else:
+            has_options = True
+
+    # The name as it is, otherwise without a comment, otherwise without quotes.
+    name = text[at:]
+    names = dict.fromkeys((name, without_comment(name).rstrip(), name.strip("\"'")))
+    files = [nearby(library, each, folder) for each in names]
+    file, fault = next((each for each in files if each[0]), files[0])
+    return MapImage(file, fault, is_clamped, has_options)
 
 
 class _Material:
@@ -155,26 +183,14 @@ class _Material:
 
     def _texture(self, text: str, place: str) -> dict[str, str] | None:
         """The texture of a map statement; None if there is no such file."""
-        # Options precede the name, which may contain blanks.
-        texture: dict[str, str] = {}
-        at, options = 0, False
-        while option := _OPTION.match(text, at):
-            at = option.end()
-            if (option["name"] or "").lower() == "clamp" and option["word"].lower() == "on":
-                texture["wrap"] = "clamp"
-            else:
-                options = True
-        if options:
+        image = image_of(self._path, self._folder, text)
+        if image.has_options:
             note(self._looks, "texture options left out", place)
-
-        # The name as it is, otherwise without a comment, otherwise without quotes.
-        name = text[at:]
-        names = dict.fromkeys((name, without_comment(name).rstrip(), name.strip("\"'")))
-        files = [nearby(self._path, each, self._folder) for each in names]
-        file, fault = next((each for each in files if each[0]), files[0])
-        if fault:
-            note(self._repairs, f"textures {fault} {TAKEN if file else 'left out'}", place)
-        return None if file is None else {"texture": str(file), **texture}
+        if image.fault:
+            note(self._repairs, f"textures {image.fault} {TAKEN if image.file else 'left out'}", place)
+        if image.file is None:
+            return None
+        return {"texture": str(image.file), **({"wrap": "clamp"} if image.is_clamped else {})}
 
     def keys(self) -> tuple[dict[str, Any], dict[str, Substitute]]:
         """The keys of a scene's material, and the substitutes of its textures."""

@@ -31,7 +31,7 @@ from illumcli.mesh_files._color import unit_range
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh
-from illumcli.mesh_files._text import Block, Text, keyword
+from illumcli.mesh_files._text import Block, Text, decoded, keyword, without_comment
 from illumcli.records import Value
 
 _LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
@@ -339,6 +339,13 @@ def companions(path: Path) -> list[Path]:
         for image in files_named(library, mtl.IMAGE.findall, path.parent)
     ]
     return [*libraries, *images]
+
+
+def libraries(path: Path) -> list[Path]:
+    """The material libraries of an OBJ that exist, in order."""
+    names = [without_comment(decoded(name)).strip() for name in _library_names(content(path))]
+    files = [file for name in dict.fromkeys(names) for file, _ in _library_files(path, name)]
+    return [file for file in dict.fromkeys(files) if file is not None]
 
 
 def _library_names(data: bytes) -> list[bytes]:

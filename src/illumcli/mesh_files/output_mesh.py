@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.files.seal import BLANK
+from illumcli.mesh_files.pbr import PbrMaterial
 from illumcli.records import Record
 
 STANDARD = ("normal", "uv", "color")
@@ -25,6 +26,10 @@ class OutputMesh(Record):
     starts: NDArray[np.int32]  # (P + 1,)
     triangles: NDArray[np.int32]  # (T, 3) vertex numbers
     attributes: Mapping[str, NDArray[Any]]  # per vertex: `normal`, `uv`, `color` (linear), and any others
+    group_names: tuple[str, ...] = ()
+    triangle_groups: NDArray[np.int32] | None = None  # (T,) index in `group_names`, -1 none
+    materials: tuple[PbrMaterial, ...] = ()
+    triangle_materials: NDArray[np.int32] | None = None  # (T,) index in `materials`, -1 none
 
 
 class VertexData(Record):

@@ -37,14 +37,14 @@ class GlbWriter:
         self._size += fill + len(data)
         views = self.json.setdefault("bufferViews", [])
         if replaced is None:
-            return _appended(views, entry)
+            return appended(views, entry)
         self._unused.append(_extent(views[replaced]))
         views[replaced] = entry
         return replaced
 
     def table(self, values: NDArray[Any], target: int, **more: Any) -> int:
         """Append an array, (N,) or (N, k); the number of its accessor, whose further keys are `more`."""
-        return _appended(self.json.setdefault("accessors", []), self._accessor(values, target, None, more))
+        return appended(self.json.setdefault("accessors", []), self._accessor(values, target, None, more))
 
     def replace_table(self, accessor: int, values: NDArray[Any], target: int) -> None:
         """Replace an accessor, and the buffer view that only it refers to."""
@@ -69,7 +69,7 @@ class GlbWriter:
     def image(self, data: bytes, kind: str, name: str) -> int:
         """Append an encoded image of a media type; its number."""
         entry = {"bufferView": self.view(data), "mimeType": kind, "name": name}
-        return _appended(self.json.setdefault("images", []), entry)
+        return appended(self.json.setdefault("images", []), entry)
 
     def write(self, path: Path) -> None:
         """Write the GLB, whole or not at all."""
@@ -123,6 +123,7 @@ def _extent(view: dict[str, Any]) -> tuple[int, int]:
     return start, start + view.get("byteLength", 0)
 
 
-def _appended(items: list[Any], entry: Any) -> int:
+def appended(items: list[Any], entry: Any) -> int:
+    """Append an entry. Returns its number."""
     items.append(entry)
     return len(items) - 1

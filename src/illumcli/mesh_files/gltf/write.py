@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.mesh_files.gltf.document import open_document
-from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter
+from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter, appended
+from illumcli.mesh_files.gltf.pbr import Encoded, MaterialWriter
 from illumcli.mesh_files.gltf.reindex import fitting
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
+from illumcli.records import Record
 
 
-def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> None:
-    """Write a node per mesh with its vertices in their order, and `data` as float attributes `_NAME`.
+class Rows(Record):
+    """A primitive to write: some triangles of a mesh, over the vertices that they use."""
+
+    group: int  # -1 none
+    material: int  # -1 none
+    vertices: NDArray[np.int64]  # (N,) ascending rows of the mesh's vertices
+    triangles: NDArray[np.int64]  # (K, 3) rows of `vertices`
+
+
+def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData, encoded: Encoded) -> None:
+    """Write a node per group of each mesh, a primitive per material, and `data` as float attributes `_NAME`.
 
     Polygons become triangles. If single precision is too coarse, vertices are relative to the mesh's centre,
     which becomes the node's translation. If `data` has a colour, it becomes `COLOR_0`; viewers multiply all
@@ -25,61 +36,109 @@ def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData) -> Non
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "illum", "extras": {"illum": data.sealed_about()}},
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(meshes)))}],
+        "scenes": [{"nodes": []}],
         "nodes": [],
         "meshes": [],
     }
     writer = GlbWriter(document)
+    materials = MaterialWriter(writer, encoded)
     first = 0
-    for number, mesh in enumerate(meshes):
-        rows = slice(first, first + len(mesh.vertices))
-        first = rows.stop
-
-        # Positions, relative to the centre if single precision would move them.
-        node = {"mesh": number, "name": mesh.name}
-        vertices = mesh.vertices
-        if not fits_single(vertices):
-            centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-            node["translation"] = centre.tolist()
-            vertices = vertices - centre
-        attributes = {"POSITION": positions(writer, vertices)}
-
-        # The mesh's attributes, then the values.
-        _add_attributes(writer, attributes, mesh, with_color=data.color is None)
-        for name, column in data.columns.items():
-            attributes[f"_{name.upper()}"] = writer.table(column[rows].astype(np.float32), VERTICES)
-        if data.color is not None:
-            color = np.full((len(vertices), 4), 255, np.uint8)
-            if "color" in mesh.attributes:
-                color[:, :3] = np.rint(255 * np.clip(mesh.attributes["color"], 0, 1))
-            color[:, data.channels] = data.color[rows, None]
-            attributes["COLOR_0"] = writer.table(color, VERTICES, normalized=True)
-
-        indices = writer.table(fitting(mesh.triangles.ravel(), len(vertices)), INDICES)
-        document["nodes"].append(node)
-        document["meshes"].append({"primitives": [{"attributes": attributes, "indices": indices}]})
+    for mesh in meshes:
+        number_of_group: dict[int, int] = {}
+        offset = _offset(mesh.vertices)
+        for part in _primitives(mesh):
+            primitive = _primitive(writer, mesh, part, offset)
+            _add_values(writer, primitive["attributes"], mesh, part.vertices, data, first)
+            if part.material >= 0:
+                primitive["material"] = materials.number(mesh.materials[part.material])
+            if part.group not in number_of_group:
+                name = _name(mesh, part.group, alone=len(meshes) == 1)
+                number = appended(document["meshes"], {"name": name, "primitives": []})
+                number_of_group[part.group] = number
+                place = {} if offset is None else {"translation": offset.tolist()}
+                node = appended(document["nodes"], {"name": name, "mesh": number, **place})
+                document["scenes"][0]["nodes"].append(node)
+            document["meshes"][number_of_group[part.group]]["primitives"].append(primitive)
+        first += len(mesh.vertices)
     writer.write(path)
 
 
-def _add_attributes(
-    writer: GlbWriter, attributes: dict[str, int], mesh: OutputMesh, with_color: bool
-) -> None:
-    """Add accessors for the attributes of a mesh that glTF can hold: up to four numbers per vertex."""
+def _primitives(mesh: OutputMesh) -> Iterator[Rows]:
+    """The triangles of each group and material, by group, then by material."""
+    count = len(mesh.triangles)
+    none = np.full(count, -1)
+    groups = none if mesh.triangle_groups is None else mesh.triangle_groups.astype(np.int64)
+    materials = none if mesh.triangle_materials is None else mesh.triangle_materials.astype(np.int64)
+    key = (groups + 1) * (len(mesh.materials) + 1) + materials + 1
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+    for rows in np.split(order, starts[1:]):
+        vertices, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
+        yield Rows(
+            int(groups[rows[0]]), int(materials[rows[0]]), vertices.astype(np.int64), triangles.reshape(-1, 3)
+        )
+
+
+def _offset(vertices: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The centre of the vertices if single precision would move them, otherwise None."""
+    return None if fits_single(vertices) else (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+
+
+def _name(mesh: OutputMesh, group: int, alone: bool) -> str:
+    """The name of the node of a group: that of the group, after the mesh's if there are several meshes."""
+    if group < 0:
+        return mesh.name
+    return mesh.group_names[group] if alone else f"{mesh.name}.{mesh.group_names[group]}"
+
+
+def _primitive(
+    writer: GlbWriter, mesh: OutputMesh, part: Rows, offset: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    """Positions, attributes that glTF can hold (up to four numbers per vertex), and indices."""
+    vertices = mesh.vertices[part.vertices] - (0 if offset is None else offset)
+    attributes = {"POSITION": positions(writer, vertices)}
     for name, given in sorted(mesh.attributes.items(), key=lambda each: each[0] not in STANDARD):
-        values = np.asarray(given)
+        values = np.asarray(given)[part.vertices]
+        if (name == "alpha" and "color" in mesh.attributes) or not fits_attribute(values):
+            continue
         if name == "color":
-            if with_color:
-                attributes["COLOR_0"] = writer.table(values.astype(np.float32), VERTICES)
-            continue
-        if values.ndim > 1 and values.shape[1] not in (2, 3, 4):
-            continue
-        if name == "normal":
+            label = "COLOR_0"
+            if "alpha" in mesh.attributes:
+                values = np.column_stack([values, mesh.attributes["alpha"][part.vertices]])
+        elif name == "normal":
             label, values = "NORMAL", unit_rows(values)
         elif name == "uv":
             label, values = "TEXCOORD_0", values * [1, -1] + [0, 1]  # glTF counts v downwards
         else:
             label = name if name.startswith("_") else "_" + name.upper()
         attributes[free_name(label, attributes)] = writer.table(values.astype(np.float32), VERTICES)
+    indices = writer.table(fitting(part.triangles.ravel(), len(vertices)), INDICES)
+    return {"attributes": attributes, "indices": indices}
+
+
+def fits_attribute(values: NDArray[Any]) -> bool:
+    """True if glTF can hold values as a vertex attribute: up to four numbers."""
+    return values.ndim == 1 or values.shape[1] in (2, 3, 4)
+
+
+def _add_values(
+    writer: GlbWriter,
+    attributes: dict[str, int],
+    mesh: OutputMesh,
+    vertices: NDArray[np.int64],
+    data: VertexData,
+    first: int,
+) -> None:
+    """Add the columns of `data` and its colour; `first` is the row of the mesh's first vertex."""
+    rows = first + vertices
+    for name, column in data.columns.items():
+        attributes[f"_{name.upper()}"] = writer.table(column[rows].astype(np.float32), VERTICES)
+    if data.color is not None:
+        color = np.full((len(vertices), 4), 255, np.uint8)
+        if "color" in mesh.attributes:
+            color[:, :3] = np.rint(255 * np.clip(mesh.attributes["color"][vertices], 0, 1))
+        color[:, data.channels] = data.color[rows, None]
+        attributes["COLOR_0"] = writer.table(color, VERTICES, normalized=True)
 
 
 def read_about(path: Path) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def test_a_folder_with_a_faulty_mesh_and_one_that_is_up_to_date(illum, folder):
         told[3],
     ]
     assert told[3].startswith("meshes/part19.obj:4")
-    assert told[4].startswith("meshes/part00.obj: 4 vertices: error 0")
+    assert told[4].startswith("meshes/part00.obj: 4 vertices: obscurance error 0")
     assert "baked/part07.glb: kept, its content is the same" in told
     assert told[-1] == "1 of 20 inputs failed"
     assert len(told) == 4 + 19 + 1

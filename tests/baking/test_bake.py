@@ -21,7 +21,7 @@ from illumcli.baking.vertex_points import vertex_points
 from illumcli.cli import illum
 from illumcli.errors import InputError, OutputError
 from illumcli.geometry.corner_normals import corner_normals
-from illumcli.images.embedded import png_bytes
+from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.progress import no_progress

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from gltf_validator import faults
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cli import illum
 from illumcli.errors import InputError
 from illumcli.images.png import read_texts
 from illumcli.images.reader import read_image, read_metadata
+from illumcli.mesh_files import embedded_image
+from illumcli.mesh_files.gltf.accessors import table
+from illumcli.mesh_files.gltf.document import open_document
 
 SETTINGS = BakeSettings(texture=(16, 16), samples=16)
 
@@ -86,6 +90,24 @@ def test_texels_agree_with_vertices(text_mesh, tmp_path):
         inside = 0.25 + (u - 0.25) * 0.97, 0.5 + (v - 0.5) * 0.97
         # w is steep at the ends of the wall
         assert w[column(*inside, size=64)] == pytest.approx(value, abs=0.02 if u < 0.2 else 0.1)
+
+
+def test_a_glb_has_the_texture_of_its_uv(text_mesh, tmp_path):
+    source = text_mesh(CORNER)
+    bake(source, tmp_path / "a.glb", BakeSettings(texture=(64, 64), samples=256))
+    bake(tmp_path / "a.glb", tmp_path / "b.glb", BakeSettings(texture=(64, 64), samples=256))
+    for path in (tmp_path / "a.glb", tmp_path / "b.glb"):  # new, and extended
+        document = open_document(path)
+        (tmp_path / "map.png").write_bytes(embedded_image(path, 0))
+        w = texels(tmp_path / "map.png")
+        primitive = document.json["meshes"][0]["primitives"][0]
+        uv = table(document, primitive["attributes"]["TEXCOORD_0"], (2,))  # v downwards, as rows
+        at_vertices = table(document, primitive["attributes"]["_OBSCURANCE"], (1,))[:, 0]
+        inside = uv[:4].mean(axis=0) + 0.97 * (uv[:4] - uv[:4].mean(axis=0))
+        column, row = (64 * inside).astype(int).T
+        np.testing.assert_allclose(w[row, column], at_vertices[:4], atol=0.1)
+        assert "occlusionTexture" in document.json["materials"][primitive["material"]]
+        assert faults(path) == []
 
 
 def test_files_say_what_they_are(text_mesh, tmp_path):

@@ -12,6 +12,7 @@ from typing import Any
 from illumcli import __version__
 from illumcli.baking.at_texels import baked_texture, sampled_at_texels
 from illumcli.baking.at_vertices import sampled_at_vertices
+from illumcli.baking.baked_texture import BakedTextures
 from illumcli.baking.context import BakeContext, BakedChannels, SampleStatistics, VertexChannels
 from illumcli.baking.fit import fitted_to_surface
 from illumcli.baking.inputs import BakeWork, prepare_bake
@@ -91,26 +92,33 @@ def baked_of(work: BakeWork, due: Sequence[Path], context: BakeContext) -> Baked
     at_vertices = at_texels = None
     if any(path not in work.slot_of for path in due):
         at_vertices = METHODS[work.settings.method](context)
-    if any(path in work.slot_of for path in due):
+    if any(work.has_textures(path) for path in due):
         at_texels = sampled_at_texels(context, work.slots)
     return BakedChannels(at_vertices, at_texels)
 
 
 def write_files(work: BakeWork, due: Sequence[Path], values: BakedChannels) -> Sequence[str]:
     """Write the files `due`. Returns a line for each part of the input that they lack."""
-    left_out: Sequence[str] = ()
-    if values.at_vertices is not None:
-        about = description(work, values.at_vertices.of_points.statistics)
-        baked = replace(baked_values(values.at_vertices), about=about)
-        left_out = write_outputs(work, [path for path in due if path not in work.slot_of], baked)
+    # Textures, each in a file of its own.
+    textures = BakedTextures()
     if values.at_texels is not None:
         about = description(work, values.at_texels.of_points.statistics)
-        for texture in values.at_texels.texels.textures:
-            baked_here = baked_texture(texture, values.at_texels.of_points)
+        of_slots = [
+            (each.slot, baked_texture(each, values.at_texels.of_points))
+            for each in values.at_texels.texels.textures
+        ]
+        for slot, texture in of_slots:
             for path in due:
-                if work.slot_of.get(path) == texture.slot:
-                    write_texture(path, baked_here, about, work.settings.bits)
-    return left_out
+                if work.slot_of.get(path) == slot:
+                    write_texture(path, texture, about, work.settings.bits)
+        textures = BakedTextures(tuple(texture for _, texture in of_slots))
+
+    # Values at vertices, in all other files.
+    if values.at_vertices is None:
+        return ()
+    about = description(work, values.at_vertices.of_points.statistics)
+    baked = replace(baked_values(values.at_vertices), about=about)
+    return write_outputs(work, [path for path in due if path not in work.slot_of], baked, textures)
 
 
 def description(work: BakeWork, statistics: Mapping[str, SampleStatistics]) -> dict[str, Any]:

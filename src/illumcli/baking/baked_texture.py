@@ -41,7 +41,7 @@ class TextureUvs(Record):
 class BakedTextures(Record):
     """The textures of a bake."""
 
-    textures: tuple[BakedTexture, ...]
+    textures: tuple[BakedTexture, ...] = ()
     unwrapped: Mapping[int, TextureUvs] = field(default_factory=dict)
     """Object -> the uv that its textures use, if they are not those of its file."""
     about: Mapping[str, Any] = field(default_factory=dict)

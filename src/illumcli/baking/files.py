@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.images.contents import image_contents, image_texts
-from illumcli.images.embedded import embedded_image
+from illumcli.images.encoded import encoded_image
 from illumcli.mesh_files import ply
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
+from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
 from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
@@ -44,18 +45,27 @@ def write_baked_ply(
     ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, channel), source)
 
 
-def write_baked_glb(path: Path, meshes: Sequence[OutputMesh], baked: Baked, channel: str | None) -> None:
+def write_baked_glb(
+    path: Path,
+    meshes: Sequence[OutputMesh],
+    baked: Baked,
+    channel: str | None,
+    occlusion: OcclusionMaps = NO_MAPS,
+) -> None:
     """Write a GLB with an attribute for each channel: `_OBSCURANCE` and so on; `COLOR_0` only if a `channel`
     is given, or the meshes have colours."""
-    gltf.write_glb(path, meshes, _vertex_data(baked.channels, baked, channel), embedded_image)
+    data = _vertex_data(baked.channels, baked, channel)
+    gltf.write_glb(path, meshes, data, encoded_image, occlusion)
 
 
-def add_baked_to_glb(path: Path, source: Path, baked: Baked, channel: str | None) -> list[str]:
+def add_baked_to_glb(
+    path: Path, source: Path, baked: Baked, channel: str | None, occlusion: OcclusionMaps = NO_MAPS
+) -> list[str]:
     """Write a GLB with all that a glTF file has and the attributes of `write_baked_glb`.
 
     Returns the parts of the source that it does not have.
     """
-    return extend_glb(path, source, _vertex_data(baked.channels, baked, channel))
+    return extend_glb(path, source, _vertex_data(baked.channels, baked, channel), occlusion)
 
 
 def baked_contents(path: Path) -> list[str]:

@@ -71,6 +71,11 @@ class BakeWork(Record):
         """The settings of the bake."""
         return self.job.settings
 
+    def has_textures(self, path: Path) -> bool:
+        """True for files that hold textures: a texture, or a GLB if the settings ask for textures."""
+        has_glb = self.settings.texture is not None and path.suffix.lower() == ".glb"
+        return has_glb or path in self.slot_of
+
     @property
     def contents(self) -> tuple[str, ...]:
         """The content of each output."""
@@ -178,9 +183,12 @@ def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
     files = [each for each in outputs if is_texture(each)]
     if files and settings.texture is None:
         raise InputError(f"{files[0]}: is a texture; give its size, as in --texture 1024")
-    if settings.texture is not None and not files:
-        raise InputError("--texture belongs to .png and .exr outputs; name one with -o")
-    if files and "ao" not in settings.what:
+    if settings.texture is None:
+        return
+    files += [each for each in outputs if each.suffix.lower() == ".glb"]
+    if not files:
+        raise InputError("--texture belongs to .png, .exr and .glb outputs; name one with -o")
+    if "ao" not in settings.what:
         raise InputError(f"{files[0]}: textures hold ao; add it to --what")
 
 

@@ -8,23 +8,29 @@ from pathlib import Path
 
 import numpy as np
 
+from illumcli.baking.baked_texture import BakedTextures
 from illumcli.baking.files import add_baked_to_glb, write_baked_glb, write_baked_ply
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.split import split_meshes, whole_meshes, with_materials
+from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import is_mesh_file
 from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import fits_attribute
 from illumcli.mesh_files.materials import pbr_materials
+from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.visibility.baked import Baked, write_npz
 
 GLTF = (".glb", ".gltf")
 
 
-def write_outputs(work: BakeWork, due: Sequence[Path], baked: Baked) -> tuple[str, ...]:
-    """Write the files `due`. Returns a line for each part of the input that one of them lacks."""
-    writer = _Writer(work, baked)
+def write_outputs(
+    work: BakeWork, due: Sequence[Path], baked: Baked, textures: BakedTextures
+) -> tuple[str, ...]:
+    """Write the files `due`, a GLB with its textures. Returns a line for each part of the input that one of
+    them lacks."""
+    writer = _Writer(work, baked, textures)
     return tuple(f"{path.name}: {what}" for path in due for what in writer.write(path))
 
 
@@ -38,11 +44,22 @@ def pose_warnings(path: Path) -> list[str]:
     return [f"meshes are deformed by {' and '.join(deformers)}: the values are those of the rest pose"]
 
 
+def occlusion_maps(textures: BakedTextures) -> OcclusionMaps:
+    """Textures in the form in which a GLB has them: 8 bits of obscurance."""
+    maps = {}
+    for each in textures.textures:
+        steps = np.rint(255 * np.clip(each.channels["obscurance"], 0, 1)).astype(np.uint8)
+        png = png_bytes(steps[..., None], srgb=False)
+        maps[each.object, each.material] = OcclusionMap(f"occlusion of {each.name}", png)
+    uvs = {number: each.uvs[each.corner_uvs] for number, each in textures.unwrapped.items()}
+    return OcclusionMaps(maps, uvs)
+
+
 class _Writer:
     """Writes the files of one bake."""
 
-    def __init__(self, work: BakeWork, baked: Baked) -> None:
-        self._work, self._baked = work, baked
+    def __init__(self, work: BakeWork, baked: Baked, textures: BakedTextures) -> None:
+        self._work, self._baked, self._textures = work, baked, textures
         self._source, self._channel, self._split = work.path, work.settings.channel, work.settings.split
         self._is_mesh = is_mesh_file(work.path)
         self._names = (work.path.stem,) if self._is_mesh else work.scene.object_names()
@@ -58,7 +75,8 @@ class _Writer:
             return ()
         if kind == ".glb":
             if source_kind in GLTF:
-                return add_baked_to_glb(path, self._source, self._baked, self._channel)
+                occlusion = occlusion_maps(self._textures)
+                return add_baked_to_glb(path, self._source, self._baked, self._channel, occlusion)
             return self._write_glb(path)
         if source_kind == ".ply" and not self._split:
             write_baked_ply(path, [], self._baked, self._source, self._channel)
@@ -67,7 +85,8 @@ class _Writer:
 
     def _write_glb(self, path: Path) -> list[str]:
         """Write a new GLB with the materials of the mesh file."""
-        split = split_meshes(self._names, self._work.surfaces, self._baked, fill=True)
+        unwrapped = self._textures.unwrapped
+        split = split_meshes(self._names, self._work.surfaces, self._baked, fill=True, unwrapped=unwrapped)
         meshes = split.meshes
         left_out = []
         if self._is_mesh:
@@ -76,7 +95,7 @@ class _Writer:
             left_out += [each for mesh in meshes for material in mesh.materials for each in material.left_out]
         elif self._has_materials(meshes):
             left_out.append("materials")
-        write_baked_glb(path, meshes, split.baked, self._channel)
+        write_baked_glb(path, meshes, split.baked, self._channel, occlusion_maps(self._textures))
         for mesh in meshes:
             wide = [name for name, values in mesh.attributes.items() if not fits_attribute(values)]
             left_out += [f"the vertex property {name} of {mesh.name}" for name in wide]

@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.baking.baked_texture import TextureUvs
 from illumcli.baking.points import Surfaces
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.transforms import cofactors
-from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, free_name
+from illumcli.mesh_files.output_mesh import STANDARD, TEXTURE_UV, OutputMesh, free_name
 from illumcli.mesh_files.pbr import PbrMaterial
 from illumcli.mesh_files.split import SplitVertices, split_vertices
 from illumcli.records import Record
 from illumcli.visibility.baked import Baked
+
+NONE: Mapping[int, TextureUvs] = {}
 
 
 class OutputMeshes(Record):
@@ -43,13 +46,24 @@ def whole_meshes(names: Sequence[str], surfaces: Surfaces, baked: Baked) -> Outp
     return OutputMeshes(outputs, baked, tuple(left_out))
 
 
-def split_meshes(names: Sequence[str], surfaces: Surfaces, baked: Baked, fill: bool) -> OutputMeshes:
-    """The objects with vertices split where corners have several normals, uv or values; `fill` as of
-    `corner_tables`."""
+def split_meshes(
+    names: Sequence[str],
+    surfaces: Surfaces,
+    baked: Baked,
+    fill: bool,
+    unwrapped: Mapping[int, TextureUvs] = NONE,
+) -> OutputMeshes:
+    """The objects with vertices split where corners have several normals, uv or values.
+
+    `fill` is that of `corner_tables`; `unwrapped` has uv of textures that are not those of the file, by
+    object.
+    """
     outputs, parts = [], []
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     for index, (name, mesh) in enumerate(zip(names, meshes, strict=True)):
         tables = corner_tables(surfaces, index, fill)
+        if index in unwrapped:
+            tables[TEXTURE_UV] = unwrapped[index].uvs[unwrapped[index].corner_uvs]
         first = surfaces.geometry.placed[index].first_corner
         values = [
             each[first : first + len(mesh.corners)].reshape(len(mesh.corners), -1)

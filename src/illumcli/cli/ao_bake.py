@@ -233,7 +233,7 @@ def _request(options: dict[str, Any]) -> BakeRequest:
 @click.option(
     "--texture",
     type=_TextureSize(),
-    help="Bake textures of this size over the uv of the meshes, for .png and .exr outputs.",
+    help="Bake textures of this size over the uv of the meshes, for .png, .exr and .glb outputs.",
 )
 @click.option("--bits", type=click.Choice([8, 16]), default=8, show_default=True, help="Of textures as .png.")
 @click.option(

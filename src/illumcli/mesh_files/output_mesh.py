@@ -16,6 +16,9 @@ from illumcli.records import Record
 STANDARD = ("normal", "uv", "color")
 """Attributes that every format has its own form for; others keep their name where the format allows."""
 
+TEXTURE_UV = "uv of textures"
+"""Attribute with the uv of an object's baked textures, if they are not `uv`."""
+
 
 class OutputMesh(Record):
     """One object to write: polygons over vertices in the order of the input file."""

@@ -10,10 +10,12 @@ import pytest
 
 from gltf_validator import faults
 from illumcli.geometry.mesh import Mesh
+from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.gltf.accessors import stored, table
 from illumcli.mesh_files.gltf.document import Document, open_document
 from illumcli.mesh_files.gltf.extend import extend_glb
+from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import VertexData
 
 PNG = bytes.fromhex(
@@ -312,3 +314,83 @@ def test_the_document_read_is_not_changed(tmp_path: Path, Scene: Any) -> None:
     before = source.read_bytes()
     extended(source)
     assert source.read_bytes() == before
+
+
+# ------------------------------------------------------------------ occlusion textures
+
+
+def with_texture(source: Path, out: str = "out.glb", **more: Any) -> tuple[dict[str, Any], list[str]]:
+    """The JSON of a file with an occlusion texture for its first material, and what it lacks."""
+    png = png_bytes(np.full((4, 4, 1), more.pop("level", 128), np.uint8), srgb=False)
+    maps = OcclusionMaps({(0, 0): OcclusionMap("occlusion", png)}, **more)
+    left_out = extend_glb(source.with_name(out), source, values_of(read_mesh(source)), maps)
+    return open_document(source.with_name(out)).json, left_out
+
+
+def test_a_texture_becomes_that_of_its_material(tmp_path: Path, Scene: Any) -> None:
+    source = whole(Scene()).write(tmp_path / "a.glb")
+    json, left_out = with_texture(source)
+    assert left_out == []
+    assert json["materials"][0]["occlusionTexture"] == {"index": 1}
+    assert json["textures"] == [{"source": 0}, {"source": 1}]
+    assert json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0, "texCoord": 1}
+    assert faults(tmp_path / "out.glb") == []
+
+
+def test_the_occlusion_of_a_packed_texture_is_replaced_and_the_rest_kept(tmp_path: Path, Scene: Any) -> None:
+    scene = whole(Scene())
+    material = scene.json["materials"][0]
+    material["occlusionTexture"] = {"index": 0, "strength": 0.5}
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": 0}
+    json, left_out = with_texture(scene.write(tmp_path / "a.glb"))
+    assert left_out == ["the former occlusion texture of material clay"]
+    assert json["materials"][0]["occlusionTexture"] == {"index": 1}
+    assert json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] == {"index": 0}
+    assert faults(tmp_path / "out.glb") == []
+
+    # again: its own texture is replaced, and no image is added
+    again, _ = with_texture(tmp_path / "out.glb", "again.glb", level=7)
+    assert len(again["images"]) == len(again["textures"]) == 2
+    document = open_document(tmp_path / "again.glb")
+    data, start, end = document.view(again["images"][1]["bufferView"])
+    assert data[start:end] == png_bytes(np.full((4, 4, 1), 7, np.uint8), srgb=False)
+    assert (tmp_path / "again.glb").stat().st_size < (tmp_path / "out.glb").stat().st_size + 64
+    assert faults(tmp_path / "again.glb") == []
+
+
+def test_a_material_of_other_primitives_is_copied(tmp_path: Path, Scene: Any) -> None:
+    scene = whole(Scene())
+    scene.json["meshes"].append({"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]})
+    scene.json["nodes"].append({"mesh": 1})
+    json, _ = with_texture(scene.write(tmp_path / "a.glb"))
+    assert [mesh["primitives"][0]["material"] for mesh in json["meshes"]] == [1, 0]
+    assert "occlusionTexture" not in json["materials"][0]
+    assert json["materials"][1]["name"] == "clay"
+
+
+def test_uv_of_textures_become_a_further_set(tmp_path: Path, Scene: Any) -> None:
+    source = whole(Scene()).write(tmp_path / "a.glb")
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0.25, 0], [1, 1], [0, 1]])
+    json, _ = with_texture(source, uvs={0: uv})
+    assert json["materials"][0]["occlusionTexture"] == {"index": 1, "texCoord": 2}
+    primitive = json["meshes"][0]["primitives"][0]
+    document = open_document(tmp_path / "out.glb")
+    corners = stored(document, primitive["indices"], (1,))[:, 0]
+    made = stored(document, primitive["attributes"]["TEXCOORD_2"], (2,))[corners]
+    np.testing.assert_allclose(made, uv * [1, -1] + [0, 1])
+    first = stored(document, primitive["attributes"]["TEXCOORD_0"], (2,))[corners]
+    np.testing.assert_array_equal(first, np.array([[0, 1], [1, 1], [1, 0], [0, 0]])[QUAD])
+    assert faults(tmp_path / "out.glb") == []
+
+
+def test_polygons_without_a_material_get_one(tmp_path: Path, square: Any) -> None:
+    scene = valid(square())
+    scene.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = scene.table(np.zeros((4, 2)))
+    source = scene.write(tmp_path / "a.glb")
+    png = png_bytes(np.zeros((4, 4, 1), np.uint8), srgb=False)
+    maps = OcclusionMaps({(0, -1): OcclusionMap("occlusion", png)})
+    extend_glb(tmp_path / "out.glb", source, values_of(read_mesh(source)), maps)
+    json = open_document(tmp_path / "out.glb").json
+    assert json["materials"] == [{"occlusionTexture": {"index": 0}}]
+    assert json["meshes"][0]["primitives"][0]["material"] == 0
+    assert faults(tmp_path / "out.glb") == []

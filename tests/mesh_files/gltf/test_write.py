@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gltf_validator import faults
+from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.gltf.accessors import stored
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import unit_rows, write_glb
-from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
+from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
+from illumcli.mesh_files.output_mesh import TEXTURE_UV, OutputMesh, VertexData
 from illumcli.mesh_files.pbr import PbrMaterial
 
 BAR = np.array([[x, y, 0] for x in range(4) for y in range(2)], float)
@@ -76,6 +80,25 @@ def test_two_objects_share_materials_and_images(tmp_path: Path) -> None:
     assert len(json["materials"]) == len(json["images"]) == len(json["textures"]) == 1
     assert json["images"][0]["name"] == "wood"
     assert json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0}
+
+
+def test_objects_with_different_textures_have_materials_of_their_own(tmp_path: Path) -> None:
+    wood, of_all = PbrMaterial("wood"), np.zeros(3, np.int32)
+    meshes = [bar(name, materials=(wood,), triangle_materials=of_all) for name in ("a", "b", "c")]
+    meshes[1] = replace(meshes[1], attributes={**meshes[1].attributes, TEXTURE_UV: BAR[:, 1::-1]})
+    png = png_bytes(np.zeros((2, 2, 1), np.uint8), srgb=False)
+    maps = {(0, 0): OcclusionMap("a", png), (1, 0): OcclusionMap("b", png)}
+    data = VertexData({"obscurance": np.zeros(24, np.float32)}, {})
+    write_glb(tmp_path / "a.glb", meshes, data, lambda image: (b"", ""), OcclusionMaps(maps))
+    json = open_document(tmp_path / "a.glb").json
+    assert [mesh["primitives"][0]["material"] for mesh in json["meshes"]] == [0, 1, 2]
+    textures = [material.get("occlusionTexture") for material in json["materials"]]
+    assert textures == [{"index": 0}, {"index": 1, "texCoord": 1}, None]
+    uvs = open_document(tmp_path / "a.glb").json["meshes"][1]["primitives"][0]["attributes"]
+    made = stored(open_document(tmp_path / "a.glb"), uvs["TEXCOORD_1"], (2,))
+    used = np.delete(BAR[:, 1::-1], 1, axis=0)
+    np.testing.assert_array_equal(made, used * [1, -1] + [0, 1])
+    assert faults(tmp_path / "a.glb") == []
 
 
 def test_many_vertices_have_long_indices(tmp_path: Path) -> None:

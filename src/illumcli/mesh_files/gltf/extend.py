@@ -14,13 +14,15 @@ from illumcli.mesh_files.gltf.glb_writer import VERTICES, GlbWriter
 from illumcli.mesh_files.gltf.instances import distinct_meshes, forget_extension
 from illumcli.mesh_files.gltf.placed_values import PrimitiveValues, placed_values
 from illumcli.mesh_files.gltf.reindex import reindex, vertex_colors
-from illumcli.mesh_files.output_mesh import VertexData
+from illumcli.mesh_files.gltf.set_occlusion import set_occlusion
+from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
+from illumcli.mesh_files.output_mesh import TEXTURE_UV, VertexData
 from illumcli.mesh_files.split import split_vertices
 
 COMPRESSION = "KHR_draco_mesh_compression"
 
 
-def extend_glb(path: Path, source: Path, data: VertexData) -> list[str]:
+def extend_glb(path: Path, source: Path, data: VertexData, occlusion: OcclusionMaps = NO_MAPS) -> list[str]:
     """Write a glTF file as a GLB with `data` added to its primitives as attributes `_NAME`.
 
     A mesh that several nodes have is copied for nodes with other values; copies share all other attributes.
@@ -31,6 +33,8 @@ def extend_glb(path: Path, source: Path, data: VertexData) -> list[str]:
     ----------
     data : VertexData
         Rows in the order of `gltf.read`.
+    occlusion : OcclusionMaps
+        Textures of object 0, which is the whole file; their own uv become a further uv set.
 
     Returns
     -------
@@ -43,10 +47,11 @@ def extend_glb(path: Path, source: Path, data: VertexData) -> list[str]:
     asset = document.json["asset"]
     extras = asset.get("extras")
     asset["extras"] = {**(extras if isinstance(extras, dict) else {}), "illum": data.sealed_about()}
-    meshes = distinct_meshes(document, placed_values(document, data))
+    meshes = distinct_meshes(document, placed_values(document, data, occlusion.uvs.get(0)))
 
     # Add the values.
     owned = _replaceable(document)
+    by_slot: dict[int, list[dict[str, Any]]] = {}
     for mesh, values_of_primitives in meshes.items():
         for values in values_of_primitives:
             primitive = document.json["meshes"][mesh]["primitives"][values.number]
@@ -54,6 +59,12 @@ def extend_glb(path: Path, source: Path, data: VertexData) -> list[str]:
                 del primitive["extensions"][COMPRESSION]
                 left_out.append(f"the compressed form of primitives ({COMPRESSION})")
             left_out += _add_values(document, writer, primitive, values, data.channels, owned)
+            by_slot.setdefault(values.material, []).append(primitive)
+
+    # Add the textures, all for one uv set.
+    maps = {slot: each for (_, slot), each in occlusion.maps.items()}
+    uv_set = _number_texture_uvs(by_slot) if 0 in occlusion.uvs else 0
+    left_out += set_occlusion(document, writer, by_slot, maps, uv_set)
     if not any(COMPRESSION in extensions(each) for each in _primitives(document)):
         forget_extension(document.json, COMPRESSION)
     writer.write(path)
@@ -99,7 +110,24 @@ def _add_values(
             attributes[name] = number
         else:
             attributes[name] = writer.table(column.astype(np.float32), VERTICES)
+
+    # Add the uv of textures.
+    if TEXTURE_UV in values.at_corners:
+        uvs = values.at_corners[TEXTURE_UV][np.maximum(split.corner, 0)]
+        uvs = np.where(split.corner[:, None] >= 0, uvs, 0.0).astype(np.float32)
+        attributes[TEXTURE_UV] = writer.table(uvs, VERTICES)
     return left_out
+
+
+def _number_texture_uvs(by_slot: dict[int, list[dict[str, Any]]]) -> int:
+    """Make the uv of textures the first uv set that no primitive has; missing sets before it are the same."""
+    tables = [primitive["attributes"] for primitives in by_slot.values() for primitive in primitives]
+    uv_set = max(sum(name.startswith("TEXCOORD_") for name in each) for each in tables)
+    for each in tables:
+        accessor = each.pop(TEXTURE_UV)
+        for number in range(uv_set + 1):
+            each.setdefault(f"TEXCOORD_{number}", accessor)
+    return uv_set
 
 
 def _replaceable(document: Document) -> set[int]:

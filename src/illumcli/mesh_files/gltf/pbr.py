@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from illumcli.mesh_files.gltf.glb_writer import GlbWriter, appended
+from illumcli.mesh_files.occlusion import OcclusionMap
 from illumcli.mesh_files.pbr import PbrMaterial
 
 Encoded: TypeAlias = Callable[[str], tuple[bytes, str]]
@@ -15,21 +16,31 @@ _CLAMP, _REPEAT = 33071, 10497
 _STRENGTH = "KHR_materials_emissive_strength"
 
 
+def occlusion_texture(writer: GlbWriter, occlusion: OcclusionMap, uv_set: int) -> dict[str, int]:
+    """Add an occlusion texture. Returns what a material says of it."""
+    image = writer.image(occlusion.png, "image/png", occlusion.name)
+    texture = appended(writer.json.setdefault("textures", []), {"source": image})
+    return {"index": texture, **({"texCoord": uv_set} if uv_set else {})}
+
+
 class MaterialWriter:
     """Adds materials to a document, each of them, each image and each texture once."""
 
     def __init__(self, writer: GlbWriter, encoded: Encoded) -> None:
         self._writer, self._encoded = writer, encoded
-        self._materials: list[PbrMaterial] = []
+        self._materials: list[tuple[PbrMaterial, tuple[OcclusionMap, int] | None]] = []
         self._images: dict[str, int] = {}
         self._textures: dict[tuple[str, bool], int] = {}
 
-    def number(self, material: PbrMaterial) -> int:
-        """Number of a material in the document."""
-        if material in self._materials:
-            return self._materials.index(material)
-        self._materials.append(material)
-        return appended(self._writer.json.setdefault("materials", []), self._entry(material))
+    def number(self, material: PbrMaterial, occlusion: tuple[OcclusionMap, int] | None = None) -> int:
+        """Number of a material in the document, with an occlusion texture for a uv set, if one is given."""
+        if (material, occlusion) in self._materials:
+            return self._materials.index((material, occlusion))
+        self._materials.append((material, occlusion))
+        entry = self._entry(material)
+        if occlusion is not None:
+            entry["occlusionTexture"] = occlusion_texture(self._writer, *occlusion)
+        return appended(self._writer.json.setdefault("materials", []), entry)
 
     def _entry(self, material: PbrMaterial) -> dict[str, Any]:
         """A material as JSON. It is seen from both sides, as in formats that have no single-sided ones."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from illumcli.mesh_files.gltf.document import Document
 from illumcli.mesh_files.gltf.primitives import Part, parts
-from illumcli.mesh_files.output_mesh import VertexData
+from illumcli.mesh_files.output_mesh import TEXTURE_UV, VertexData
 from illumcli.records import Record
 
 
@@ -19,6 +19,7 @@ class PrimitiveValues(Record):
     """Values at the V vertices, and perhaps the corners of the T triangles, of a primitive at one place."""
 
     number: int  # of the primitive in its mesh
+    material: int  # index in the material names of the mesh that is read, -1 none
     triangles: NDArray[np.int64]  # (T, 3) vertices, in the order of the file
     columns: Mapping[str, NDArray[Any]]  # (V,) or (V, k) by attribute
     at_corners: Mapping[str, NDArray[Any]]  # (3 T,) or (3 T, k); none if no vertex has several values
@@ -30,8 +31,13 @@ Place: TypeAlias = tuple[int, int]
 """Number of a node, -1 if the file has none, and number of an instance of its mesh."""
 
 
-def placed_values(document: Document, data: VertexData) -> dict[int, dict[Place, MeshValues]]:
-    """Mesh -> place -> values; a node that is reached through several parents has the values of the first."""
+def placed_values(
+    document: Document, data: VertexData, texture_uvs: NDArray[np.float64] | None
+) -> dict[int, dict[Place, MeshValues]]:
+    """Mesh -> place -> values; a node that is reached through several parents has the values of the first.
+
+    `texture_uvs` of corners, v upwards, become the attribute `TEXTURE_UV`, v downwards.
+    """
     # The columns by the attributes that they become.
     columns: dict[str, NDArray[Any]] = {f"_{name.upper()}": each for name, each in data.columns.items()}
     corner_columns: dict[str, NDArray[Any]] = {
@@ -42,11 +48,17 @@ def placed_values(document: Document, data: VertexData) -> dict[int, dict[Place,
     if data.corner_color is not None:
         corner_columns["COLOR_0"] = data.corner_color
 
+    if texture_uvs is not None:
+        corner_columns[TEXTURE_UV] = texture_uvs * [1, -1] + [0, 1]
+
     # The rows of each part and instance.
     meshes: dict[int, dict[Place, MeshValues]] = {}
     known: set[tuple[int, int]] = set()
+    materials: dict[int | None, int] = {}
     vertex = corner = 0
     for part in parts(document):
+        is_named = part.material is not None or "color" in part.attributes
+        material = materials.setdefault(part.material, len(materials)) if is_named else -1
         size, corners = len(part.vertices) // part.copies, part.triangles.size // part.copies
         is_new = (part.node, part.primitive) not in known or part.node < 0
         known.add((part.node, part.primitive))
@@ -56,6 +68,7 @@ def placed_values(document: Document, data: VertexData) -> dict[int, dict[Place,
             of_corners = slice(corner + instance * corners, corner + (instance + 1) * corners)
             values = PrimitiveValues(
                 part.primitive,
+                material,
                 triangles,
                 {name: each[of_vertices] for name, each in columns.items()},
                 {

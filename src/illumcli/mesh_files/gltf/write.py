@@ -13,7 +13,16 @@ from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter, appended
 from illumcli.mesh_files.gltf.pbr import Encoded, MaterialWriter
 from illumcli.mesh_files.gltf.reindex import fitting
-from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
+from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
+from illumcli.mesh_files.output_mesh import (
+    STANDARD,
+    TEXTURE_UV,
+    OutputMesh,
+    VertexData,
+    fits_single,
+    free_name,
+)
+from illumcli.mesh_files.pbr import PbrMaterial
 from illumcli.records import Record
 
 
@@ -26,8 +35,16 @@ class Rows(Record):
     triangles: NDArray[np.int64]  # (K, 3) rows of `vertices`
 
 
-def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData, encoded: Encoded) -> None:
+def write_glb(
+    path: Path,
+    meshes: Sequence[OutputMesh],
+    data: VertexData,
+    encoded: Encoded,
+    occlusion: OcclusionMaps = NO_MAPS,
+) -> None:
     """Write a node per group of each mesh, a primitive per material, and `data` as float attributes `_NAME`.
+
+    Occlusion textures become those of materials; objects with different ones have materials of their own.
 
     Polygons become triangles. If single precision is too coarse, vertices are relative to the mesh's centre,
     which becomes the node's translation. If `data` has a colour, it becomes `COLOR_0`; viewers multiply all
@@ -43,14 +60,19 @@ def write_glb(path: Path, meshes: Sequence[OutputMesh], data: VertexData, encode
     writer = GlbWriter(document)
     materials = MaterialWriter(writer, encoded)
     first = 0
-    for mesh in meshes:
+    for index, mesh in enumerate(meshes):
         number_of_group: dict[int, int] = {}
         offset = _offset(mesh.vertices)
         for part in _primitives(mesh):
             primitive = _primitive(writer, mesh, part, offset)
             _add_values(writer, primitive["attributes"], mesh, part.vertices, data, first)
-            if part.material >= 0:
-                primitive["material"] = materials.number(mesh.materials[part.material])
+            has_map = (index, part.material) in occlusion.maps
+            if part.material >= 0 or has_map:
+                uv_set = sum(name.startswith("TEXCOORD_") for name in primitive["attributes"]) - 1
+                primitive["material"] = materials.number(
+                    mesh.materials[part.material] if part.material >= 0 else PbrMaterial(mesh.name),
+                    (occlusion.maps[index, part.material], uv_set) if has_map else None,
+                )
             if part.group not in number_of_group:
                 name = _name(mesh, part.group, alone=len(meshes) == 1)
                 number = appended(document["meshes"], {"name": name, "primitives": []})
@@ -109,6 +131,9 @@ def _primitive(
             label, values = "NORMAL", unit_rows(values)
         elif name == "uv":
             label, values = "TEXCOORD_0", values * [1, -1] + [0, 1]  # glTF counts v downwards
+        elif name == TEXTURE_UV:
+            label = "TEXCOORD_1" if "uv" in mesh.attributes else "TEXCOORD_0"
+            values = values * [1, -1] + [0, 1]
         else:
             label = name if name.startswith("_") else "_" + name.upper()
         attributes[free_name(label, attributes)] = writer.table(values.astype(np.float32), VERTICES)

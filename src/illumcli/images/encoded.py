@@ -20,7 +20,7 @@ _PROFILES = (b"iCCP", b"cHRM", b"gAMA")
 _NAMES = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}
 
 
-def embedded_image(path: str) -> tuple[bytes, str]:
+def encoded_image(path: str) -> tuple[bytes, str]:
     """The bytes of a PNG or JPEG with its pixels as they are, of other images converted to a PNG; and the
     media type.
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+from illumcli.commands import bands
 from illumcli.commands.bands import LEAST, ROWS, band_counts, rows_of_bands
-from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.options import RenderJob, RenderOptions, Shard
 from illumcli.commands.render import render_scene
+from illumcli.commands.render_all import render_scenes
+from illumcli.commands.render_shard import render_shard
+from illumcli.commands.runner import Here
 from illumcli.commands.unit import Worker
 from illumcli.images.picture_bands import join_bands
 from ring import RING
@@ -57,3 +63,37 @@ def test_bands_have_whole_blocks_and_end_with_the_picture(scene):
         assert [first for first, _ in rows] == [0, *(end for _, end in rows[:-1])]
         assert rows[-1][1] == height
         assert all(first % ROWS == 0 for first, _ in rows)
+
+
+def test_shards_of_bands_are_merged_to_the_picture(illum, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(bands, "LEAST", 1)
+    overrides = ("film.width=20", "film.height=300", LAYERS)
+
+    def render(folder, shard=None):
+        options = RenderOptions(overrides, f"{folder}/{{scene}}.exr", cache=False, shard=shard)
+        do = render_scenes if shard is None else render_shard
+        return do([scene], options, Path(folder, "r.json"), Here(), lambda done: None, print)
+
+    render("whole")
+    lines = [render(folder, Shard(number, 2)) for number, folder in ((1, "a"), (2, "b"))]
+    assert [line.split(";")[0] for line in lines] == ["shard 1/2: 3 of 5", "shard 2/2: 2 of 5"]
+    done = illum("merge", "a", "-o", "all", "-q")
+    assert done.returncode == 1
+    assert "rows 192 to 255: shard-2-of-2.json is missing" in done.stderr
+    assert done.stderr.endswith("1 unit is missing\n")
+    done = illum("merge", "a", "b", "-o", "all", "-q")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["all/s.exr", "all/r.json"]
+    assert Path("all/s.exr").read_bytes() == Path("whole/s.exr").read_bytes()
+    merged, whole = (json.loads(Path(name, "r.json").read_text()) for name in ("all", "whole"))
+    assert (merged["scene"], merged["scene_hash"]) == (whole["scene"], whole["scene_hash"])
+    assert merged["rays"]["obscurance"] == whole["rays"]["obscurance"]
+    again = illum("merge", "a", "b", "-o", "all")
+    assert "all/s.exr: kept" in again.stderr
+
+
+def test_the_plan_says_which_pictures_stay_whole(illum, scene):
+    cut = illum("plan", scene, "-D", "obscurance.reconstruct=false")
+    whole = illum("plan", scene, "-D", "obscurance.reconstruct=true")
+    assert "whole" not in cut.stdout
+    assert "whole   on clusters and in shards: obscurance is reconstructed" in whole.stdout

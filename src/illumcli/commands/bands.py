@@ -14,7 +14,6 @@ from illumcli.commands.unit_cost import cost_of
 from illumcli.commands.work import Work
 from illumcli.files.names import band_path
 from illumcli.film.view import View
-from illumcli.images.picture_bands import join_bands
 from illumcli.render_graph.costs import CostModel
 from illumcli.render_graph.needs import reconstructs
 
@@ -27,11 +26,11 @@ ROWS = 64
 
 
 def whole_because(work: Work) -> str:
-    """Why the pictures of a work cannot be cut; empty if they can."""
+    """Why large pictures of a work are not cut; empty if they are."""
     if work.job.options.target_error is not None:
-        return "sample counts for a target error are chosen for the whole"
+        return "sample counts are chosen for its target error"
     if reconstructs(work.scene):
-        return "obscurance is reconstructed from the pixels around, and its error measured in the whole"
+        return "obscurance is reconstructed from the pixels around, and audited"
     return ""
 
 
@@ -81,6 +80,8 @@ class CutJobs:
 
     def join(self, number: int, results: Sequence[tuple[list[Path], Report]]) -> tuple[list[Path], Report]:
         """The files and the report of a job, from those of its units."""
+        from illumcli.images.picture_bands import join_bands  # loads OpenImageIO, which plans do not need
+
         work, rows = self._jobs.work(number), self._rows[number]
         due = [target for target in work.due() if len(rows[target.view.name]) > 1]
         for target in due:

@@ -59,6 +59,7 @@ def merged_shards(folders: Sequence[Path], output: Path, force: bool) -> tuple[M
     contents: dict[int, tuple[str, ...]] = {}
     missing: dict[int, str] = {}
     kept: list[Path] = []
+    bands: dict[int, Path] = {}
     for number, unit in enumerate(whole.units):
         why = f"shard-{unit.shard}-of-{whole.shard.count}.json is missing"
         for path, record in records.items():
@@ -68,7 +69,9 @@ def merged_shards(folders: Sequence[Path], output: Path, force: bool) -> tuple[M
             why = result.error or _damage(path.parent, result.files)
             if why or result.report is None:
                 continue
-            for name, content in result.files.items():
+            if "picture" in unit.about:
+                bands[number] = path.parent
+            for name, content in () if number in bands else result.files.items():
                 if _copy(path.parent / name, output / name, content, force):
                     kept.append(output / name)
             named = {key: [str(output / name) for name in result.report[key]] for key in ("written", "kept")}
@@ -80,7 +83,12 @@ def merged_shards(folders: Sequence[Path], output: Path, force: bool) -> tuple[M
     merged = MergedShards(
         whole.command, whole.settings, outputs, whole.units, output, reports, contents, missing
     )
-    return merged, kept
+    if not bands:
+        return merged, kept
+    from illumcli.commands.merged_bands import with_pictures
+
+    merged, joined = with_pictures(merged, bands, force)
+    return merged, [*kept, *joined]
 
 
 def _records(folders: Sequence[Path]) -> dict[Path, ShardRecord]:

@@ -38,6 +38,7 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
         _row("baked", baked_lines(part["obscurance_files"])),
         _row("", [f"traced as {part['ray_loop']}"] if part["ray_loop"] else []),
         _row("memory", [f"{name} {size / 2**20:,.1f} MiB" for name, size in part["expected_bytes"].items()]),
+        _row("whole", [f"on clusters and in shards: {part['whole']}"] if part["whole"] else []),
         _time_row(part["expected_time"]),
     ]
     reasons = defaultdict(list)

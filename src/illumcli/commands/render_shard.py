@@ -1,13 +1,14 @@
-"""Render a shard of scenes and their frames; a unit is what one camera sees."""
+"""Render a shard of scenes and their frames; a unit is what one camera sees, or a band of a large picture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from illumcli.commands.bands import band_counts, rows_of_bands, whole_because
 from illumcli.commands.batch import Batch, Tell
 from illumcli.commands.batch_shard import BatchUnits, run_shard
 from illumcli.commands.options import RenderJob, RenderOptions
@@ -16,11 +17,14 @@ from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
 from illumcli.commands.runner import Runner
 from illumcli.commands.sharding import PlannedUnit, Sharding
+from illumcli.commands.targets import band_of
 from illumcli.commands.unit import Unit
 from illumcli.commands.unit_cost import cost_of
 from illumcli.errors import unless_faulty
 from illumcli.files.names import check_unique
-from illumcli.render_graph.costs import CostModel
+from illumcli.film.develop import Target
+from illumcli.records import Value
+from illumcli.render_graph.costs import Cost, CostModel
 
 
 def render_shard(
@@ -42,7 +46,7 @@ def render_shard(
     """
     assert options.shard is not None
     jobs = RenderJobs(scenes, replace(options, shard=None))
-    batch_units, planned = _units(jobs, options.target_error is None)
+    batch_units, planned = _units(jobs, options.shard.count)
     check_unique([str(path) for path in dict.fromkeys(path for unit in planned for path in unit.files)])
     settings = {"target_error": options.target_error}
     sharding = Sharding("render", options.shard, planned, {"report": report}, settings)
@@ -57,25 +61,58 @@ def render_shard(
     return run_shard(BatchUnits(batch_units, sharding, options.force), batch, jobs.worker, runner, done)
 
 
-def _units(jobs: RenderJobs, by_camera: bool) -> tuple[list[RenderJob], list[PlannedUnit]]:
-    """A unit for every job, or for every camera of its scene; one for a job with a fault."""
-    units, planned, model = list[RenderJob](), list[PlannedUnit](), CostModel()
+class _Picture(Value):
+    """What a camera sees of a job, or all of its cameras: a unit, or several bands."""
+
+    unit: RenderJob
+    planned: PlannedUnit
+    targets: tuple[Target, ...] = ()
+    """Its files, if it can be cut."""
+
+    def bands(self, count: int) -> Iterator[tuple[RenderJob, PlannedUnit]]:
+        """At most `count` units."""
+        whole, rows_of_each = self.planned, rows_of_bands(self.targets[0].view, count)
+        cost = Cost(whole.cost.alone // len(rows_of_each), whole.cost.after // len(rows_of_each))
+        picture = {"name": whole.name, "files": whole.files, "contents": whole.about["contents"]}
+        for rows in rows_of_each:
+            parts = [band_of(target, rows) for target in self.targets]
+            name = f"{whole.name}, rows {rows[0]} to {rows[1] - 1}"
+            about = {**whole.about, "contents": [part.content for part in parts], "picture": picture}
+            yield (
+                replace(self.unit, rows=rows),
+                PlannedUnit(name, tuple(part.path for part in parts), cost, about),
+            )
+
+
+def _units(jobs: RenderJobs, shards: int) -> tuple[list[RenderJob], list[PlannedUnit]]:
+    """The units of all jobs."""
+    pictures = list(_pictures(jobs))
+    counts = band_counts([each.planned.cost.alone for each in pictures], shards)
+    units = list[tuple[RenderJob, PlannedUnit]]()
+    for picture, count in zip(pictures, counts, strict=True):
+        is_cut = count > 1 and picture.targets
+        units += picture.bands(count) if is_cut else [(picture.unit, picture.planned)]
+    return [unit for unit, _ in units], [planned for _, planned in units]
+
+
+def _pictures(jobs: RenderJobs) -> Iterator[_Picture]:
+    """What each camera sees of each job; all of them together for a job with a fault or a target error."""
+    model = CostModel()
     for number, job in enumerate(jobs):
         about = {"entry": number, "of": entry_of(job)}
         label = ", ".join(filter(None, (str(job.scene), jobs.label(number))))
         work = unless_faulty(partial(jobs.planned, number))
         if work is None:
-            units.append(job)
-            planned.append(PlannedUnit(label, (), about=about))
+            yield _Picture(job, PlannedUnit(label, (), about=about))
             continue
         jobs.drop(number)
         cameras = tuple(dict.fromkeys(target.view.name for target in work.targets))
+        by_camera = job.options.target_error is None
         for names in [(camera,) for camera in cameras] if by_camera else [cameras]:
             targets = tuple(target for target in work.targets if target.view.name in names)
             part = replace(work, targets=targets)
-            units.append(replace(job, cameras=names))
             name = label if names == cameras else f"{label}, camera {names[0]}"
             files = tuple(target.path for target in targets)
             facts = {**about, "contents": part.contents}
-            planned.append(PlannedUnit(name, files, cost_of(part, model), facts))
-    return units, planned
+            planned = PlannedUnit(name, files, cost_of(part, model), facts)
+            yield _Picture(replace(job, cameras=names), planned, () if whole_because(work) else targets)

@@ -229,12 +229,6 @@ def test_properties_with_the_names_of_others_keep_their_values(text_mesh, tmp_pa
     assert scalars == {"_UV_": [1, 2, 3], "_COLOR_": [4, 5, 6], "_HEAT": [7, 8, 9], "_HEAT_": [10, 11, 12]}
 
 
-def test_an_object_called_own_is_no_occluder_by_that_name(text_mesh, tmp_path):
-    path = text_mesh("version: 1\nobjects: [{name: own, mesh: {shape: sphere}}]\n", "own.yaml")
-    with pytest.raises(InputError, match="--occluders own: an object has that name too; give the object"):
-        bake(path, tmp_path / "a.npz", occluders=("own",))
-
-
 def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
     path = text_mesh(CUBE.replace("v 1 1 1\n", "v 1 1 1 \n") + "v 0 3 0\nf 4 3 9\nf 8 9 7\n")
     outs = [tmp_path / f"out.{kind}" for kind in ("npz", "ply", "glb")]
@@ -357,34 +351,6 @@ def test_back_faces_do_as_told(text_mesh, tmp_path):
     assert (found["count"] < 0.1).all()
     assert (found["ignore"] == 1).all()
     assert (found["one_sided"] == 1).all()
-
-
-def test_a_ground_closes_what_stands_on_it(text_mesh, tmp_path):
-    bake(text_mesh(CUBE), tmp_path / "out.npz", ground="y", samples=1024)
-    w = read_npz(tmp_path / "out.npz").obscurance
-    low = np.array([1, 1, 0, 0, 1, 1, 0, 0], bool)
-    assert (w[low] < 0.4).all()
-    np.testing.assert_allclose(w[~low], 2 / 3, atol=0.02)  # the mean of an open top and two walls on a floor
-
-
-def test_a_scene_hides_its_objects_from_each_other_or_not(text_mesh, tmp_path):
-    text_mesh(CUBE, "cube.obj")
-    scene = tmp_path / "two.yaml"
-    scene.write_text(
-        "version: 1\nobjects:\n- {name: a, mesh: cube.obj}\n"
-        "- {name: b, mesh: cube.obj, transform: {translate: [2.2, 0, 0]}}\n"
-    )
-    bake(scene, tmp_path / "all.npz")
-    bake(scene, tmp_path / "own.npz", occluders=("own",))
-    bake(scene, tmp_path / "named.npz", occluders=("a",))
-    both, own, named = (read_npz(tmp_path / f"{n}.npz").obscurance for n in ("all", "own", "named"))
-    assert len(both) == 16
-    assert both[:8].min() < 0.99
-    assert (own == 1).all()
-    assert (named[:8] == 1).all()
-    assert np.array_equal(named[8:], both[8:])
-    with pytest.raises(InputError, match="no object of that name"):
-        bake(scene, tmp_path / "none.npz", occluders=("c",))
 
 
 def test_a_fit_is_right_in_the_middle_of_large_triangles(text_mesh, tmp_path):
@@ -559,7 +525,7 @@ def test_errors_at_a_hollow_edge_keep_falling_with_the_rays(text_mesh, tmp_path)
     surfaces, _ = surfaces_of(loaded.scene, loaded)
     points = vertex_points(surfaces).points
     assert not points.is_flat.any()
-    occluders = occluders_of(loaded.scene, points.geometry, BakeSettings())
+    occluders = occluders_of(loaded.scene.object_names(), points.geometry, BakeSettings(), {})
     sampler = BakeSampler(points, occluders, Measure(Method(1, Step(), 1.0)), 0, 1, no_progress)
 
     def rmse(samples):

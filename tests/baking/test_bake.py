@@ -19,6 +19,7 @@ from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.baking.vertex_points import vertex_points
 from illumcli.cli import illum
+from illumcli.color import to_srgb
 from illumcli.errors import InputError, OutputError
 from illumcli.geometry.corner_normals import corner_normals
 from illumcli.images.encoded import png_bytes
@@ -306,6 +307,50 @@ def test_an_obj_goes_to_glb_with_its_groups_materials_and_images(text_mesh, tmp_
     assert "baseColorTexture" in json["materials"][0]["pbrMetallicRoughness"]
     assert len(json["images"]) == 1
     assert faults(tmp_path / "out.glb") == []
+
+
+def test_an_obj_keeps_its_lines_and_takes_its_materials_along(text_mesh, tmp_path):
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps/brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))
+    (tmp_path / "a.mtl").write_text("newmtl clay\nmap_Ke maps/brick.png\n")
+    path = text_mesh("mtllib a.mtl\nusemtl clay\n" + CUBE)
+    out = tmp_path / "baked" / "out.obj"
+    _, report = bake(path, out, tmp_path / "out.npz", samples=64)
+    assert report.left_out == []
+    mesh, made, baked = read_mesh(path), read_mesh(out), read_npz(tmp_path / "out.npz")
+    np.testing.assert_array_equal(made.vertices, mesh.vertices)
+    np.testing.assert_array_equal(made.corners, mesh.corners)
+    assert made.materials.keys() == mesh.materials.keys()
+    np.testing.assert_allclose(to_srgb(made.attributes["color"])[:, 0], baked.obscurance, atol=1e-6)
+    assert (out.parent / "maps/brick.png").exists()
+    assert bake(path, out, tmp_path / "out.npz", samples=64)[1].kept == [str(out), str(tmp_path / "out.npz")]
+
+    # a library of another content beside the output is not replaced
+    (out.parent / "a.mtl").write_text("newmtl other\n")
+    out.unlink()
+    with pytest.raises(OutputError, match=r"a\.mtl: a different file is there; use --force"):
+        bake(path, out, samples=32)
+    bake(path, out, samples=32, force=True)
+    assert (out.parent / "a.mtl").read_text() == (tmp_path / "a.mtl").read_text()
+
+
+def test_an_obj_with_colours_has_no_place_for_values(text_mesh, tmp_path):
+    path = text_mesh(CUBE.replace("v 1 1 1", "v 1 1 1 1 0 0"))
+    with pytest.raises(InputError, match=r"out\.obj: the vertices have colours, .*--color"):
+        bake(path, tmp_path / "out.obj")
+    bake(path, tmp_path / "out.obj", samples=4, channel="g")
+    assert read_mesh(tmp_path / "out.obj").attributes["color"].shape == (8, 3)
+
+
+def test_a_mirrored_object_keeps_its_outside(text_mesh, tmp_path):
+    text_mesh(CUBE, "cube.obj")
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("version: 1\nobjects: [{mesh: cube.obj, transform: {scale: [-1, 1, 1]}}]\n")
+    for kind in ("ply", "obj", "glb"):
+        bake(scene, tmp_path / f"out.{kind}", samples=4)
+        made = read_mesh(tmp_path / f"out.{kind}")
+        a, b, c = (made.vertices[made.corners[made.starts[:-1] + k]] for k in range(3))
+        assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all(), kind
 
 
 def test_an_asset_is_written_again_if_an_image_or_material_changes(text_mesh, tmp_path):

@@ -138,6 +138,7 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     content = content_hash(loaded.scene, hashes, surfaces, settings, occluding)
     if is_mesh_file(path) and any(each.suffix.lower() in ASSETS for each in outputs):
         content = digest((content, FileFingerprint(lambda: path, companions)))
+    refuse_lost_colors(outputs, meshes, settings)
     if options.strict:
         refuse_repairs(str(path), repairs)
     slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)
@@ -204,6 +205,18 @@ def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
         raise InputError("--texture belongs to .png, .exr and .glb outputs; name one with -o")
     if "ao" not in settings.what:
         raise InputError(f"{files[0]}: textures hold ao; add it to --what")
+
+
+def refuse_lost_colors(outputs: Sequence[Path], meshes: Sequence[Mesh], settings: BakeSettings) -> None:
+    """Raise InputError for an OBJ that has no place for values, because its vertices have colours."""
+    files = [each for each in outputs if each.suffix.lower() == ".obj"]
+    if files and settings.channel is None and any("color" in mesh.attributes for mesh in meshes):
+        raise InputError(
+            f"{files[0]}: the vertices have colours, which an OBJ would hold in place of values; "
+            "choose a channel with --color, or bake to .npz"
+        )
+    if files and "ao" not in settings.what:
+        raise InputError(f"{files[0]}: an OBJ holds ao; add it to --what")
 
 
 def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking.baked_texture import TextureUvs
+from illumcli.baking.obj_files import reversed_corners
 from illumcli.baking.points import Surfaces
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.transforms import cofactors
@@ -140,7 +141,7 @@ def output_mesh(
     return OutputMesh(
         name,
         vertices[part.source],
-        part.of_corner,
+        part.of_corner[reversed_corners(mesh)] if placed.mirrored else part.of_corner,
         mesh.starts,
         part.of_corner[corner],
         attributes,

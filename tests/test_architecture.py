@@ -46,6 +46,7 @@ HOMES = {
     "pydantic_core": ("nowhere: it is no dependency of ours",),
     "embreex": ("rays/",),
     "OpenImageIO": ("images/openimageio.py",),
+    "xatlas": ("atlas/xatlas_process.py",),
     "distributed": ("cluster/",),
     "dask": ("cluster/",),
     "jinja2": ("html_report/",),

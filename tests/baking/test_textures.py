@@ -9,13 +9,14 @@ import pytest
 from click.testing import CliRunner
 
 from gltf_validator import faults
+from illumcli.baking import unwrapped as unwrapped_module
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cli import illum
 from illumcli.errors import InputError
 from illumcli.images.png import read_texts
 from illumcli.images.reader import read_image, read_metadata
-from illumcli.mesh_files import embedded_image
+from illumcli.mesh_files import embedded_image, read_mesh
 from illumcli.mesh_files.gltf.accessors import table
 from illumcli.mesh_files.gltf.document import open_document
 
@@ -206,6 +207,58 @@ def test_meshes_without_uv_are_refused(text_mesh, tmp_path):
     path = text_mesh("v 0 0 0\nv 1 0 0\nv 0 0 -1\nf 1 2 3\n")
     with pytest.raises(InputError, match="has no uv"):
         bake(path, tmp_path / "a.png")
+
+
+def test_uv_are_made_where_there_are_none_and_kept_for_the_next_bake(text_mesh, tmp_path, monkeypatch):
+    pytest.importorskip("xatlas")
+    monkeypatch.setenv("ILLUM_CACHE", str(tmp_path / "cache"))
+    plain = "".join(line for line in CORNER.splitlines(keepends=True) if not line.startswith("vt"))
+    path = text_mesh(
+        plain.replace("/1", "")
+        .replace("/2", "")
+        .replace("/3", "")
+        .replace("/4", "")
+        .replace("/5", "")
+        .replace("/6", "")
+        .replace("/7", "")
+        .replace("/8", "")
+    )
+    settings = BakeSettings(texture=(32, 32), samples=64, unwrap="missing")
+    with pytest.raises(InputError, match="--unwrap missing makes them"):
+        bake(path, tmp_path / "a.png")
+    bake(path, tmp_path / "a.exr", settings)
+    channels = read_image(tmp_path / "a.exr").channels
+    assert 0.4 < channels["Y"].min() < 0.6
+    assert channels["coverage.Y"].mean() > 0.3
+
+    def fail(*_):
+        raise AssertionError("made again")
+
+    monkeypatch.setattr(unwrapped_module, "unwrapped", fail)
+    bake(path, tmp_path / "b.exr", settings)
+    np.testing.assert_array_equal(read_image(tmp_path / "b.exr").channels["Y"], channels["Y"])
+
+
+def test_uv_that_overlap_are_replaced_on_request(text_mesh, tmp_path):
+    pytest.importorskip("xatlas")
+    overlapping = text_mesh(CORNER.replace("f 2/5 5/6 6/7 3/8", "f 2/1 5/2 6/3 3/4"))
+    settings = BakeSettings(texture=(32, 32), samples=16, unwrap="all")
+    _, report = bake(overlapping, tmp_path / "a.png", settings)
+    assert not report.warnings
+
+
+def test_a_glb_has_uv_that_cut_polygons(tmp_path):
+    pytest.importorskip("xatlas")
+    # a folded quad: xatlas may cut it along its diagonal, so its triangles have corners of their own
+    path = tmp_path / "mesh.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 3 -1\nv 0 0 -1\nf 1 2 3 4\n")
+    bake(path, tmp_path / "a.glb", BakeSettings(texture=(32, 32), samples=16, unwrap="missing"))
+    mesh = read_mesh(tmp_path / "a.glb")
+    assert mesh.uvs is not None
+    assert len(mesh.corners) == 6
+    corners = mesh.uvs[mesh.corner_uvs].reshape(2, 3, 2)
+    (ax, ay), (bx, by) = (corners[:, k].T - corners[:, 0].T for k in (1, 2))
+    assert (ax * by - ay * bx > 0.01).all()
 
 
 def test_a_changed_uv_is_another_texture(text_mesh, tmp_path):

@@ -15,6 +15,7 @@ from illumcli.baking.baked_texture import BakedTexture
 from illumcli.baking.context import BakeContext, PointChannels, TexelChannels
 from illumcli.baking.texel_points import TexturePoints, texel_points
 from illumcli.baking.texture_slots import Slot
+from illumcli.baking.unwrapped import unwrapped_uvs
 from illumcli.visibility.channels import CHANNELS
 
 
@@ -22,8 +23,9 @@ def sampled_at_texels(context: BakeContext, slots: Sequence[Slot]) -> TexelChann
     """The channels that the settings ask for, at the texels of the textures of all slots."""
     assert context.settings.texture is not None
     size = TextureSize(*context.settings.texture)
-    texels = texel_points(context.surfaces, slots, size, {}, context.threads)
-    return TexelChannels(texels, channels_at(context, texels.points))
+    uvs = unwrapped_uvs(context, slots, size)
+    texels = texel_points(context.surfaces, slots, size, uvs, context.threads)
+    return TexelChannels(texels, channels_at(context, texels.points), uvs)
 
 
 def baked_texture(texture: TexturePoints, values: PointChannels) -> BakedTexture:

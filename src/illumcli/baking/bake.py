@@ -80,7 +80,7 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
 def bake_context(work: BakeWork, progress: Progress, journal: Journal) -> BakeContext:
     """What the methods of a bake need."""
     geometry, settings = work.surfaces.geometry, work.settings
-    occluders = occluders_of(work.scene.object_names(), geometry, settings, work.occluding)
+    occluders = occluders_of(work.scene, geometry, settings)
     wanted = measures(settings, geometry.render_space.radius)
     work.clock.lap("build")
     threads, clock = work.job.threads, work.clock
@@ -111,7 +111,7 @@ def write_files(work: BakeWork, due: Sequence[Path], values: BakedChannels) -> S
             for path in due:
                 if work.slot_of.get(path) == slot:
                     write_texture(path, texture, about, work.settings.bits)
-        textures = BakedTextures(tuple(texture for _, texture in of_slots))
+        textures = BakedTextures(tuple(texture for _, texture in of_slots), values.at_texels.unwrapped)
 
     # Values at vertices, in all other files.
     if values.at_vertices is None:

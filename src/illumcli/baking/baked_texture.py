@@ -32,10 +32,10 @@ class BakedTexture(Record):
 
 
 class TextureUvs(Record):
-    """uv of an object's corners, as `Mesh` has them: where the file's own do not serve."""
+    """uv of an object's triangles, where the file's own do not serve. Seams may run inside polygons."""
 
     uvs: NDArray[np.float64]  # (U, 2) v upwards
-    corner_uvs: NDArray[np.int32]  # (C,) row of `uvs`
+    corner_uvs: NDArray[np.int32]  # (T, 3) row of `uvs` at the corners of each, as the geometry has them
 
 
 class BakedTextures(Record):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors
+from illumcli.baking.baked_texture import TextureUvs
 from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import Occluders
 from illumcli.baking.points import Surfaces
@@ -108,6 +109,7 @@ class TexelChannels(Record):
 
     texels: Texels
     of_points: PointChannels
+    unwrapped: Mapping[int, TextureUvs]  # object -> uv that were made for its textures
 
 
 class BakedChannels(Record):

@@ -9,23 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from illumcli.baking.baked_texture import BakedTextures
-from illumcli.baking.files import (
-    add_baked_to_glb,
-    extend_baked_obj,
-    write_baked_glb,
-    write_baked_obj,
-    write_baked_ply,
-)
+from illumcli.baking.files import add_baked_to_glb, write_baked_glb, write_baked_ply
 from illumcli.baking.inputs import BakeWork
-from illumcli.baking.obj_files import copy_materials, placed_mesh, write_materials
-from illumcli.baking.split import split_meshes, whole_meshes, with_materials
+from illumcli.baking.points import Surfaces
+from illumcli.baking.split import corners_of_triangles, split_meshes, whole_meshes, with_materials
 from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import is_mesh_file
 from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import fits_attribute
 from illumcli.mesh_files.materials import pbr_materials
-from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.visibility.baked import Baked, write_npz
@@ -52,14 +45,20 @@ def pose_warnings(path: Path) -> list[str]:
     return [f"meshes are deformed by {' and '.join(deformers)}: the values are those of the rest pose"]
 
 
-def occlusion_maps(textures: BakedTextures) -> OcclusionMaps:
-    """Textures in the form in which a GLB has them: 8 bits of obscurance."""
+def occlusion_maps(textures: BakedTextures, surfaces: Surfaces) -> OcclusionMaps:
+    """Textures in the form in which a GLB has them: 8 bits of obscurance. uv of corners are those of
+    triangles, which all polygons of glTF files are."""
     maps = {}
     for each in textures.textures:
         steps = np.rint(255 * np.clip(each.channels["obscurance"], 0, 1)).astype(np.uint8)
         png = png_bytes(steps[..., None], srgb=False)
         maps[each.object, each.material] = OcclusionMap(f"occlusion of {each.name}", png)
-    uvs = {number: each.uvs[each.corner_uvs] for number, each in textures.unwrapped.items()}
+    uvs = {}
+    for number, of_triangles in textures.unwrapped.items():
+        at_corners = np.zeros((len(surfaces.geometry.placed[number].mesh.corners), 2))
+        corners = corners_of_triangles(surfaces.geometry, number)
+        at_corners[corners] = of_triangles.uvs[of_triangles.corner_uvs]
+        uvs[number] = at_corners
     return OcclusionMaps(maps, uvs)
 
 
@@ -83,11 +82,9 @@ class _Writer:
             return ()
         if kind == ".glb":
             if source_kind in GLTF:
-                occlusion = occlusion_maps(self._textures)
+                occlusion = occlusion_maps(self._textures, self._work.surfaces)
                 return add_baked_to_glb(path, self._source, self._baked, self._channel, occlusion)
             return self._write_glb(path)
-        if kind == ".obj":
-            return self._write_obj(path)
         if source_kind == ".ply" and not self._split:
             write_baked_ply(path, [], self._baked, self._source, self._channel)
             return ()
@@ -105,7 +102,8 @@ class _Writer:
             left_out += [each for mesh in meshes for material in mesh.materials for each in material.left_out]
         elif self._has_materials(meshes):
             left_out.append("materials")
-        write_baked_glb(path, meshes, split.baked, self._channel, occlusion_maps(self._textures))
+        occlusion = occlusion_maps(self._textures, self._work.surfaces)
+        write_baked_glb(path, meshes, split.baked, self._channel, occlusion)
         for mesh in meshes:
             wide = [name for name, values in mesh.attributes.items() if not fits_attribute(values)]
             left_out += [f"the vertex property {name} of {mesh.name}" for name in wide]
@@ -134,29 +132,6 @@ class _Writer:
             left_out.append("materials")
         if any(mesh.group_names for mesh in written.meshes):
             left_out.append("groups")
-        if self._source.suffix.lower() in GLTF:
-            left_out += beside_mesh(open_document(self._source))
-        return left_out
-
-    def _write_obj(self, path: Path) -> list[str]:
-        """Write an OBJ: the lines of an OBJ with colours, or the meshes, with their materials beside it."""
-        placed, force = self._work.surfaces.geometry.placed, self._work.job.options.force
-        channel = self._channel
-        if self._source.suffix.lower() == ".obj":
-            extend_baked_obj(path, self._source, placed[0].mesh, self._baked, channel)
-            copy_materials(path, self._source, force)
-            return []
-        meshes = [NamedMesh(name, placed_mesh(each)) for name, each in zip(self._names, placed, strict=True)]
-        library = write_materials(path, [each.mesh for each in meshes], force)
-        write_baked_obj(path, meshes, self._baked, channel, library)
-
-        # What an OBJ has no place for.
-        names = {name for each in meshes for name in each.mesh.attributes} - {"color", "alpha"}
-        left_out = [f"the vertex property {name}" for name in sorted(names)]
-        if self._work.scene.materials:
-            left_out.append("materials of the scene")
-        differences = {what for each in meshes for what in each.mesh.material_repairs}
-        left_out += sorted(what.removesuffix(" left out") for what in differences if "left out" in what)
         if self._source.suffix.lower() in GLTF:
             left_out += beside_mesh(open_document(self._source))
         return left_out

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking.baked_texture import TextureUvs
-from illumcli.baking.obj_files import reversed_corners
 from illumcli.baking.points import Surfaces
 from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.geometry.transforms import cofactors
 from illumcli.mesh_files.output_mesh import STANDARD, TEXTURE_UV, OutputMesh, free_name
 from illumcli.mesh_files.pbr import PbrMaterial
@@ -63,16 +63,25 @@ def split_meshes(
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     for index, (name, mesh) in enumerate(zip(names, meshes, strict=True)):
         tables = corner_tables(surfaces, index, fill)
+        corners = np.arange(len(mesh.corners), dtype=np.int32)
         if index in unwrapped:
-            tables[TEXTURE_UV] = unwrapped[index].uvs[unwrapped[index].corner_uvs]
+            # seams may run inside polygons: every triangle has corners of its own
+            corners = corners_of_triangles(surfaces.geometry, index).ravel()
+            tables = {kind: values[corners] for kind, values in tables.items()}
+            tables[TEXTURE_UV] = unwrapped[index].uvs[unwrapped[index].corner_uvs].reshape(-1, 2)
         first = surfaces.geometry.placed[index].first_corner
-        values = [
-            each[first : first + len(mesh.corners)].reshape(len(mesh.corners), -1)
-            for each in baked.corner_channels.values()
-        ]
-        parts.append(split_vertices(mesh.corners, len(mesh.vertices), [*tables.values(), *values]))
-        outputs.append(output_mesh(name, surfaces, index, tables, parts[-1]))
+        values = [each[first + corners].reshape(len(corners), -1) for each in baked.corner_channels.values()]
+        part = split_vertices(mesh.corners[corners], len(mesh.vertices), [*tables.values(), *values])
+        outputs.append(output_mesh(name, surfaces, index, tables, part))
+        has_corner = part.corner >= 0
+        parts.append(replace(part, corner=np.where(has_corner, corners[part.corner], -1)))
     return OutputMeshes(outputs, split_values(baked, meshes, parts))
+
+
+def corners_of_triangles(geometry: SceneGeometry, index: int) -> NDArray[np.int32]:
+    """(T, 3) corner numbers, in its mesh, of the triangles of an object."""
+    first = geometry.placed[index].first_corner
+    return np.asarray(geometry.corners[geometry.objects == index] - np.int32(first))
 
 
 def corner_tables(surfaces: Surfaces, index: int, fill: bool) -> dict[str, NDArray[np.float64]]:
@@ -131,9 +140,12 @@ def output_mesh(
         attributes[kind] = np.where((part.corner >= 0)[:, None], at, 0.0)
 
     # The triangles. Reversed polygons regain the order of corners in their file.
-    of_object = geometry.objects == index
-    corner = geometry.corners[of_object] - np.int32(placed.first_corner)
-    polygons = geometry.polygons[of_object] - placed.first_polygon
+    corner = corners_of_triangles(geometry, index)
+    starts = mesh.starts
+    if TEXTURE_UV in tables:  # every triangle has corners of its own
+        corner = np.arange(corner.size, dtype=np.int32).reshape(-1, 3)
+        starts = np.arange(0, corner.size + 1, 3, dtype=np.int32)
+    polygons = geometry.polygons[geometry.objects == index] - placed.first_polygon
     if placed.reversed is not None:
         is_reversed = placed.reversed[polygons]
         corner[is_reversed] = corner[is_reversed, ::-1]
@@ -141,8 +153,8 @@ def output_mesh(
     return OutputMesh(
         name,
         vertices[part.source],
-        part.of_corner[reversed_corners(mesh)] if placed.mirrored else part.of_corner,
-        mesh.starts,
+        part.of_corner,
+        starts,
         part.of_corner[corner],
         attributes,
         mesh.group_names,

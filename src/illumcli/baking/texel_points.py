@@ -20,7 +20,7 @@ from illumcli.atlas.texels import texels_of
 from illumcli.atlas.triangles import AtlasTriangles, TextureSize, atlas_triangles
 from illumcli.baking.baked_texture import TextureUvs
 from illumcli.baking.points import PointsOnTriangles, Surfaces
-from illumcli.baking.texture_slots import Slot
+from illumcli.baking.texture_slots import Slot, slot_triangles
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
 from illumcli.rays.corner_weights import corner_weights
@@ -130,16 +130,12 @@ def _triangles(
     """The triangles of a slot that have an area, on its texture."""
     placed = geometry.placed[slot.object]
     mesh = placed.mesh
-    own = np.flatnonzero(geometry.objects == slot.object).astype(np.int32)
-    if mesh.polygon_materials is not None:
-        material = mesh.polygon_materials[geometry.polygons[own] - placed.first_polygon]
-        own = own[material == slot.material]
+    own = slot_triangles(geometry, slot)
     a, b, c = triangle_corners(geometry.vertices, geometry.triangles[own])
     own = own[length(cross(b - a, c - a)) > 0]
-    uvs, corner_uvs = (
-        (mesh.uvs, mesh.corner_uvs) if unwrapped is None else (unwrapped.uvs, unwrapped.corner_uvs)
-    )
-    if uvs is None or corner_uvs is None:
-        uvs, corner_uvs = np.zeros((0, 2)), np.full(len(mesh.corners), -1, np.int32)
+    if unwrapped is not None:
+        return atlas_triangles(size, unwrapped.uvs, unwrapped.corner_uvs[own - placed.first_triangle], own)
+    assert mesh.uvs is not None
+    assert mesh.corner_uvs is not None
     corner = geometry.corners[own] - np.int32(placed.first_corner)
-    return atlas_triangles(size, uvs, corner_uvs[corner], own)
+    return atlas_triangles(size, mesh.uvs, mesh.corner_uvs[corner], own)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from illumcli.arrays import Ids
 from illumcli.errors import InputError
 from illumcli.files.names import expand
 from illumcli.geometry.scene_geometry import SceneGeometry
@@ -44,6 +45,16 @@ def texture_slots(names: Sequence[str], geometry: SceneGeometry) -> tuple[Slot, 
             of_mesh = mesh.material_names[material] if material >= 0 else NO_MATERIAL
             slots.append(Slot(number, material, name, of_mesh))
     return tuple(slots)
+
+
+def slot_triangles(geometry: SceneGeometry, slot: Slot) -> Ids:
+    """(T,) int32 numbers of the triangles of a slot, ascending."""
+    placed = geometry.placed[slot.object]
+    own = np.flatnonzero(geometry.objects == slot.object).astype(np.int32)
+    if placed.mesh.polygon_materials is not None:
+        material = placed.mesh.polygon_materials[geometry.polygons[own] - placed.first_polygon]
+        own = own[material == slot.material]
+    return own
 
 
 def is_texture(path: Path) -> bool:

@@ -71,5 +71,6 @@ def uv_warnings(texture: TexturePoints) -> list[str]:
         fact = f"{overlaps.several} texels ({share:.1%}) belong to several places of the surface"
         if overlaps.mirrored:
             fact += f", {overlaps.mirrored} of them to mirrored charts"
-        warnings.append(f"{name}: {fact}: each has the mean of their values; --unwrap makes uv of their own")
+        advice = "--unwrap all makes uv that do not overlap"
+        warnings.append(f"{name}: {fact}: each has the mean of their values; {advice}")
     return warnings

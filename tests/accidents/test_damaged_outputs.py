@@ -11,7 +11,7 @@ from illumcli.accuracy.convergence_files import ConvergenceFiles
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.commands import render, render_all
-from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions
 from illumcli.commands.runner import Here
 from illumcli.commands.sweep import sweep_scene
 from illumcli.commands.sweep_files import SweepFiles
@@ -43,9 +43,9 @@ def report(folder, name):
         settings = RenderOptions(changes, str(folder / "o.exr"), cache=False, force=force)
         ignore = lambda *words: None  # noqa: E731
         kept = render_all.render_scenes(
-            [folder / "scene.yaml"], settings, folder / name, Here(), written=ignore, tell=ignore
+            [folder / "scene.yaml"], settings, RenderFiles(folder / name), Here(), written=ignore, tell=ignore
         )
-        return [str(folder / name)] if kept else []
+        return [*map(str, kept)]
 
     return make
 

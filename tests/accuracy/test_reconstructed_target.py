@@ -110,13 +110,13 @@ def test_a_target_beyond_fits_is_reached_by_rays_alone(scene, illum, tmp_path, m
     monkeypatch.setattr("illumcli.accuracy.reconstructed_target.MOST_RAYS", 1)
     monkeypatch.setattr("illumcli.accuracy.reconstructed_target.MOST_PIXEL_SAMPLES", 1)
     scene.write_text(SCENE.replace("samples: 64", "samples: 64, reconstruct: true"))
-    from illumcli.commands.options import RenderOptions
+    from illumcli.commands.options import RenderFiles, RenderOptions
     from illumcli.commands.render_all import render_scenes
     from illumcli.commands.runner import Here
 
     options = RenderOptions(pattern=str(tmp_path / "out.exr"), target_error=0.015, cache=False)
     done = []
-    render_scenes([scene], options, None, Here(), done.append, pytest.fail)
+    render_scenes([scene], options, RenderFiles(), Here(), done.append, pytest.fail)
     assert done[0].report.error["reached"] < 0.017
     assert "obscurance.reconstruct=false" in done[0].report.chosen
     assert done[0].report.audited_error == {}

@@ -10,7 +10,7 @@ import pytest
 from illumcli.cluster.address import address_of
 from illumcli.cluster.runner import ClusterRunner
 from illumcli.commands import bands
-from illumcli.commands.options import RenderOptions
+from illumcli.commands.options import RenderFiles, RenderOptions
 from illumcli.commands.render_all import render_scenes
 from illumcli.commands.runner import Here
 from illumcli.progress import no_progress
@@ -21,7 +21,7 @@ LARGE = ("film.width=96", "film.height=200", FILES)
 
 def rendered(options, runner, report=None):
     done = []
-    render_scenes([Path("s.yaml")], options, report, runner, done.append, print)
+    render_scenes([Path("s.yaml")], options, RenderFiles(report), runner, done.append, print)
     (only,) = done
     return only
 

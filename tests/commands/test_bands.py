@@ -11,7 +11,7 @@ import pytest
 
 from illumcli.commands import bands
 from illumcli.commands.bands import LEAST, ROWS, band_counts, rows_of_bands
-from illumcli.commands.options import RenderJob, RenderOptions, Shard
+from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions, Shard
 from illumcli.commands.render import render_scene
 from illumcli.commands.render_all import render_scenes
 from illumcli.commands.render_shard import render_shard
@@ -72,7 +72,7 @@ def test_shards_of_bands_are_merged_to_the_picture(illum, scene, tmp_path, monke
     def render(folder, shard=None):
         options = RenderOptions(overrides, f"{folder}/{{scene}}.exr", cache=False, shard=shard)
         do = render_scenes if shard is None else render_shard
-        return do([scene], options, Path(folder, "r.json"), Here(), lambda done: None, print)
+        return do([scene], options, RenderFiles(Path(folder, "r.json")), Here(), lambda done: None, print)
 
     render("whole")
     lines = [render(folder, Shard(number, 2)) for number, folder in ((1, "a"), (2, "b"))]

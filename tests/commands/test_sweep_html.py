@@ -36,7 +36,8 @@ def report_data(folder):
 
 
 def test_a_report_has_the_values_and_measures_of_all_variants(illum, scene, tmp_path):
-    done = illum("sweep", "ball.yaml", *VALUES, "--html", "report", "--table", "t.csv", "--reference", "1")
+    more = ("--table", "t.csv", "--reference", "1", "--no-cache")
+    done = illum("sweep", "ball.yaml", *VALUES, "--html", "report", *more)
     assert done.returncode == 0, done.stderr
     data = report_data(tmp_path / "report")
     assert data["title"] == "ball"

@@ -194,6 +194,10 @@ report_option = click.option(
     "--report", type=FILE, metavar="FILE.json", help="Write a report of the run as JSON."
 )
 
+html_option = click.option(
+    "--html", type=FILE, metavar="DIR", help="Write a report for a browser: pictures, filters, comparison."
+)
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 
 json_results_option = click.option(

@@ -66,13 +66,13 @@ class Results:
         click.echo(json.dumps(self._entries, indent=1))
 
 
-def run_batch(results: Results, do: Callable[[], bool | str], report: Path | None, quiet: bool) -> None:
+def run_batch(results: Results, do: Callable[[], list[Path] | str], quiet: bool) -> None:
     """Do several pieces of work, and print their results and what is known at the end.
 
     Parameters
     ----------
     do : callable
-        Returns lines about a shard; otherwise whether the report is kept.
+        Returns lines about a shard; otherwise the files about all pieces that are kept.
     """
     with results:
         ending = do()
@@ -80,5 +80,5 @@ def run_batch(results: Results, do: Callable[[], bool | str], report: Path | Non
         return
     if isinstance(ending, str):
         say(ending)
-    elif ending:
-        say_kept([report])
+    else:
+        say_kept(ending)

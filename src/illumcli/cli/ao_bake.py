@@ -287,7 +287,7 @@ def ao_bake(
             for name, seconds in done.seconds.items():
                 say(f"{seconds:8.3f} s  {name}")
 
-    do: Callable[..., bool | str]
+    do: Callable[..., list[Path] | str]
     if request.shard is None:
         from illumcli.commands.bake import bake_inputs as do
     else:
@@ -295,13 +295,13 @@ def ao_bake(
 
     results = Results(as_json)
 
-    def bake_all() -> bool | str:
+    def bake_all() -> list[Path] | str:
         named = with_folders(inputs)
         for line in () if quiet else named.passed_over:
             say(line)
         return do(named.paths, request, report, runner(reporter(quiet)), written, results.fail)
 
-    run_batch(results, bake_all, report, quiet)
+    run_batch(results, bake_all, quiet)
 
 
 def _say_report(source: Path, report: BakeReport, verbose: bool) -> None:

@@ -15,6 +15,7 @@ from illumcli.cli._options import (
     force_option,
     frames_option,
     gathered,
+    html_option,
     json_results_option,
     keep_going_option,
     no_cache_option,
@@ -29,14 +30,24 @@ from illumcli.cli._options import (
     shard_option,
     strict_option,
     studio_options,
+    taken,
     threads_option,
     verbose_option,
 )
 from illumcli.cli._printing import Results, run_batch, say, say_kept
 
 if TYPE_CHECKING:
-    from illumcli.commands.options import RenderOptions
+    from illumcli.commands.options import RenderFiles, RenderOptions
     from illumcli.commands.render_all import Rendered
+
+
+def _files(options: dict[str, Any]) -> RenderFiles:
+    from illumcli.commands.options import RenderFiles
+
+    if options["html"] is not None and options["shard"] is not None:
+        way = "render with it and without --shard after illum merge: pictures that exist are kept"
+        raise click.UsageError(f"--html shows all scenes, --shard renders some of them; {way}")
+    return taken(RenderFiles, options)
 
 
 @click.command()
@@ -55,6 +66,7 @@ if TYPE_CHECKING:
 @seed_option("Random seed; by default the scene's.")
 @threads_option
 @report_option
+@html_option
 @json_results_option
 @force_option()
 @keep_going_option
@@ -64,11 +76,12 @@ if TYPE_CHECKING:
 @shard_option
 @quiet_option
 @verbose_option
+@gathered("about_all", _files)
 @gathered("options", render_options)
 def render(
     scenes: tuple[Path, ...],
     options: RenderOptions,
-    report: Path | None,
+    about_all: RenderFiles,
     runner: RunnerOf,
     as_json: bool,
     quiet: bool,
@@ -108,15 +121,15 @@ def render(
         if done.frame is not None and len(film := films.setdefault(done.scene, [])) < 2:
             film.append(done)
 
-    do: Callable[..., bool | str]
+    do: Callable[..., list[Path] | str]
     if options.shard is None:
         from illumcli.commands.render_all import render_scenes as do
     else:
         from illumcli.commands.render_shard import render_shard as do
 
     results = Results(as_json)
-    given = scenes, options, report, runner(reporter(quiet)), written, results.fail
-    run_batch(results, lambda: do(*given), report, quiet)
+    given = scenes, options, about_all, runner(reporter(quiet)), written, results.fail
+    run_batch(results, lambda: do(*given), quiet)
     if options.shard is None and not quiet and sys.stderr.isatty():
         _say_films(films)
 

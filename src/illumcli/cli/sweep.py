@@ -14,6 +14,7 @@ from illumcli.cli._options import (
     cluster_options,
     force_option,
     gathered,
+    html_option,
     json_results_option,
     keep_going_option,
     no_cache_option,
@@ -61,12 +62,7 @@ def _files(options: dict[str, Any]) -> SweepFiles:
     help="Pictures along a row of the sheet; by default the last -D.",
 )
 @click.option("--table", type=FILE, metavar="FILE.csv", help="Write values, seconds, rays, mean, errors.")
-@click.option(
-    "--html",
-    type=FILE,
-    metavar="DIR",
-    help="Write a report for a browser: pictures, filters, comparison.",
-)
+@html_option
 @click.option(
     "--reference",
     metavar="N|FILE",

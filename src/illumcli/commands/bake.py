@@ -60,8 +60,8 @@ def bake_inputs(
     runner: Runner,
     written: Callable[[Path, list[Path], BakeReport], None],
     tell: Tell,
-) -> bool:
-    """Bake every input. True if the report file is kept because it would be the same.
+) -> list[Path]:
+    """Bake every input. Returns the report's path if it is kept because it would be the same.
 
     `written` is called with each finished input, its files and report; `tell` with the errors of the others.
 

@@ -105,11 +105,11 @@ class BatchReport:
         """Set the entry of a finished piece."""
         self._entries[number] = entry
 
-    def finish(self, batch: Batch) -> bool:
-        """Write the report and end the batch. True if the existing one is kept."""
+    def finish(self, batch: Batch) -> list[Path]:
+        """Write the report and end the batch. Returns its path if the existing one is kept."""
         self.write(batch.failures)
         batch.finish()
-        return self._is_kept
+        return [self._path] if self._path is not None and self._is_kept else []
 
     def write(self, failures: Mapping[int, Exception]) -> bool:
         """Write the report, or refresh the date of the existing one. True if that is kept.

@@ -51,6 +51,14 @@ class RenderOptions(Value):
     """The part of all units that is rendered; by default all."""
 
 
+class RenderFiles(Value):
+    """The files to write about all scenes and frames of `illum render`."""
+
+    report: Path | None = None
+    html: Path | None = None
+    """Folder of a report for a browser."""
+
+
 class RenderJob(Value):
     """One scene with its options, a unit of work: see `commands/unit.py`."""
 

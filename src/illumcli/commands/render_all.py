@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport, Tell
-from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
 from illumcli.commands.runner import Cut, PlannedPieces, Runner
@@ -18,6 +18,9 @@ from illumcli.progress import Progress
 from illumcli.records import Value
 from illumcli.scene.frames import FRAMES_PER_SECOND
 from illumcli.scene.problems import without_value
+
+if TYPE_CHECKING:
+    from illumcli.commands.render_html import RenderPage
 
 
 class Rendered(Value):
@@ -33,12 +36,13 @@ class Rendered(Value):
 def render_scenes(
     scenes: Sequence[Path],
     options: RenderOptions,
-    report: Path | None,
+    about_all: RenderFiles,
     runner: Runner,
     written: Callable[[Rendered], None],
     tell: Tell,
-) -> bool:
-    """Render every scene, or every frame of it. True if the report is kept because it would be the same.
+) -> list[Path]:
+    """Render every scene, or every frame of it. Returns the files about all that are kept because they would
+    be the same.
 
     `written` is called with each rendered scene or frame, `tell` with the error of each that failed.
 
@@ -50,7 +54,8 @@ def render_scenes(
     jobs = RenderJobs(scenes, options)
     what = "frames" if any(job.frame is not None for job in jobs) else "scenes"
     batch = Batch(what, len(jobs), options.keep_going, once(tell) if what == "frames" else tell)
-    entries = BatchReport(report, [entry_of(job) for job in jobs])
+    entries = BatchReport(about_all.report, [entry_of(job) for job in jobs])
+    page = _page(about_all.html, jobs)
     planned = PlannedPieces()
     files: dict[tuple[Path, str], None] = {}  # every file once, even if a scene is given twice
 
@@ -61,9 +66,13 @@ def render_scenes(
             planned.add(number, work)
             names = [str(target.path) for target in work.targets]
             entries.plan(number, digest((work.content, names, options.target_error)))
+            if page is not None:
+                page.plan(number, work)
             files |= dict.fromkeys((target.path, target.content) for target in work.targets)
     check_unique([str(path) for path, _ in files])
     entries.look(options.force)
+    if page is not None:
+        page.look(options.force)
 
     # Render; buffers that the next frame reads stay in memory.
     def run(number: int, progress: Progress) -> tuple[list[Path], Report]:
@@ -82,11 +91,23 @@ def render_scenes(
             paths, done = result()
             job = jobs.unit(number)
             done = replace(done, warnings=(*done.warnings, *jobs.unused(job.scene)))
-            if report is not None:
+            if page is not None:
+                page.add(number, done)
+            if about_all.report is not None:
                 entries.add(number, entry_of(job) | done.as_data())
             written(Rendered(job.scene, paths, done, job.frame, jobs.fps(job.scene)))
         jobs.drop(number)
-    return entries.finish(batch)
+    kept = page.write(batch.failures) if page is not None else []
+    return [*entries.finish(batch), *kept]
+
+
+def _page(folder: Path | None, jobs: RenderJobs) -> RenderPage | None:
+    """The report for a browser, if it is asked for."""
+    if folder is None:
+        return None
+    from illumcli.commands.render_html import RenderPage
+
+    return RenderPage(folder, jobs)
 
 
 def once(tell: Tell) -> Tell:

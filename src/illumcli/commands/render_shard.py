@@ -11,7 +11,7 @@ from typing import Any
 from illumcli.commands.bands import band_counts, rows_of_bands, whole_because
 from illumcli.commands.batch import Batch, Tell
 from illumcli.commands.batch_shard import BatchUnits, run_shard
-from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions
 from illumcli.commands.render_all import Rendered, entry_of, once
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
@@ -30,7 +30,7 @@ from illumcli.render_graph.costs import Cost, CostModel
 def render_shard(
     scenes: Sequence[Path],
     options: RenderOptions,
-    report: Path | None,
+    about_all: RenderFiles,
     runner: Runner,
     written: Callable[[Rendered], None],
     tell: Tell,
@@ -49,7 +49,7 @@ def render_shard(
     batch_units, planned = _units(jobs, options.shard.count)
     check_unique([str(path) for path in dict.fromkeys(path for unit in planned for path in unit.files)])
     settings = {"target_error": options.target_error}
-    sharding = Sharding("render", options.shard, planned, {"report": report}, settings)
+    sharding = Sharding("render", options.shard, planned, {"report": about_all.report}, settings)
 
     def done(unit: Unit, paths: list[Path], report: Any) -> Report:
         assert isinstance(unit, RenderJob)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.options import RenderJob
@@ -52,10 +53,10 @@ def html_contents(
             values=_values(outcome.variant),
             content=content,
             state=table.state(outcome),
-            command=render_command(job, outcome.variant),
+            command=render_command(_job_of(job, outcome.variant)),
             error=None if outcome.error is None else str(outcome.error),
             measures=table.measures(outcome),
-            pictures=_pictures(outcome.planned) if outcome.planned and outcome.report else {},
+            pictures=pictures_of(outcome.planned) if outcome.planned and outcome.report else {},
             reference=_reference(outcome, references, outcomes),
         )
         for outcome, content in zip(outcomes, contents, strict=True)
@@ -64,16 +65,23 @@ def html_contents(
     return Contents(job.scene.stem, entries, seconds, planned.height / planned.width if planned else 1.0)
 
 
-def render_command(job: RenderJob, variant: Variant) -> str:
-    """The command that renders one variant into the files it has in the sweep."""
+def render_command(job: RenderJob) -> str:
+    """The command that renders a job into its files."""
     options = job.options
     words = ["illum", "render", str(job.scene)]
     words += [word for layer in options.only for word in ("--only", layer)]
     words += [] if options.seed is None else ["--seed", str(options.seed)]
-    words += [] if variant.frame is None else ["--frames", f"{variant.frame}:{variant.frame}"]
-    words += [word for override in variant.overrides for word in ("-D", override)]
-    words += ["-o", expand_some(options.pattern or "", variant.fields)]
+    words += [] if options.target_error is None else ["--target-error", str(options.target_error)]
+    words += [] if job.frame is None else ["--frames", f"{job.frame}:{job.frame}"]
+    words += [word for override in options.overrides for word in ("-D", override)]
+    words += [] if options.pattern is None else ["-o", expand_some(options.pattern, job.fields)]
     return shlex.join(words)
+
+
+def _job_of(job: RenderJob, variant: Variant) -> RenderJob:
+    """The job of a variant, from what all have."""
+    options = replace(job.options, overrides=tuple(variant.overrides))
+    return replace(job, options=options, frame=variant.frame, fields=variant.fields)
 
 
 def _values(variant: Variant) -> dict[str, str]:
@@ -82,7 +90,7 @@ def _values(variant: Variant) -> dict[str, str]:
     return {**frame, **variant.values, **variant.names}
 
 
-def _pictures(planned: PlannedVariant) -> dict[str, Picture]:
+def pictures_of(planned: PlannedVariant) -> dict[str, Picture]:
     """The pictures of a variant; the camera is left out of the name if there is only one."""
     cameras = {image.name.partition(" ")[0] for image in planned.images}
     names = [
@@ -103,4 +111,4 @@ def _reference(
     if reference.number is None:
         return Picture(reference.path, reference.content, outcome.planned.exposure)
     other = outcomes[reference.number - 1]
-    return next(iter(_pictures(other.planned).values())) if other.planned and other.report else None
+    return next(iter(pictures_of(other.planned).values())) if other.planned and other.report else None

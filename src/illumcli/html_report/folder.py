@@ -69,7 +69,7 @@ def write_report(folder: Path, contents: Contents) -> None:
         try:
             write_picture(pictures, picture)
         except InputError as error:
-            fact = "was written, but cannot be read any more; run the sweep again"
+            fact = "was written, but cannot be read any more; run the command again"
             raise OutputError(f"{picture.path}: {fact}") from error
 
     # The page, then what it says.

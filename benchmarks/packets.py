@@ -59,14 +59,15 @@ def questions(geometry: SceneGeometry, single: RayLoop, count: int) -> Iterator[
     normal = np.where(np.sum(normal * camera[1][seen], axis=1, keepdims=True) > 0, -normal, normal)
     point = eye + d[seen] * hits.distance[seen, None] + OFFSET * normal
 
-    def closest(rays: Rays) -> Ask:
-        return lambda loop: loop.closest(*rays)
+    def closest(rays: Rays, coherent: bool = False) -> Ask:
+        return lambda loop: loop.closest(*rays, coherent)
 
     def occluded(rays: Rays, coherent: bool = False) -> Ask:
         return lambda loop: loop.occluded(*rays, UNLIMITED, coherent)
 
     to_lamp = column_major(point, F), column_major(lamp - point, F)
     yield "camera, closest hit", len(d), closest(camera)
+    yield "the same, coherent", len(d), closest(camera, True)
     yield "to a lamp, occlusion", len(seen), occluded(to_lamp, True)
 
     # Obscurance about the points.

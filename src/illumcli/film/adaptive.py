@@ -72,7 +72,7 @@ def probes(
     tracer: Tracer, geometry: SceneGeometry, render_space: RenderSpace, probe_view: View, probe_rays: Rays
 ) -> Probes:
     """First hits of some samples of every pixel; one that leaks through a vertex refines its pixel."""
-    closest = tracer.closest(probe_rays.origins, probe_rays.directions, retry=False)
+    closest = tracer.closest(probe_rays.origins, probe_rays.directions, retry=False, coherent=True)
     hit = closest.triangle >= 0
     objects = geometry.objects_of(closest.triangle, closest.instance)
     number = np.where(hit, objects + np.int32(1), np.int32(0))

@@ -54,22 +54,26 @@ class Tracer:
         tracer.rays, tracer._stop = 0, stop
         return tracer
 
-    def closest(self, origins: Vectors, directions: Vectors, retry: bool = True) -> Closest:
-        """The closest hit of each ray; to `retry`, a ray that misses is traced again, turned by
-        `RETRY_TURN`."""
+    def closest(
+        self, origins: Vectors, directions: Vectors, retry: bool = True, coherent: bool = False
+    ) -> Closest:
+        """The closest hit of each ray; to `retry`, a ray that misses is traced again, turned by `RETRY_TURN`.
+
+        Rays that are `coherent` have origins and directions like those before and after them; this changes
+        the time only.
+        """
         self._admit(origins, directions)
-        hits = self._closest(origins, directions)
+        hits = self._closest(origins, directions, coherent)
         missed = np.flatnonzero(hits.triangle < 0)
         if retry and missed.size and not self.is_empty:
             d, origin = directions[missed], missed // (len(directions) // len(origins))
             self.rays += len(missed)
-            retried = self._closest(origins[origin], d + RETRY_TURN * np.abs(d[:, [1, 2, 0]]))
-            for values, others in zip(vars(hits).values(), vars(retried).values(), strict=True):
-                values[missed] = others
+            turned = d + RETRY_TURN * np.abs(d[:, [1, 2, 0]])
+            hits.replace(missed, self._closest(origins[origin], turned, coherent=False))
         return hits
 
-    def _closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        hits = self._loop.closest(origins, directions)
+    def _closest(self, origins: Vectors, directions: Vectors, coherent: bool) -> Closest:
+        hits = self._loop.closest(origins, directions, coherent)
         hits.distance[hits.triangle < 0] = np.inf
         if self._instanced is not None:
             within = np.flatnonzero(hits.instance >= 0)
@@ -88,8 +92,8 @@ class Tracer:
     ) -> NDArray[np.bool_]:
         """(N,) True where a triangle lies between a ray's origin and `limits` along its direction.
 
-        The result is False for a limit of 0 or less, where Embree would say True. Rays that are `coherent`
-        have origins and directions like those before and after them; this changes the time only.
+        The result is False for a limit of 0 or less, where Embree would say True; `coherent` as for
+        `closest`.
         """
         self._admit(origins, directions)
         reach = np.asarray(limits, F)

@@ -22,7 +22,7 @@ from illumcli.errors import IllumError
 Handle: TypeAlias = int
 """Address of a device, scene or geometry of Embree."""
 
-ROBUST = 4  # RTC_SCENE_FLAG_ROBUST
+ROBUST, FILTER_IN_ARGUMENTS = 1 << 2, 1 << 3  # RTC_SCENE_FLAG_ROBUST, _FILTER_FUNCTION_IN_ARGUMENTS
 INDEX, VERTEX = 0, 1  # RTC_BUFFER_TYPE_*
 UINT3, FLOAT3 = 0x5003, 0x9003  # RTC_FORMAT_*
 MATRIX_BY_COLUMNS = 0x9234  # RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR

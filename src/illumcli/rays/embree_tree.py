@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.rays.embree_library import (
+    FILTER_IN_ARGUMENTS,
     INSTANCE,
     MATRIX_BY_COLUMNS,
     NATIVE_PACKETS,
@@ -69,7 +70,7 @@ def _new_scene() -> Handle:
     scene: Handle | None = library.rtcNewScene(device())
     if not scene:
         raise MemoryError
-    library.rtcSetSceneFlags(scene, ROBUST)
+    library.rtcSetSceneFlags(scene, ROBUST | FILTER_IN_ARGUMENTS)
     return scene
 
 

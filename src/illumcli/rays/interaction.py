@@ -33,7 +33,7 @@ class Hits(Record):
 
 def hits(tracer: Tracer, geometry: SceneGeometry, rays: Rays) -> Hits:
     """The samples whose rays hit a triangle, and where."""
-    closest = tracer.closest(rays.origins, rays.directions)
+    closest = tracer.closest(rays.origins, rays.directions, coherent=True)
     sample = np.flatnonzero(closest.triangle >= 0).astype(np.int32)
     triangle, instance, u, v = (
         getattr(closest, name).take(sample) for name in ("triangle", "instance", "u", "v")

@@ -4,6 +4,7 @@
    functions, and calls it by ctypes, without the interpreter lock. The layouts are those of RTCRay, RTCRay4, RTCRay8
    and RTCRay16 and of the hits that follow them (rtcore_ray.h, Embree 4). */
 
+#include <stddef.h>
 #include <stdint.h>
 
 #if defined(_WIN32)
@@ -17,7 +18,7 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
-enum { INTERFACE = 3 }; /* of packet_loop.py: both change together */
+enum { INTERFACE = 4 }; /* of packet_loop.py: both change together */
 enum { WIDEST = 16, ALIGNMENT = 64 };
 
 /* Rows of a packet, each of as many cells as the packet has rays; the hit begins with its normal. */
@@ -62,6 +63,8 @@ typedef struct {
   int32_t *triangle; /* -1 if nothing is hit; NULL: only distances are wanted */
   int32_t *instance; /* number of the geometry that is an instance; -1 if that is none */
   float *u, *v, *distance;
+  uint8_t *doubtful; /* NULL: each ray of a packet is traced alone; else they are traced together, in half of the time,
+                        and rays whose hits may depend on the others get a 1 */
 } Hits;
 
 /* Rays of points that each cast the directions of a pattern, turned into a frame of their own.
@@ -157,16 +160,104 @@ INLINE void occluded(const Rays *of, int64_t width, uint8_t *out) {
   }
 }
 
+/* Rays of a packet that are traced together: the order in which they meet triangles depends on all of them. It can decide
+   which of two triangles at almost the same distance is hit, so such rays are noted. For this, triangles that are a
+   little farther than the closest one are tested, too. */
+#define NEAR 1e-4f     /* of the distance */
+#define ROUNDING 6e-6f /* 100 ulp of single precision */
+enum { COHERENT = 1 << 16, INVOKE_ARGUMENT_FILTER = 1 << 1 }; /* RTC_RAY_QUERY_FLAG_* */
+
+typedef struct {
+  uint8_t query[128]; /* RTCRayQueryContext, with room for what other versions add; all bits set: in no instance */
+  float closest[WIDEST], margin[WIDEST]; /* distance of the closest triangle; how much farther others are near it */
+  uint8_t has_rivals[WIDEST];
+} Context;
+
+typedef struct { /* RTCFilterFunctionNArguments */
+  const int32_t *valid;
+  void *geometry;
+  Context *context;
+  Cell *rays; /* their limits are the distances of the triangle */
+  void *hits;
+  uint32_t width;
+} Candidates;
+
+typedef struct { /* RTCIntersectArguments */
+  uint32_t flags, feature_mask;
+  Context *context;
+  void (*filter)(const Candidates *);
+  void *rest[4];
+} Arguments;
+
+INLINE float near(float distance, float margin) { return distance + NEAR * distance + margin; }
+
+INLINE float largest(const Cell *vector, int64_t width) {
+  float out = 0;
+  for (int k = 0; k < 3; k++) {
+    float x = vector[k * width].real;
+    out = x > out ? x : -x > out ? -x : out;
+  }
+  return out;
+}
+
+/* Called by Embree with each triangle that rays hit within their limits. */
+static void note_rivals(const Candidates *of) {
+  for (int64_t j = 0, width = of->width; j < width; j++) {
+    if (!of->valid[j])
+      continue;
+    Context *context = of->context;
+    uint32_t ray = of->rays[ID * width + j].bits;
+    float *limit = &of->rays[TFAR * width + j].real, *closest = &context->closest[ray];
+    if (near(*limit, context->margin[ray]) >= *closest)
+      context->has_rivals[ray] = 1;
+    if (*limit < *closest)
+      *closest = *limit;
+    *limit = near(*closest, context->margin[ray]);
+  }
+}
+
+/* Whether a ray is so nearly in the plane of the triangle it hit that its distance may be wrong by more than NEAR. */
+INLINE int is_grazing(const Cell *ray, int64_t width, float distance) {
+  double across = 0, area = 0, length = 0; /* the area is twice that of the triangle; all squared */
+  for (int k = 0; k < 3; k++) {
+    double normal = ray[(NORMAL_X + k) * width].real, direction = ray[(DIR_X + k) * width].real;
+    across += normal * direction;
+    area += normal * normal;
+    length += direction * direction;
+  }
+  across *= across;
+  double rounding = ROUNDING * ROUNDING * distance * distance * length;
+  return across < 4e-4 * area * length || across * across < rounding * rounding * area * length * length;
+}
+
 INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
   Cell room[ROWS * WIDEST + ALIGNMENT], *packet = aligned(room);
   Cell mask[2 * WIDEST + ALIGNMENT];
   int32_t *valid = &aligned(mask)->number;
+  Query query = of->query;
+  Context context;
+  Arguments together = {COHERENT | INVOKE_ARGUMENT_FILTER, 0xffffffff, &context, note_rivals, {0}};
+  if (out->doubtful) {
+    query.arguments = &together;
+    for (size_t k = 0; k < sizeof context.query; k++)
+      context.query[k] = 0xff;
+  }
   prepare(packet, width);
   for (int64_t ray = of->first; ray < of->end; ray += width) {
     fill(of, ray, width, packet, valid);
     clear_hits(packet, width);
-    trace(&of->query, width, valid, packet);
+    for (int64_t j = 0; j < width; j++) {
+      context.closest[j] = packet[TFAR * width + j].real;
+      context.margin[j] = ROUNDING * largest(packet + j, width) / largest(packet + DIR_X * width + j, width);
+      context.has_rivals[j] = 0;
+    }
+    trace(&query, width, valid, packet);
     for (int64_t j = 0; j < width && ray + j < of->end; j++) {
+      if (out->doubtful) {
+        packet[TFAR * width + j].real = context.closest[j];
+        out->doubtful[ray + j] = packet[PRIMITIVE * width + j].number < 0 || context.has_rivals[j] ||
+                                 is_grazing(packet + j, width, context.closest[j]);
+      }
       out->distance[ray + j] = packet[TFAR * width + j].real;
       if (!out->triangle)
         continue;

@@ -46,7 +46,7 @@ class PythonPacketLoop:
             out[part] = _row(packets, LIMIT, part) < 0  # Embree sets it to -inf
         return out
 
-    def closest(self, origins: Vectors, directions: Vectors) -> Closest:
+    def closest(self, origins: Vectors, directions: Vectors, coherent: bool = False) -> Closest:
         origins, hits = per_ray(origins, directions), Closest.empty(len(directions))
         for part in _batches(len(directions)):
             packets = self._traced("rtcIntersect", origins[part], directions[part], NO_LIMIT)

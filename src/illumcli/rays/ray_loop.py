@@ -38,6 +38,11 @@ class Closest(Record):
         triangle, instance = np.empty(count, np.int32), np.empty(count, np.int32)
         return cls(triangle, instance, np.empty(count, F), np.empty(count, F), np.empty(count, F))
 
+    def replace(self, index: NDArray[np.intp], others: Closest) -> None:
+        """Replace the hits of some rays."""
+        for values, new in zip(vars(self).values(), vars(others).values(), strict=True):
+            values[index] = new
+
 
 class InstancedMeshes(Record):
     """Meshes that each have a tree of their own, and I instances of them."""
@@ -72,8 +77,8 @@ class RayLoop(Protocol):
         """
         ...
 
-    def closest(self, origins: Vectors, directions: Vectors) -> Closest:
-        """The closest hit of each ray."""
+    def closest(self, origins: Vectors, directions: Vectors, coherent: bool = False) -> Closest:
+        """The closest hit of each ray; `coherent` as above."""
         ...
 
     def distance(self, origins: Vectors, directions: Vectors) -> Floats:

@@ -54,7 +54,7 @@ class SingleRayLoop:
             np.greater_equal(hit, 0, out=out[part])
         return out
 
-    def closest(self, origins: Vectors, directions: Vectors) -> Closest:
+    def closest(self, origins: Vectors, directions: Vectors, coherent: bool = False) -> Closest:
         origins = per_ray(origins, directions)
         hits = Closest.empty(len(directions))
         hits.instance.fill(-1)

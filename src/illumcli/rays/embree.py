@@ -12,7 +12,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors
+from illumcli.arrays import F, Floats, Vectors, take_rows
 from illumcli.errors import IllumError
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.pattern_rays import PatternRays, PatternResults
@@ -66,10 +66,14 @@ class Tracer:
         hits = self._closest(origins, directions, coherent)
         missed = np.flatnonzero(hits.triangle < 0)
         if retry and missed.size and not self.is_empty:
-            d, origin = directions[missed], missed // (len(directions) // len(origins))
+            # Most of them miss again, which an occlusion query tells in less time.
             self.rays += len(missed)
-            turned = d + RETRY_TURN * np.abs(d[:, [1, 2, 0]])
-            hits.replace(missed, self._closest(origins[origin], turned, coherent=False))
+            d = take_rows(directions, missed)
+            o = take_rows(origins, missed // (len(directions) // len(origins)))
+            turned = d + RETRY_TURN * np.abs(np.roll(d, -1, axis=1))
+            again = np.flatnonzero(self._loop.occluded(o, turned, np.asarray(NO_LIMIT), coherent))
+            found = self._closest(take_rows(o, again), take_rows(turned, again), coherent)
+            hits.replace(missed[again], found)
         return hits
 
     def _closest(self, origins: Vectors, directions: Vectors, coherent: bool) -> Closest:

@@ -45,7 +45,12 @@ def caster(
     method = Method(256, settings.obscurance().falloff, geometry.render_space.radius, sampler)
     threads = len(os.sched_getaffinity(0))
     made = BakeSampler(
-        vertices.points, occluders_of(scene, geometry, settings), Measure(method), seed, threads, no_progress
+        vertices.points,
+        occluders_of(scene.object_names(), geometry, settings, {}),
+        Measure(method),
+        seed,
+        threads,
+        no_progress,
     )
     return made, np.flatnonzero(~made.open_points())
 

@@ -19,6 +19,7 @@ from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.baking.vertex_points import vertex_points
 from illumcli.cli import illum
+from illumcli.color import to_srgb
 from illumcli.errors import InputError, OutputError
 from illumcli.geometry.corner_normals import corner_normals
 from illumcli.images.encoded import png_bytes
@@ -229,12 +230,6 @@ def test_properties_with_the_names_of_others_keep_their_values(text_mesh, tmp_pa
     assert scalars == {"_UV_": [1, 2, 3], "_COLOR_": [4, 5, 6], "_HEAT": [7, 8, 9], "_HEAT_": [10, 11, 12]}
 
 
-def test_an_object_called_own_is_no_occluder_by_that_name(text_mesh, tmp_path):
-    path = text_mesh("version: 1\nobjects: [{name: own, mesh: {shape: sphere}}]\n", "own.yaml")
-    with pytest.raises(InputError, match="--occluders own: an object has that name too; give the object"):
-        bake(path, tmp_path / "a.npz", occluders=("own",))
-
-
 def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
     path = text_mesh(CUBE.replace("v 1 1 1\n", "v 1 1 1 \n") + "v 0 3 0\nf 4 3 9\nf 8 9 7\n")
     outs = [tmp_path / f"out.{kind}" for kind in ("npz", "ply", "glb")]
@@ -314,6 +309,50 @@ def test_an_obj_goes_to_glb_with_its_groups_materials_and_images(text_mesh, tmp_
     assert faults(tmp_path / "out.glb") == []
 
 
+def test_an_obj_keeps_its_lines_and_takes_its_materials_along(text_mesh, tmp_path):
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps/brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))
+    (tmp_path / "a.mtl").write_text("newmtl clay\nmap_Ke maps/brick.png\n")
+    path = text_mesh("mtllib a.mtl\nusemtl clay\n" + CUBE)
+    out = tmp_path / "baked" / "out.obj"
+    _, report = bake(path, out, tmp_path / "out.npz", samples=64)
+    assert report.left_out == []
+    mesh, made, baked = read_mesh(path), read_mesh(out), read_npz(tmp_path / "out.npz")
+    np.testing.assert_array_equal(made.vertices, mesh.vertices)
+    np.testing.assert_array_equal(made.corners, mesh.corners)
+    assert made.materials.keys() == mesh.materials.keys()
+    np.testing.assert_allclose(to_srgb(made.attributes["color"])[:, 0], baked.obscurance, atol=1e-6)
+    assert (out.parent / "maps/brick.png").exists()
+    assert bake(path, out, tmp_path / "out.npz", samples=64)[1].kept == [str(out), str(tmp_path / "out.npz")]
+
+    # a library of another content beside the output is not replaced
+    (out.parent / "a.mtl").write_text("newmtl other\n")
+    out.unlink()
+    with pytest.raises(OutputError, match=r"a\.mtl: a different file is there; use --force"):
+        bake(path, out, samples=32)
+    bake(path, out, samples=32, force=True)
+    assert (out.parent / "a.mtl").read_text() == (tmp_path / "a.mtl").read_text()
+
+
+def test_an_obj_with_colours_has_no_place_for_values(text_mesh, tmp_path):
+    path = text_mesh(CUBE.replace("v 1 1 1", "v 1 1 1 1 0 0"))
+    with pytest.raises(InputError, match=r"out\.obj: the vertices have colours, .*--color"):
+        bake(path, tmp_path / "out.obj")
+    bake(path, tmp_path / "out.obj", samples=4, channel="g")
+    assert read_mesh(tmp_path / "out.obj").attributes["color"].shape == (8, 3)
+
+
+def test_a_mirrored_object_keeps_its_outside(text_mesh, tmp_path):
+    text_mesh(CUBE, "cube.obj")
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("version: 1\nobjects: [{mesh: cube.obj, transform: {scale: [-1, 1, 1]}}]\n")
+    for kind in ("ply", "obj", "glb"):
+        bake(scene, tmp_path / f"out.{kind}", samples=4)
+        made = read_mesh(tmp_path / f"out.{kind}")
+        a, b, c = (made.vertices[made.corners[made.starts[:-1] + k]] for k in range(3))
+        assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all(), kind
+
+
 def test_an_asset_is_written_again_if_an_image_or_material_changes(text_mesh, tmp_path):
     library = tmp_path / "a.mtl"
     library.write_text("newmtl clay\nKd 1 0 0\n")
@@ -357,34 +396,6 @@ def test_back_faces_do_as_told(text_mesh, tmp_path):
     assert (found["count"] < 0.1).all()
     assert (found["ignore"] == 1).all()
     assert (found["one_sided"] == 1).all()
-
-
-def test_a_ground_closes_what_stands_on_it(text_mesh, tmp_path):
-    bake(text_mesh(CUBE), tmp_path / "out.npz", ground="y", samples=1024)
-    w = read_npz(tmp_path / "out.npz").obscurance
-    low = np.array([1, 1, 0, 0, 1, 1, 0, 0], bool)
-    assert (w[low] < 0.4).all()
-    np.testing.assert_allclose(w[~low], 2 / 3, atol=0.02)  # the mean of an open top and two walls on a floor
-
-
-def test_a_scene_hides_its_objects_from_each_other_or_not(text_mesh, tmp_path):
-    text_mesh(CUBE, "cube.obj")
-    scene = tmp_path / "two.yaml"
-    scene.write_text(
-        "version: 1\nobjects:\n- {name: a, mesh: cube.obj}\n"
-        "- {name: b, mesh: cube.obj, transform: {translate: [2.2, 0, 0]}}\n"
-    )
-    bake(scene, tmp_path / "all.npz")
-    bake(scene, tmp_path / "own.npz", occluders=("own",))
-    bake(scene, tmp_path / "named.npz", occluders=("a",))
-    both, own, named = (read_npz(tmp_path / f"{n}.npz").obscurance for n in ("all", "own", "named"))
-    assert len(both) == 16
-    assert both[:8].min() < 0.99
-    assert (own == 1).all()
-    assert (named[:8] == 1).all()
-    assert np.array_equal(named[8:], both[8:])
-    with pytest.raises(InputError, match="no object of that name"):
-        bake(scene, tmp_path / "none.npz", occluders=("c",))
 
 
 def test_a_fit_is_right_in_the_middle_of_large_triangles(text_mesh, tmp_path):
@@ -559,7 +570,7 @@ def test_errors_at_a_hollow_edge_keep_falling_with_the_rays(text_mesh, tmp_path)
     surfaces, _ = surfaces_of(loaded.scene, loaded)
     points = vertex_points(surfaces).points
     assert not points.is_flat.any()
-    occluders = occluders_of(loaded.scene, points.geometry, BakeSettings())
+    occluders = occluders_of(loaded.scene.object_names(), points.geometry, BakeSettings(), {})
     sampler = BakeSampler(points, occluders, Measure(Method(1, Step(), 1.0)), 0, 1, no_progress)
 
     def rmse(samples):

@@ -75,3 +75,22 @@ def test_a_fault_of_any_variant_is_told(illum, scene):
     done = illum("plan", scene, "-D", "film.samples=4,0")
     assert done.returncode == 2
     assert "film.samples" in done.stderr
+
+
+def test_a_dry_run_of_a_shard_shows_what_the_shard_does(illum, scene):
+    shown = []
+    for number in (1, 2, 3):
+        more = ("--shard", f"{number}/3", "-o", f"shard{number}/{{ambient}}-{{lights.key.position}}.png")
+        dry_run = ("sweep", scene, *AXES, *more, "--no-cache", "--dry-run")
+        assert f"shard   {number}/3, of 6 variants\n" in illum(*dry_run).stdout
+        (planned,) = json.loads(illum(*dry_run, "--json").stdout)
+        written = illum("sweep", scene, *AXES, *more, "-q", "--no-cache").stdout.split()
+        assert sorted(planned["files"]) == sorted(written)
+        shown += planned["labels"]
+    assert sorted(shown) == sorted(dict.fromkeys(shown))
+    assert len(shown) == 6
+
+
+def test_a_dry_run_of_a_shard_without_a_variant_says_so(illum, scene):
+    done = illum("sweep", scene, "-D", "ambient=0,1", "--shard", "3/3", "--dry-run")
+    assert done.stdout == "shard   3/3, of 2 variants\nall     no variant\n"

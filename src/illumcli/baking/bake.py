@@ -80,7 +80,7 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
 def bake_context(work: BakeWork, progress: Progress, journal: Journal) -> BakeContext:
     """What the methods of a bake need."""
     geometry, settings = work.surfaces.geometry, work.settings
-    occluders = occluders_of(work.scene, geometry, settings)
+    occluders = occluders_of(work.scene.object_names(), geometry, settings, work.occluding)
     wanted = measures(settings, geometry.render_space.radius)
     work.clock.lap("build")
     threads, clock = work.job.threads, work.clock

@@ -11,18 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.geometry.mesh import Mesh
 from illumcli.images.contents import image_contents, image_texts
 from illumcli.images.encoded import encoded_image
-from illumcli.mesh_files import ply
+from illumcli.mesh_files import obj_write, ply
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
+from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
 from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
 from illumcli.visibility.channels import ply_columns
 
-ASSETS = (".ply", ".glb")
+ASSETS = (".ply", ".glb", ".obj")
 """Files that have everything of the input that their format can hold."""
 SUFFIXES = (".npz", *ASSETS)
 CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
@@ -68,6 +70,18 @@ def add_baked_to_glb(
     return extend_glb(path, source, _vertex_data(baked.channels, baked, channel), occlusion)
 
 
+def extend_baked_obj(path: Path, source: Path, mesh: Mesh, baked: Baked, channel: str | None) -> None:
+    """Write the lines of an OBJ with obscurance as grey of vertices, or in a `channel` of their colour."""
+    obj_write.extend_obj(path, source, mesh, _vertex_data(baked.channels, baked, channel))
+
+
+def write_baked_obj(
+    path: Path, meshes: Sequence[NamedMesh], baked: Baked, channel: str | None, library: str | None
+) -> None:
+    """Write meshes as an OBJ with the colours of `extend_baked_obj`; `library` is its material library."""
+    obj_write.write_obj(path, meshes, _vertex_data(baked.channels, baked, channel), library)
+
+
 def baked_contents(path: Path) -> list[str]:
     """The content hash in a file written here.
 
@@ -97,7 +111,12 @@ def baked_about(path: Path) -> dict[str, Any]:
     """
     if path.suffix.lower() in (".png", ".exr"):
         return dict(json.loads(image_texts(path)["illum:about"]))
-    readers = {".npz": npz.read_about, ".glb": gltf.read_about, ".ply": ply.read_about}
+    readers = {
+        ".npz": npz.read_about,
+        ".glb": gltf.read_about,
+        ".ply": ply.read_about,
+        ".obj": obj_write.read_about,
+    }
     return readers[path.suffix.lower()](path)
 
 

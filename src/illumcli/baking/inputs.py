@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from illumcli import __version__
 from illumcli.atlas.unwrap import refuse_missing_library
 from illumcli.baking.context import StageClock
 from illumcli.baking.files import ASSETS, SUFFIXES, baked_contents
+from illumcli.baking.occluder_choice import occluding_files
+from illumcli.baking.occluders import OccludingMesh
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
@@ -27,7 +30,7 @@ from illumcli.files.claims import claim_path
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import corner_normals
+from illumcli.geometry.scene_geometry import SceneGeometry, corner_normals
 from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.records import Record
 from illumcli.render_graph.build import build
@@ -55,6 +58,8 @@ class BakeWork(Record):
     """File of a texture -> its slot."""
     scene: Scene
     surfaces: Surfaces
+    occluding: Mapping[Path, OccludingMesh]
+    """What occludes and is not baked, by its file."""
     hashes: tuple[str, ...]
     """Hashes of the meshes."""
     content: str
@@ -122,19 +127,19 @@ def prepare_bake(job: BakeJob) -> BakeWork:
 
     # Load the scene; refuse meshes that do not fit into memory.
     clock = StageClock()
-    is_mesh = is_mesh_file(path)
-    loaded = mesh_alone(path, options.overrides) if is_mesh else load(path, options.overrides)
-    expected = expected_memory(loaded, loaded.scene, shares_meshes=False)
-    expected.pop("textures", None)  # no bake reads them
-    refuse_memory(0, 0, 0, expected, str(path))
+    loaded = input_of(path, options.overrides)
+    occluding_inputs = {each: input_of(each) for each in occluding_files(settings.occluders)}
+    refuse_inputs([loaded, *occluding_inputs.values()], str(path))
 
     # Read and hash the meshes, and find the outputs to write.
     surfaces, repairs = surfaces_of(loaded.scene, loaded)
     meshes = [placed.mesh for placed in surfaces.geometry.placed]
     hashes = tuple(mesh_hash(mesh.vertices, mesh.corners, mesh.starts) for mesh in meshes)
-    content = content_hash(loaded.scene, hashes, surfaces, settings)
-    if is_mesh and any(each.suffix.lower() in ASSETS for each in outputs):
+    occluding = {each: OccludingMesh.of(geometry_of(of)) for each, of in occluding_inputs.items()}
+    content = content_hash(loaded.scene, hashes, surfaces, settings, occluding)
+    if is_mesh_file(path) and any(each.suffix.lower() in ASSETS for each in outputs):
         content = digest((content, FileFingerprint(lambda: path, companions)))
+    refuse_lost_colors(outputs, meshes, settings)
     if options.strict:
         refuse_repairs(str(path), repairs)
     slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)
@@ -142,7 +147,19 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     if settings.texture is not None and settings.unwrap is None:
         refuse_missing_uv(str(path), slots, meshes)
     outputs = (*(each for each in outputs if not is_texture(each)), *slot_of)
-    work = BakeWork(job, outputs, slots, slot_of, loaded.scene, surfaces, hashes, content, repairs, clock)
+    work = BakeWork(
+        job,
+        outputs,
+        slots,
+        slot_of,
+        loaded.scene,
+        surfaces,
+        occluding,
+        hashes,
+        content,
+        repairs,
+        clock,
+    )
     work.due()
     return work
 
@@ -157,9 +174,7 @@ def bake_cost(job: BakeJob) -> int:
     InputError
         The scene or mesh cannot be read.
     """
-    overrides = job.options.overrides
-    is_mesh = is_mesh_file(job.path)
-    loaded = mesh_alone(job.path, overrides) if is_mesh else load(job.path, overrides)
+    loaded = input_of(job.path, job.options.overrides)
     expected = expected_memory(loaded, loaded.scene)
     size = expected.get("meshes", 0) + expected.get("shapes", 0)
     return size // BYTES + size * job.settings.samples // VERTEX_BYTES
@@ -197,6 +212,18 @@ def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
         raise InputError(f"{files[0]}: textures hold ao; add it to --what")
 
 
+def refuse_lost_colors(outputs: Sequence[Path], meshes: Sequence[Mesh], settings: BakeSettings) -> None:
+    """Raise InputError for an OBJ that has no place for values, because its vertices have colours."""
+    files = [each for each in outputs if each.suffix.lower() == ".obj"]
+    if files and settings.channel is None and any("color" in mesh.attributes for mesh in meshes):
+        raise InputError(
+            f"{files[0]}: the vertices have colours, which an OBJ would hold in place of values; "
+            "choose a channel with --color, or bake to .npz"
+        )
+    if files and "ao" not in settings.what:
+        raise InputError(f"{files[0]}: an OBJ holds ao; add it to --what")
+
+
 def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh]) -> None:
     """Raise InputError for objects that textures are baked of and that have no uv."""
     problems = [
@@ -206,6 +233,20 @@ def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh])
     ]
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
+
+
+def refuse_inputs(inputs: Sequence[SceneFile], place: str) -> None:
+    """Raise LimitError if meshes do not fit into memory together."""
+    total: Counter[str] = Counter()
+    for loaded in inputs:
+        total.update(expected_memory(loaded, loaded.scene, shares_meshes=False))
+    total.pop("textures", None)  # no bake reads them
+    refuse_memory(0, 0, 0, total, place)
+
+
+def input_of(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
+    """A scene, or the scene of a mesh file alone."""
+    return mesh_alone(path, overrides) if is_mesh_file(path) else load(path, overrides)
 
 
 def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
@@ -218,17 +259,33 @@ def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
 def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
     """The placed meshes of a scene, as in a render, with the normals that are the axes of hemispheres; and
     their repairs."""
-    buffers: dict[str, Any] = {}
-    graph = build(scene, loaded, shares_meshes=False)
-    for node in graph.topological_order(["geometry", "corner_normals", "repairs"]):
-        buffers[node.output] = node.run(buffers)
+    buffers = _buffers_of(scene, loaded, "geometry", "corner_normals", "repairs")
     geometry, normals = buffers["geometry"], buffers["corner_normals"]
     if scene.obscurance is not None and scene.obscurance.about == "geometric":
         normals = corner_normals(("flat",) * len(geometry.placed), geometry)
     return Surfaces(geometry, normals), buffers["repairs"].repairs
 
 
-def content_hash(scene: Scene, hashes: Sequence[str], surfaces: Surfaces, settings: BakeSettings) -> str:
+def geometry_of(loaded: SceneFile) -> SceneGeometry:
+    """The placed meshes of a scene."""
+    geometry: SceneGeometry = _buffers_of(loaded.scene, loaded, "geometry")["geometry"]
+    return geometry
+
+
+def _buffers_of(scene: Scene, loaded: SceneFile, *names: str) -> dict[str, Any]:
+    buffers: dict[str, Any] = {}
+    for node in build(scene, loaded, shares_meshes=False).topological_order(list(names)):
+        buffers[node.output] = node.run(buffers)
+    return buffers
+
+
+def content_hash(
+    scene: Scene,
+    hashes: Sequence[str],
+    surfaces: Surfaces,
+    settings: BakeSettings,
+    occluding: Mapping[Path, OccludingMesh],
+) -> str:
     """Hash of everything that the values and files of a bake depend on."""
     transforms = [dict(each.transform) for each in scene.objects]
     text = json.dumps(
@@ -236,6 +293,7 @@ def content_hash(scene: Scene, hashes: Sequence[str], surfaces: Surfaces, settin
     )
     digest = hashlib.blake2b(text.encode(), digest_size=16)
     arrays: list[NDArray[Any] | None] = [surfaces.normals.values, surfaces.normals.index]
+    arrays += [array for each in occluding.values() for array in (each.vertices, each.triangles)]
     if settings.texture is not None:
         for placed in surfaces.geometry.placed:
             mesh = placed.mesh

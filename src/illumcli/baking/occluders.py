@@ -1,25 +1,37 @@
-"""The geometry that may occlude the vertices of each object of a bake."""
+"""The geometry that may occlude the points of each object of a bake."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, column_major, cross, unit
+from illumcli.baking.ground import Ground
+from illumcli.baking.occluder_choice import OccluderChoice, occluder_choices
 from illumcli.baking.settings import BakeSettings
-from illumcli.errors import InputError
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
 from illumcli.rays.embree import Tracer
 from illumcli.records import Record
-from illumcli.scene.spec import Scene
 from illumcli.visibility.open_hemisphere import ClusterTree
 
-GROUND_GAP = 1e-4
-"""Distance of the added ground below the lowest vertex, in radii: it closes objects that stand on it."""
-GROUND_SIZE = 1e3
-"""Half the side of the added ground, in radii."""
+
+class OccludingMesh(Record):
+    """The meshes of a file in their places, which occlude and are not baked."""
+
+    vertices: NDArray[np.float64]  # (V, 3) [scene units]
+    triangles: NDArray[np.int32]  # (T, 3)
+
+    @classmethod
+    def of(cls, geometry: SceneGeometry) -> OccludingMesh:
+        """All triangles of the geometry of a file."""
+        vertices = [
+            placed.mesh.vertices @ placed.matrix[:3, :3].T + placed.matrix[:3, 3]
+            for placed in geometry.placed
+        ]
+        return cls(np.concatenate([np.zeros((0, 3)), *vertices]), geometry.triangles)
 
 
 class Occluders(Record):
@@ -30,62 +42,57 @@ class Occluders(Record):
     normals: NDArray[np.float32] | None = None  # (T, 3) unit; None if back faces occlude
 
 
-def occluders_of(scene: Scene, geometry: SceneGeometry, settings: BakeSettings) -> list[Occluders]:
-    """Occluders of each object: the scene, the object itself, or the object and others by name.
+def occluders_of(
+    names: Sequence[str],
+    geometry: SceneGeometry,
+    settings: BakeSettings,
+    files: Mapping[Path, OccludingMesh],
+) -> list[Occluders]:
+    """Occluders of each object, by its name.
 
     Raises
     ------
     InputError
-        A name in `settings.occluders` is no object, or is ambiguous.
+        A text of `settings.occluders` names nothing, or two things.
     """
-    names = scene.object_names()
-    _refuse_unknown(settings.occluders, names)
-    named = [names.index(name) for name in settings.occluders if name in names]
-    built: dict[tuple[int, ...], Occluders] = {}
+    built: dict[OccluderChoice, Occluders] = {}
     occluders = []
-    for index in range(len(names)):
-        objects = tuple(range(len(names)))
-        if "scene" not in settings.occluders:
-            objects = tuple(sorted({index, *named}))
-        if objects not in built:
-            built[objects] = _occluders(geometry, objects, settings)
-        occluders.append(built[objects])
+    for choice in occluder_choices(settings.occluders, names):
+        if choice not in built:
+            built[choice] = _occluders(geometry, choice, settings, files)
+        occluders.append(built[choice])
     return occluders
 
 
-def _refuse_unknown(occluders: Sequence[str], names: Sequence[str]) -> None:
-    if "own" in occluders and "own" in names:
-        raise InputError("--occluders own: an object has that name too; give the object another name")
-    unknown = [name for name in occluders if name not in (*names, "scene", "own")]
-    if unknown:
-        raise InputError(
-            f"--occluders {unknown[0]}: no object of that name; there are: scene, own, {', '.join(names)}"
-        )
-
-
-def _occluders(geometry: SceneGeometry, objects: tuple[int, ...], settings: BakeSettings) -> Occluders:
-    vertices, triangles = geometry.vertices, geometry.triangles
-    if len(objects) < len(geometry.placed):
-        triangles = triangles[np.isin(geometry.objects, objects)]
+def _occluders(
+    geometry: SceneGeometry,
+    choice: OccluderChoice,
+    settings: BakeSettings,
+    files: Mapping[Path, OccludingMesh],
+) -> Occluders:
+    space = geometry.render_space
+    vertices, triangles = [geometry.vertices], [geometry.triangles]
+    if len(choice.objects) < len(geometry.placed):
+        triangles = [geometry.triangles[np.isin(geometry.objects, choice.objects)]]
+    for path in choice.files:
+        vertices.append(space.from_world(files[path].vertices).astype(F))
+        triangles.append(files[path].triangles)
     if settings.ground is not None:
-        level = vertices[np.unique(geometry.triangles), "xyz".index(settings.ground)].min(initial=0)
-        vertices, triangles = _with_ground(vertices, triangles, "xyz".index(settings.ground), level)
+        used = geometry.vertices[np.unique(geometry.triangles)]
+        vertices.append(Ground.of(settings.ground).square(used, space.radius))
+        triangles.append(np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    return _built(vertices, triangles, settings.faces != "count")
+
+
+def _built(
+    vertices: Sequence[NDArray[np.float32]], triangles: Sequence[NDArray[np.int32]], with_normals: bool
+) -> Occluders:
+    """The occluders of several meshes."""
+    first = np.cumsum([0, *(len(each) for each in vertices)])
+    every = np.concatenate(vertices)
+    index = np.concatenate([each + np.int32(k) for each, k in zip(triangles, first[:-1], strict=True)])
     normals = None
-    if settings.faces != "count":
-        a, b, c = triangle_corners(vertices, triangles)
+    if with_normals:
+        a, b, c = triangle_corners(every, index)
         normals = column_major(unit(cross(b - a, c - a)), F)
-    return Occluders(Tracer(vertices, triangles), ClusterTree(vertices, triangles), normals)
-
-
-def _with_ground(
-    vertices: NDArray[np.float32], triangles: NDArray[np.int32], up: int, lowest: np.float32
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The triangles and a large square just below `lowest` on the axis `up`, facing up."""
-    a, b = (up + 1) % 3, (up + 2) % 3
-    square = np.empty((4, 3), F)
-    square[:, up] = lowest - GROUND_GAP
-    square[:, a] = [-GROUND_SIZE, GROUND_SIZE, GROUND_SIZE, -GROUND_SIZE]
-    square[:, b] = [-GROUND_SIZE, -GROUND_SIZE, GROUND_SIZE, GROUND_SIZE]
-    first = len(vertices)
-    faces = np.array([[first, first + 1, first + 2], [first, first + 2, first + 3]], np.int32)
-    return np.concatenate([vertices, square]), np.concatenate([triangles, faces])
+    return Occluders(Tracer(every, index), ClusterTree(every, index), normals)

@@ -9,8 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from illumcli.baking.baked_texture import BakedTextures
-from illumcli.baking.files import add_baked_to_glb, write_baked_glb, write_baked_ply
+from illumcli.baking.files import (
+    add_baked_to_glb,
+    extend_baked_obj,
+    write_baked_glb,
+    write_baked_obj,
+    write_baked_ply,
+)
 from illumcli.baking.inputs import BakeWork
+from illumcli.baking.obj_files import copy_materials, placed_mesh, write_materials
 from illumcli.baking.points import Surfaces
 from illumcli.baking.split import corners_of_triangles, split_meshes, whole_meshes, with_materials
 from illumcli.images.encoded import png_bytes
@@ -19,6 +26,7 @@ from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import fits_attribute
 from illumcli.mesh_files.materials import pbr_materials
+from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.visibility.baked import Baked, write_npz
@@ -85,6 +93,8 @@ class _Writer:
                 occlusion = occlusion_maps(self._textures, self._work.surfaces)
                 return add_baked_to_glb(path, self._source, self._baked, self._channel, occlusion)
             return self._write_glb(path)
+        if kind == ".obj":
+            return self._write_obj(path)
         if source_kind == ".ply" and not self._split:
             write_baked_ply(path, [], self._baked, self._source, self._channel)
             return ()
@@ -132,6 +142,29 @@ class _Writer:
             left_out.append("materials")
         if any(mesh.group_names for mesh in written.meshes):
             left_out.append("groups")
+        if self._source.suffix.lower() in GLTF:
+            left_out += beside_mesh(open_document(self._source))
+        return left_out
+
+    def _write_obj(self, path: Path) -> list[str]:
+        """Write an OBJ: the lines of an OBJ with colours, or the meshes, with their materials beside it."""
+        placed, force = self._work.surfaces.geometry.placed, self._work.job.options.force
+        channel = self._channel
+        if self._source.suffix.lower() == ".obj":
+            extend_baked_obj(path, self._source, placed[0].mesh, self._baked, channel)
+            copy_materials(path, self._source, force)
+            return []
+        meshes = [NamedMesh(name, placed_mesh(each)) for name, each in zip(self._names, placed, strict=True)]
+        library = write_materials(path, [each.mesh for each in meshes], force)
+        write_baked_obj(path, meshes, self._baked, channel, library)
+
+        # What an OBJ has no place for.
+        names = {name for each in meshes for name in each.mesh.attributes} - {"color", "alpha"}
+        left_out = [f"the vertex property {name}" for name in sorted(names)]
+        if self._work.scene.materials:
+            left_out.append("materials of the scene")
+        differences = {what for each in meshes for what in each.mesh.material_repairs}
+        left_out += sorted(what.removesuffix(" left out") for what in differences if "left out" in what)
         if self._source.suffix.lower() in GLTF:
             left_out += beside_mesh(open_document(self._source))
         return left_out

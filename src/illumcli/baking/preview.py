@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking.files import baked_about
+from illumcli.baking.ground import Ground
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.report import BakeReport
 from illumcli.cache.fingerprint import digest
@@ -124,7 +125,7 @@ def _scene_of(work: BakeWork, shown: Path, azimuth: int) -> SceneFile:
     overrides = [
         f"film={{width: {SIZE}, height: {SIZE}, samples: 4, background: [0.6, 0.62, 0.66]}}",
         f"studio.view=[{azimuth}, {ELEVATION}]",
-        f"studio.up={work.settings.ground or 'y'}",
+        f"studio.up={Ground.of(work.settings.ground or 'y').up}",
         "objects.floor=null",
     ]
     if is_mesh_file(shown):

@@ -22,8 +22,8 @@ class BakeSettings(Value):
     sampler: str = "spiral"
     faces: str = "count"  # back faces: occlude (`count`), are transparent (`ignore`), end rays (`one_sided`)
     method: str = "vertex"  # or `fit`: least squares over the surface
-    occluders: tuple[str, ...] = ("scene",)  # or `own`, or names of objects
-    ground: str | None = None  # axis that points up from an added ground plane
+    occluders: tuple[str, ...] = ("scene",)  # as `occluder_choices` takes them
+    ground: str | None = None  # as `Ground.of` takes it
     what: tuple[str, ...] = ("ao",)  # words of `--what`, in the order of `channels.whats`
     channel: str | None = None  # of 8-bit vertex colours
     split: bool = False  # vertices of a PLY

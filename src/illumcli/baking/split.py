@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking.baked_texture import TextureUvs
+from illumcli.baking.obj_files import reversed_corners
 from illumcli.baking.points import Surfaces
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.scene_geometry import SceneGeometry
@@ -141,10 +142,12 @@ def output_mesh(
 
     # The triangles. Reversed polygons regain the order of corners in their file.
     corner = corners_of_triangles(geometry, index)
-    starts = mesh.starts
+    starts, written = mesh.starts, part.of_corner
     if TEXTURE_UV in tables:  # every triangle has corners of its own
         corner = np.arange(corner.size, dtype=np.int32).reshape(-1, 3)
         starts = np.arange(0, corner.size + 1, 3, dtype=np.int32)
+    elif placed.mirrored:
+        written = written[reversed_corners(mesh)]
     polygons = geometry.polygons[geometry.objects == index] - placed.first_polygon
     if placed.reversed is not None:
         is_reversed = placed.reversed[polygons]
@@ -153,7 +156,7 @@ def output_mesh(
     return OutputMesh(
         name,
         vertices[part.source],
-        part.of_corner,
+        written,
         starts,
         part.of_corner[corner],
         attributes,

@@ -64,6 +64,20 @@ class _Distance(click.ParamType):
         return self.fail(f"'{text}' is no distance; write 0.2 for scene units, 0.5r for half the radius")
 
 
+class _Ground(click.ParamType):
+    name = "AXIS[:OFFSET]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from illumcli.baking.ground import Ground
+        from illumcli.errors import InputError
+
+        try:
+            Ground.of(value)
+        except InputError as error:
+            raise click.UsageError(str(error)) from error
+        return str(value)
+
+
 class _What(click.ParamType):
     name = "NAME[,NAME]..."
 
@@ -160,7 +174,7 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     metavar="OUT",
     multiple=True,
     required=True,
-    help=".npz, .ply or .glb; may be repeated, may hold {name}, the name of the input.",
+    help=".npz, .ply, .obj, .glb; may be repeated, may hold {name}, the name of the input.",
 )
 @click.option("--samples", type=click.IntRange(1, 65536), help="Rays per vertex, by default 256.")
 @click.option(
@@ -207,10 +221,16 @@ def _request(options: dict[str, Any]) -> BakeRequest:
 @click.option(
     "--occluders",
     multiple=True,
-    metavar="scene|own|NAME",
-    help="Occluders of an object's vertices: the whole scene, itself, or itself and objects by name.",
+    metavar="[OBJECT=]scene|own|NAME|FILE",
+    help="What occludes an object beside itself: the scene (default), nothing (own), objects by name, mesh "
+    "or scene files, which are not baked. For all objects, or for OBJECT. May be repeated.",
 )
-@click.option("--ground", type=click.Choice(["x", "y", "z"]), help="Add a ground plane below; the up axis.")
+@click.option(
+    "--ground",
+    type=_Ground(),
+    help="Add a ground plane below the lowest vertex: the axis that points up, x, y, z, -x, -y or -z; "
+    "OFFSET raises it, scene units.",
+)
 @click.option(
     "--what",
     type=_What(),

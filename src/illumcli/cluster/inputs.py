@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from illumcli.baking.occluder_choice import occluding_files
+from illumcli.baking.settings import BakeJob
 from illumcli.cache.fingerprint import file_digest
 from illumcli.commands.unit import Unit
 from illumcli.errors import InputError
@@ -37,8 +39,14 @@ class Inputs:
         return {path: self._digest(path) for path in paths if path.is_file()}
 
     def _paths(self, unit: Unit) -> Iterator[Path]:
-        """The scene, those that it extends, and every file that a text in it names, with its companions."""
-        main = scene_of(unit)
+        """The files of all scenes and meshes that a unit reads."""
+        yield from self._paths_of(scene_of(unit), unit)
+        if isinstance(unit, BakeJob):
+            for path in occluding_files(unit.settings.occluders):
+                yield from self._paths_of(path, unit)
+
+    def _paths_of(self, main: Path, unit: Unit) -> Iterator[Path]:
+        """A scene, those that it extends, and every file that a text in it names, with its companions."""
         if main not in self._texts:
             self._texts[main] = read_text(main)
         text = self._texts[main]

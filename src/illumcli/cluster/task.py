@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from distributed import WorkerPlugin, get_worker
 
+from illumcli.baking.occluder_choice import with_files_at
 from illumcli.cluster.facts import ADVICE, facts
 from illumcli.cluster.inputs import Mirror, is_shared
 from illumcli.commands.options import RenderJob
@@ -250,4 +251,10 @@ def _mirrored(unit: Unit, mirror: Mirror) -> Unit:
         pattern = unit.options.pattern
         options = replace(unit.options, pattern=str(at(Path(pattern))) if pattern else None)
         return replace(unit, scene=at(unit.scene), options=options)
-    return replace(unit, path=at(unit.path), outputs=tuple(at(each) for each in unit.outputs))
+    occluders = with_files_at(unit.settings.occluders, at)
+    return replace(
+        unit,
+        path=at(unit.path),
+        outputs=tuple(at(each) for each in unit.outputs),
+        settings=replace(unit.settings, occluders=occluders),
+    )

@@ -10,8 +10,8 @@ from illumcli.baking.files import SUFFIXES, baked_contents
 from illumcli.errors import IllumError, InputError
 from illumcli.mesh_files import is_mesh_file
 from illumcli.records import Value
+from illumcli.scene.scene_file import SCENE_SUFFIXES
 
-SCENE_SUFFIXES = (".yaml", ".yml")
 SHOWN = 5
 """Files of a folder that are named for one reason to pass them over."""
 

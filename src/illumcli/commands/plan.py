@@ -12,7 +12,7 @@ from illumcli.cache.recorder import Cache
 from illumcli.cache.speeds import by_stage, read_speeds
 from illumcli.commands.bands import whole_because
 from illumcli.commands.options import RenderOptions
-from illumcli.commands.plan_variants import planned_variants
+from illumcli.commands.plan_variants import own_variants, planned_variants
 from illumcli.commands.sweep_names import named
 from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_works import SweepWorks
@@ -60,7 +60,8 @@ class ScenePlan:
             A variant has a fault.
         """
         options, works = self._options, SweepWorks(self._path, self._variants, self._options)
-        first = works.of(0)
+        own = own_variants(works, len(self._variants))
+        first = works.of(own[0] if own else 0)
         store = open_store() if options.cache else None
         run = Run(cache=Cache(store), threads=options.threads or len(os.sched_getaffinity(0)))
 
@@ -76,13 +77,14 @@ class ScenePlan:
 
         # What all variants take.
         if self._is_of_all:
-            outcomes = [Outcome(number, variant) for number, variant in enumerate(self._variants, 1)]
-            planned = planned_variants(works, outcomes)
+            planned = planned_variants(works, [Outcome(at + 1, self._variants[at]) for at in own])
             self._expected = planned.most_memory
             for plan, part in zip(plans, parts, strict=True):
                 camera = plan.view.name
                 time = time_of(by_stage(planned.units[camera]), speeds, run.threads)
                 part["variants"] = planned.as_data(camera, time)
+                if options.shard is not None:
+                    part["variants"] |= {"shard": str(options.shard), "of": len(self._variants)}
         return parts
 
     def refuse_too_large(self) -> None:

@@ -59,6 +59,9 @@ def baked_lines(files: Mapping[str, str]) -> list[str]:
 def _lines_of_variants(planned: Mapping[str, Any]) -> list[str]:
     """The variants, and the buffers of which they need as many different ones."""
     labels, files = planned["labels"], planned["files"]
+    shard = [f"shard   {planned['shard']}, of {planned['of']} variants"] if "shard" in planned else []
+    if not labels:
+        return [*shard, "all     no variant"]
     kept = len(labels) - planned["due"]
     exist = f", {kept} of which exist" if kept else ""
     is_one = len(labels) == 1
@@ -67,6 +70,7 @@ def _lines_of_variants(planned: Mapping[str, Any]) -> list[str]:
         for count in sorted(set(planned["times"].values()))
     }
     return [
+        *shard,
         "all     "
         + ("1 variant" if is_one else f"{len(labels)} variants from {labels[0]} to {labels[-1]}")
         + exist,

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from illumcli.cache.policy import is_kept
+from illumcli.commands.shards import shard_of_each
 from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_works import SweepWorks
+from illumcli.commands.unit_cost import cost_of
 from illumcli.commands.work import Work
 from illumcli.errors import OutputError
 from illumcli.records import Value
+from illumcli.render_graph.costs import CostModel
 from illumcli.render_graph.expected_time import ExpectedTime, units
 from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.keys import Keys
@@ -47,6 +50,16 @@ class PlannedVariants(Value):
             "expected_rays": dict(self.rays[camera]),
             "expected_time": time.as_data(),
         }
+
+
+def own_variants(works: SweepWorks, count: int) -> list[int]:
+    """The indices of the variants in the shard of the options; of all `count` without one."""
+    shard, model = works.options.shard, CostModel()
+    if shard is None:
+        return list(range(count))
+    costs = [cost_of(works.of(index), model) for index in range(count)]
+    shards = shard_of_each(costs, shard.count)
+    return [index for index, number in enumerate(shards) if number == shard.number]
 
 
 def planned_variants(works: SweepWorks, outcomes: Iterable[Outcome]) -> PlannedVariants:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from illumcli.color import to_srgb
 from illumcli.images.png import PngFile
 from illumcli.images.reader import read_image
+from illumcli.mesh_files import embedded_image, image_within
 from illumcli.mesh_files._files import content
 from illumcli.mesh_files.gltf.embed import media_type
 
@@ -22,14 +23,15 @@ _NAMES = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}
 
 def encoded_image(path: str) -> tuple[bytes, str]:
     """The bytes of a PNG or JPEG with its pixels as they are, of other images converted to a PNG; and the
-    media type.
+    media type. The image is a file, or one within a mesh file, ``FILE#images[N]``.
 
     Raises
     ------
     InputError
         The file does not exist or is no image.
     """
-    data = content(Path(path))
+    within = image_within(path)
+    data = content(Path(path)) if within is None else embedded_image(Path(within[0]), within[1])
     kind = media_type(data)
     if kind == "image/png":
         return without_profile(data), kind

@@ -18,7 +18,9 @@ from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.schema.modules import modules
 
-NO_FORMATS = frozenset({"materials", "mtl", "mtl_pbr", "occlusion", "output_mesh", "pbr", "split"})
+NO_FORMATS = frozenset(
+    {"materials", "mtl", "mtl_pbr", "mtl_write", "obj_write", "occlusion", "output_mesh", "pbr", "split"}
+)
 """Modules beside the formats."""
 OTHER_SUFFIXES = {".glb": "gltf"}  # suffix -> module of another name
 UNREAD_SUFFIXES = (".off",)  # meshes that cannot be read, listed so that they are not read as scenes

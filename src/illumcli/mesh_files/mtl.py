@@ -31,7 +31,8 @@ from illumcli.mesh_files._text import decoded, without_comment
 from illumcli.records import Value
 
 _COLORS = {"ka": "Ka", "kd": "Kd", "ks": "Ks", "ke": "Ke"}
-IMAGE = re.compile(rb"map_kd[ \t]([^\r\n]*)", re.IGNORECASE)
+_MAPS = ("bump", "disp", "decal", "refl", "norm")
+IMAGE = re.compile(rb"(?:map_\w+|bump|disp|decal|refl|norm)[ \t]([^\r\n]*)", re.IGNORECASE)
 _NUMBERS = {"ns": "Ns", "d": "d", "tr": "Tr", "illum": "illum"}
 _NOTHING = {
     "ni",
@@ -106,6 +107,17 @@ def statements(data: bytes) -> Iterator[tuple[int, str, str]]:
             yield number, word.lower(), rest[0].rstrip() if rest else ""
 
 
+def is_map(word: str) -> bool:
+    """True for statements that name an image."""
+    return word.startswith("map_") or word in _MAPS
+
+
+def images(path: Path, folder: Path) -> list[Path]:
+    """The images that a library names and that exist; arguments as of `read`."""
+    maps = [image_of(path, folder, rest) for _, word, rest in statements(content(path)) if is_map(word)]
+    return list(dict.fromkeys(each.file for each in maps if each.file is not None))
+
+
 class MapImage(Value):
     """The image of a map statement."""
 
@@ -152,7 +164,7 @@ class _Material:
             self._set(_NUMBERS[word], next(iter(self._numbers(words[-1:], place)), None), place)
         elif word == "map_kd":
             self._set("map_Kd", self._texture(rest, place), place)
-        elif word.startswith("map_") or word in ("bump", "disp", "decal", "refl", "norm"):
+        elif is_map(word):
             note(self._looks, "images of materials other than map_Kd left out", place)
         elif word not in _NOTHING:
             note(self._looks, "statements of materials that have no meaning here left out", place)

@@ -26,11 +26,10 @@ from pathlib import Path
 from illumcli.errors import IllumError
 from illumcli.mesh_files._files import content
 from illumcli.mesh_files._text import without_comment
-from illumcli.mesh_files.mtl import image_of, statements
+from illumcli.mesh_files.mtl import image_of, is_map, statements
 from illumcli.mesh_files.pbr import Color, PbrMaterial
 
 _TEXTURES = {"map_kd": "base_color", "map_ke": "emission", "norm": "normal"}
-_NO_IMAGES = ("bump", "disp", "decal", "refl")
 
 
 def read_pbr(path: Path, folder: Path) -> dict[str, PbrMaterial]:
@@ -57,7 +56,7 @@ def read_pbr(path: Path, folder: Path) -> dict[str, PbrMaterial]:
 
 def _material(name: str, said: dict[str, str], path: Path, folder: Path) -> PbrMaterial:
     # The images.
-    images = {word: image_of(path, folder, text) for word, text in said.items() if _is_map(word)}
+    images = {word: image_of(path, folder, text) for word, text in said.items() if is_map(word)}
     files = {word: str(image.file) for word, image in images.items() if image.file is not None}
     has_alpha = "map_d" in files and files["map_d"] == files.get("map_kd")
     textures = {part: files[word] for word, part in _TEXTURES.items() if word in files}
@@ -89,10 +88,6 @@ def _material(name: str, said: dict[str, str], path: Path, folder: Path) -> PbrM
 def _word(part: str) -> str:
     """The statement of a texture."""
     return next(word for word, each in _TEXTURES.items() if each == part)
-
-
-def _is_map(word: str) -> bool:
-    return word in _TEXTURES or word.startswith("map_") or word in _NO_IMAGES
 
 
 def _numbers(text: str) -> list[float]:

@@ -15,6 +15,8 @@ from illumcli.scene.spec import Scene
 from illumcli.scene.studio import STUDIO
 from illumcli.scene.unused import lacking, unused
 
+SCENE_SUFFIXES = (".yaml", ".yml")
+
 
 class SceneFile(Value):
     """A valid scene, with the file and overrides that it comes from."""

@@ -121,3 +121,20 @@ def test_plan_loads_no_ray_core(root):
         f"from illumcli.cli import illum\ntry:\n    illum(['plan', {str(scene)!r}])\nexcept SystemExit: pass"
     )
     assert not loaded_after(code) & {"embreex", "OpenImageIO"}
+
+
+def test_a_plain_render_loads_no_costs_audits_or_sweeps(tmp_path):
+    scene = tmp_path / "s.yaml"
+    scene.write_text("version: 1\nobjects: [{mesh: {shape: box}}]\nfilm: {width: 8, height: 6, samples: 1}\n")
+    code = f"""
+from illumcli.cli import illum
+try:
+    illum(["render", {str(scene)!r}, "-o", {str(tmp_path / "s.png")!r}, "--no-cache"])
+except SystemExit as end:
+    assert end.code == 0
+late = ("illumcli.render_graph.costs", "illumcli.accuracy", "illumcli.html_report", "illumcli.scene.variants")
+late += tuple(f"illumcli.commands.{{name}}" for name in ("bands", "merge", "plan", "sharding", "sweep"))
+loaded = [name for name in sys.modules if name.startswith((*late, "OpenImageIO"))]
+assert not loaded, loaded
+"""
+    loaded_after(code)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,23 @@ def test_bands_make_the_picture_of_one_process(scene, monkeypatch):
     assert again.report.written == (str(whole.paths[0]),)
     assert again.report.kept == tuple(map(str, whole.paths[1:]))
     assert whole.paths[0].read_bytes() == expected[whole.paths[0]]
+
+
+def test_workers_without_the_folder_send_their_bands(scene, machines, monkeypatch):
+    if os.geteuid() != 0:
+        pytest.skip("only root can hide a folder from a worker")
+    monkeypatch.chdir(scene.parent)
+    monkeypatch.setattr(bands, "LEAST", 1)
+    options = RenderOptions(LARGE, cache=False)
+    expected = {path: path.read_bytes() for path in rendered(options, Here()).paths}
+    for path in expected:
+        path.unlink()
+    for _ in range(2):
+        machines.start_hidden_worker()
+    done = rendered(options, ClusterRunner(address_of(machines.address), False, print, no_progress))
+    assert {path: path.read_bytes() for path in done.paths} == expected
+    assert list(Path().glob("*rows*")) == []
+    assert done.report.written == tuple(map(str, expected))
 
 
 @pytest.mark.parametrize("why", ["obscurance.reconstruct=true", "target_error"])

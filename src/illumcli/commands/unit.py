@@ -1,10 +1,10 @@
 """Units of work: one description, and one class that does it, for threads, shards and workers of a cluster.
 
-A unit is a scene, a variant or a frame of it, some or all of its cameras (`RenderJob`), or an input of a bake
-(`BakeJob`). It holds names and numbers, no arrays and no open files, and can be pickled. Its files depend on
-the unit and on the files that it names: not on the process, the number of threads, or earlier units. Its key
-is the `content` of its work: files that exist with this content are kept, whoever wrote them, so a unit that
-is done twice is computed once.
+A unit is a scene, a variant or a frame of it, some or all of its cameras, a band of their rows (`RenderJob`),
+or an input of a bake (`BakeJob`). It holds names and numbers, no arrays and no open files, and can be
+pickled. Its files depend on the unit and on the files that it names: not on the process, the number of
+threads, or earlier units. Its key is the `content` of its work: files that exist with this content are kept,
+whoever wrote them, so a unit that is done twice is computed once.
 
 An executor makes one `Worker` per process and gives it units, one after the other:
 

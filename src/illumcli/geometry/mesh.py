@@ -47,7 +47,8 @@ class Mesh(Record):
     substitutes: Mapping[str, Mapping[str, Substitute]] = field(default_factory=dict)
     """Material name -> key -> the colour that replaces its texture; white by default."""
     occlusion: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """Material name -> keys of a texture whose red channel is obscurance, and its `strength`."""
+    """Material name -> keys of a texture whose red channel is obscurance, and its `strength`; empty if an
+    attribute has the obscurance that counts."""
     material_repairs: Repairs = field(default_factory=dict)
     """Differences from the material library; reported if a scene uses the material."""
     repairs: Repairs = field(default_factory=dict)

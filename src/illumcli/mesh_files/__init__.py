@@ -72,7 +72,7 @@ def holds_obscurance(path: Path) -> bool:
     holds = getattr(_module(name), "holds_obscurance", None) if name else None
     try:
         return bool(holds and holds(path))
-    except (InputError, OSError):
+    except (InputError, OSError, ValueError, RecursionError):
         return False
 
 

@@ -91,7 +91,8 @@ class MeshFile(Description):
     obscurance: str | None = None
     """Path of a file with the obscurance of this mesh, which casts no obscurance rays then: an .npz, .ply or
     .glb that `illum ao-bake` wrote for it, or an image over its uv, whose red channel is read. The mesh's own
-    file may be named, too: of glTF, occlusion textures count where vertices have no obscurance."""
+    file may be named, too. Occlusion textures of glTF count if vertices have no obscurance, or if the same
+    bake wrote both."""
 
 
 def _mesh_kind(value: Any) -> str:

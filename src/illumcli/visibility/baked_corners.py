@@ -18,7 +18,6 @@ from illumcli.rays.corner_weights import Corners, CornerWeights
 from illumcli.records import Record
 from illumcli.visibility.baked_meshes import (
     User,
-    attribute_of,
     file_vertices,
     is_of_one_object,
     obscurance_at_vertices,
@@ -102,10 +101,10 @@ def baked(
 
 
 def has_textures(file: Located, in_mesh: Mesh | None) -> bool:
-    """True if a file of obscurance has it in textures: images, and glTF without values at vertices."""
+    """True if a file of obscurance has it in textures: an image, or glTF whose occlusion textures count."""
     if in_mesh is None:
         return file.path.suffix.lower() != ".npz"
-    return bool(in_mesh.occlusion) and attribute_of(in_mesh) is None
+    return bool(in_mesh.occlusion)
 
 
 def _values_of_npz(path: Path, in_file: Baked, mesh: Mesh, name: str) -> tuple[NDArray[np.float32], bool]:

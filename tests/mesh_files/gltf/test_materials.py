@@ -12,7 +12,7 @@ import pytest
 
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh, Substitute
-from illumcli.mesh_files import embedded_image, image_within, read_mesh
+from illumcli.mesh_files import embedded_image, holds_obscurance, image_within, read_mesh
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.shading.materials import imported_model
 
@@ -345,3 +345,29 @@ def test_occlusion_textures_have_their_coordinates_and_strength(library: Any) ->
     np.testing.assert_allclose(mesh.attributes[keys["uv"]], [1, -1] * np.array(UV) / 2 + [0.5, 1])
     assert library({"occlusionTexture": {"index": 0}}, uv=True).occlusion["paint"]["strength"] == 1
     assert not library({}, uv=True).occlusion
+
+
+@pytest.mark.parametrize(
+    "parameters, count", [(None, False), ({"texture": None}, False), ({"texture": [4, 4]}, True)]
+)
+def test_values_at_vertices_count_unless_the_same_bake_wrote_textures(
+    tmp_path: Path, square: Any, parameters: Any, count: bool
+) -> None:
+    scene = square()
+    primitive = scene.json["meshes"][0]["primitives"][0]
+    primitive["attributes"] |= {"TEXCOORD_0": scene.table(UV), "_OBSCURANCE": scene.table([0, 0, 1, 1])}
+    primitive["material"] = 0
+    (tmp_path / "w.png").write_bytes(PNG)
+    scene.json |= {
+        "materials": [{"name": "paint", "occlusionTexture": {"index": 0}}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "w.png"}],
+    }
+    if parameters is not None:
+        scene.json["asset"]["extras"] = {"illum": {"parameters": parameters}}
+    mesh = read_mesh(scene.write(tmp_path / "a.glb"))
+    assert bool(mesh.occlusion) == count
+    assert mesh.attributes["_OBSCURANCE"].tolist() == [0, 0, 1, 1]
+    assert holds_obscurance(tmp_path / "a.glb")
+    (tmp_path / "a.glb").write_bytes((tmp_path / "a.glb").read_bytes()[:30])
+    assert not holds_obscurance(tmp_path / "a.glb")

@@ -21,7 +21,7 @@ from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh, starts_of
-from illumcli.mesh_files.gltf.document import Document, dicts, open_document, printable
+from illumcli.mesh_files.gltf.document import Document, dicts, open_document, printable, read_json
 from illumcli.mesh_files.gltf.materials import Library
 from illumcli.mesh_files.gltf.primitives import Part, parts
 
@@ -64,6 +64,7 @@ def read(path: Path) -> Mesh:
     library = Library(document, primitives)
     material_names, materials = _numbered([library.name(part) for part in primitives])
     group_names, groups = _numbered([part.group for part in primitives])
+    attributes = _shared(document, primitives)
     raw = RawMesh(
         np.concatenate([np.empty((0, 3)), *(part.vertices for part in primitives)]),
         corners,
@@ -77,10 +78,10 @@ def read(path: Path) -> Mesh:
         group_names=group_names,
         polygon_groups=np.repeat(groups, counts),
         polygon_smoothing=smoothing,
-        attributes={**_shared(document, primitives), **library.coordinates()},
+        attributes={**attributes, **library.coordinates()},
         materials=library.materials,
         substitutes=library.substitutes,
-        occlusion=library.occlusion,
+        occlusion={} if OBSCURANCE in attributes and not _bakes_textures(document) else library.occlusion,
         material_repairs=library.repairs,
         repairs=document.repairs,
     )
@@ -88,10 +89,19 @@ def read(path: Path) -> Mesh:
     return checked_mesh(path, raw, place)
 
 
+def _bakes_textures(document: Document) -> bool:
+    """True if illum baked values at vertices together with the occlusion textures, which are finer; otherwise
+    the values are newer."""
+    about: Any = document.json
+    for key in ("asset", "extras", "illum", "parameters", "texture"):
+        about = about.get(key) if isinstance(about, dict) else None
+    return about is not None
+
+
 def holds_obscurance(path: Path) -> bool:
     """True if a primitive has baked obscurance, or a material an occlusion texture."""
-    document = open_document(path)
-    meshes, materials = (document.json.get(kind) for kind in ("meshes", "materials"))
+    parsed = read_json(path)
+    meshes, materials = (parsed.get(kind) for kind in ("meshes", "materials"))
     primitives = [each for mesh in dicts(meshes) for each in dicts(mesh.get("primitives"))]
     return any(OBSCURANCE in (each.get("attributes") or {}) for each in primitives) or any(
         isinstance(each.get("occlusionTexture"), dict) for each in dicts(materials)

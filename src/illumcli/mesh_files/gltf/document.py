@@ -201,6 +201,24 @@ def open_document(path: Path) -> Document:
     return document
 
 
+def read_json(path: Path) -> dict[str, Any]:
+    """The JSON of a .gltf or .glb file, without its other chunks.
+
+    Raises
+    ------
+    OSError, ValueError, RecursionError
+        A file that cannot be read, or no JSON object.
+    """
+    with path.open("rb") as file:
+        start = file.read(20)
+        is_binary = start.startswith(b"glTF")
+        data = file.read(int.from_bytes(start[12:16], "little")) if is_binary else start + file.read()
+    parsed = json.loads(data.decode(json.detect_encoding(data), "replace").rstrip("\0 \t\r\n"))
+    if not isinstance(parsed, dict):
+        raise ValueError("no JSON object")
+    return parsed
+
+
 def _name_extensions(document: Document) -> None:
     """Note the required extensions that are not fully supported.
 

@@ -29,13 +29,13 @@ WIDTH, HEIGHT = 260, 190
 TRACED = "as pictures have it"
 """Instead of options: w of every pixel, not baked."""
 FAULTS: Mapping[str, Sequence[str]] = {
-    "sheets": ("", "--faces ignore"),
+    "sheets": ("", "--faces ignore", "--occluders ground=post"),
     "poles": ("--samples 8", "--target-error 0.005"),
     "seams": (".ply", ".ply --split"),
     "facets": ("", "-D 'meshes.post.normals={crease: 60}'"),
     "interiors": ("", "--falloff smooth --max-distance 0.3r"),
     "floating": ("--occluders own", "--ground y"),
-    "shells": ("", "--occluders own"),
+    "shells": ("", "--occluders head=own"),
     "tight": ("", "--falloff smooth --max-distance 0.2r"),
     "large": ("", "--method fit --samples 2048", TRACED),
 }

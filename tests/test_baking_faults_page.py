@@ -13,8 +13,8 @@ from illumcli.cli import illum
 from illumcli.visibility.baked import read_npz
 
 LIGHTER = {
-    "sheets": ("ground", "", "--faces ignore"),
-    "shells": ("head", "", "--occluders own"),
+    "sheets": ("ground", "", "--occluders ground=post"),
+    "shells": ("head", "", "--occluders head=own"),
     "interiors": ("floor", "", "--falloff smooth --max-distance 0.3r"),
     "tight": ("ground", "", "--falloff smooth --max-distance 0.2r"),
     "floating": ("ring", "--ground y", "--occluders own"),

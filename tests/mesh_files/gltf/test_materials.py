@@ -348,7 +348,7 @@ def test_occlusion_textures_have_their_coordinates_and_strength(library: Any) ->
 
 
 @pytest.mark.parametrize(
-    "parameters, count", [(None, False), ({"texture": None}, False), ({"texture": [4, 4]}, True)]
+    ("parameters", "count"), [(None, False), ({"texture": None}, False), ({"texture": [4, 4]}, True)]
 )
 def test_values_at_vertices_count_unless_the_same_bake_wrote_textures(
     tmp_path: Path, square: Any, parameters: Any, count: bool

@@ -10,6 +10,11 @@ import pytest
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeSettings
 from illumcli.errors import InputError
+from illumcli.geometry.repairs import NO_OCCLUSION
+from illumcli.render_graph.build import build
+from illumcli.render_graph.repairs import repairs_of
+from illumcli.render_graph.schedule import outputs_of
+from illumcli.scene.load import load
 from metamorphic.pictures import pictures
 from painted import write_picture
 
@@ -105,6 +110,11 @@ def test_no_ray_is_cast_and_it_is_told(illum, path, tmp_path):
     assert "baked   " not in traced.stdout
 
 
+def repairs_of_scene(path, *overrides):
+    loaded = load(path, overrides)
+    return repairs_of(build(loaded.scene, loaded), outputs_of(loaded.scene, ("beauty",)))
+
+
 def test_occlusion_textures_of_gltf(tmp_path):
     """R of the texture, by its strength and its own coordinates, is what ambient light is multiplied by."""
     rows = 17 * np.arange(16, dtype=np.uint8).reshape(4, 4, 1)
@@ -155,6 +165,8 @@ def test_occlusion_textures_of_gltf(tmp_path):
     # a scene that does not name the file has no obscurance; a mesh rendered alone has the file's
     scene.write_text(scene.read_text().replace(", obscurance: a.gltf", ""))
     assert (pictures(scene, (), ("obscurance",))["main", "obscurance"] == 1).all()
-    from illumcli.scene.load import load
-
+    repairs = repairs_of_scene(scene, "objects.0.mesh.materials=true")
+    assert repairs[NO_OCCLUSION].count == 1
+    named = ("objects.0.mesh.materials=true", "objects.0.mesh.obscurance=a.gltf")
+    assert NO_OCCLUSION not in repairs_of_scene(scene, *named)
     assert load(tmp_path / "a.gltf").scene.meshes["subject"].obscurance == "a.gltf"

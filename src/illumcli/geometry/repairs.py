@@ -21,6 +21,7 @@ NORMALS_OF_FILE = "objects whose normals' crease or weights are not used: the fi
 NO_GRAIN = "objects whose material has a grain that nothing directs: give the object a grain, or its mesh uv"
 NO_MATERIAL = "materials that neither the scene nor a library has, drawn as the default"
 NOT_ASKED = "materials of mesh files that are not used: write materials: true, or give the object one"
+NO_OCCLUSION = "occlusion textures that are not used: name the file as its mesh's obscurance"
 APPROXIMATED = frozenset(
     {
         "metallic-roughness materials, drawn as cook_torrance",
@@ -28,6 +29,7 @@ APPROXIMATED = frozenset(
         NO_GRAIN,
         NO_MATERIAL,
         NOT_ASKED,
+        NO_OCCLUSION,
     }
 )
 """Classes that are no fault of a file: printed, and not refused under --strict."""

@@ -8,6 +8,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import (
     NO_GRAIN,
     NO_MATERIAL,
+    NO_OCCLUSION,
     NORMALS_OF_FILE,
     NOT_ASKED,
     MeshRepairs,
@@ -47,19 +48,27 @@ def undirected(names: Sequence[str], wants: Sequence[bool], meshes: Sequence[Mes
 
 
 def unnamed(
-    names: Sequence[str], selects: Sequence[tuple[tuple[str, ...], bool] | None], meshes: Sequence[Mesh]
+    names: Sequence[str],
+    selects: Sequence[tuple[tuple[str, ...], bool] | None],
+    has_obscurance: Sequence[bool],
+    meshes: Sequence[Mesh],
 ) -> MeshRepairs:
-    """Materials that mesh files select by name, but which do not exist or are not imported.
+    """Materials that mesh files select by name, but which do not exist or are not imported, and occlusion
+    textures of imported ones that are not used.
 
     Parameters
     ----------
     selects : sequence
         For each object the materials of the scene that its mesh selects from, and whether it imports those
         of its file; None for objects with one material.
+    has_obscurance : sequence
+        For each object, True if its obscurance is read from a file.
     """
     unknown: dict[str, Repair] = {}
-    for name, selected, mesh in zip(names, selects, meshes, strict=True):
+    for name, selected, has_file, mesh in zip(names, selects, has_obscurance, meshes, strict=True):
         known, imports = selected or ((), False)
+        if imports and mesh.occlusion and not has_file:
+            note(unknown, NO_OCCLUSION, name, len(mesh.occlusion))
         missing = set(mesh.material_names) - set(known)
         # Materials missing in a library are among the repairs of its mesh already.
         if selected is None or not missing or (imports and mesh.materials):

@@ -103,7 +103,7 @@ def _repair_nodes(scene: Scene) -> list[Node]:
     if any(by_uv):
         nodes.append(Node.of(partial(undirected, names, by_uv), "undirected"))
     if any(selects):
-        nodes.append(Node.of(partial(unnamed, names, selects), "unnamed"))
+        nodes.append(Node.of(partial(unnamed, names, selects, tuple(needs.is_baked(scene))), "unnamed"))
     return nodes
 
 

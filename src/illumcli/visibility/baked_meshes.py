@@ -89,17 +89,15 @@ def file_vertices(geometry: SceneGeometry, user: User, file: Mesh) -> FileVertic
     if file is mesh or np.array_equal(file.vertices, mesh.vertices):
         return FileVertices(mesh.corners.astype(np.int64), is_other=False)
 
-    # Its polygons or triangles, corner by corner.
+    # Its polygons or triangles, corner by corner; those of mirrored objects may be reversed.
     vertex, sizes = _polygons_of(geometry, user, file)
     orders: list[NDArray[np.int64]] = []
     if np.array_equal(sizes, np.diff(mesh.starts)):
-        orders.append(np.arange(len(mesh.corners)))
+        forwards = np.arange(len(mesh.corners))
+        orders += [forwards, np.repeat(mesh.starts[:-1] + mesh.starts[1:] - 1, sizes) - forwards]
     if (sizes == 3).all() and len(sizes) == len(_triangles_of(geometry, placed)):
         corner = _corners_of_triangles(geometry, placed)
-        orders += [
-            corner,
-            corner.reshape(-1, 3)[:, ::-1].ravel(),
-        ]  # those of mirrored objects may be reversed
+        orders += [corner, corner.reshape(-1, 3)[:, ::-1].ravel()]
     for corner in orders:
         if _are_in_place(geometry, user, file.vertices[vertex], mesh.corners[corner]):
             of_corner = np.zeros(len(mesh.corners), np.int64)

@@ -11,6 +11,7 @@ from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeSettings
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import NO_OCCLUSION
+from illumcli.mesh_files import holds_obscurance
 from illumcli.render_graph.build import build
 from illumcli.render_graph.repairs import repairs_of
 from illumcli.render_graph.schedule import outputs_of
@@ -54,12 +55,19 @@ def obscurance(path, file):
 @pytest.mark.parametrize("source", ["room.obj", "scene.yaml"])
 def test_all_formats_show_the_same(path, source):
     path.write_text(SCENE.replace(", obscurance: FILE", ""))
-    outputs = [path.with_name(f"baked.{kind}") for kind in ("npz", "ply", "glb")]
+    outputs = [path.with_name(f"baked.{kind}") for kind in ("npz", "ply", "glb", "obj")]
     bake_mesh(path.with_name(source), outputs, SPLIT)
     expected = obscurance(path, "baked.npz")
     assert 0.2 < np.nanmin(expected) < 0.9
     for kind in ("ply", "glb"):
         np.testing.assert_allclose(obscurance(path, f"baked.{kind}"), expected, atol=1e-6, err_msg=kind)
+
+    # an OBJ has a value per vertex, as a PLY has that is not split
+    bake_mesh(path.with_name(source), [path.with_name("whole.ply")], BakeSettings(samples=16))
+    whole = obscurance(path, "whole.ply")
+    np.testing.assert_allclose(obscurance(path, "baked.obj"), whole, atol=1e-6)
+    assert holds_obscurance(path.with_name("baked.obj"))
+    assert not holds_obscurance(path.with_name("room.obj"))
 
 
 def test_files_of_another_mesh(path):

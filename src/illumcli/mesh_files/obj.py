@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.color import from_srgb
+from illumcli.color import from_srgb, to_srgb
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, joined, note
@@ -32,6 +32,7 @@ from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh
 from illumcli.mesh_files._text import Block, Text, decoded, keyword, without_comment
+from illumcli.mesh_files.obj_write import read_about
 from illumcli.records import Value
 
 _LIBRARY = re.compile(rb"mtllib[ \t]([^\r\n]*)", re.IGNORECASE)
@@ -57,10 +58,10 @@ _UNKNOWN = "unknown statements left out"
 def read(path: Path) -> Mesh:
     """The polygons of an OBJ file, and the materials of its libraries.
 
-    Vertex colours (three or four more numbers after a position) are sRGB, in 0..1 or 0..255. `o` and `g` both
-    begin a group. Display attributes are ignored. Lines, points, free-form geometry and unknown statements
-    are left out and counted in `repairs`, as are all repairs. Only a file whose faces cannot be determined is
-    refused.
+    Vertex colours (three or four more numbers after a position) are sRGB, in 0..1 or 0..255; those that illum
+    baked are the attribute `obscurance`. `o` and `g` both begin a group. Display attributes are ignored.
+    Lines, points, free-form geometry and unknown statements are left out and counted in `repairs`, as are all
+    repairs. Only a file whose faces cannot be determined is refused.
     """
     # The lines by keyword.
     text = Text.of(path, content(path), comments=True, continued=True)
@@ -73,6 +74,8 @@ def read(path: Path) -> Mesh:
     # Tables of vertices, uv and normals; references of the faces to their rows.
     positions = text.block(lines[b"v"], keyword=1)
     vertices, attributes = _vertices(positions, repairs)
+    if "color" in attributes and holds_obscurance(path):
+        attributes = {"obscurance": to_srgb(attributes["color"][:, 0]).astype(np.float32)}
     uvs = _uvs(text.block(lines[b"vt"], keyword=2))
     normals = _normals(text.block(lines[b"vn"], keyword=2))
     faces = text.block(lines[b"f"], keyword=1)
@@ -113,6 +116,14 @@ def read(path: Path) -> Mesh:
         repairs=repairs,
     )
     return checked_mesh(path, raw, lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}")
+
+
+def holds_obscurance(path: Path) -> bool:
+    """True if illum baked the colours of the vertices, all channels of them."""
+    try:
+        return dict(read_about(path)["parameters"])["channel"] is None
+    except (StopIteration, LookupError, TypeError, ValueError):
+        return False
 
 
 _PARTS = {"vertex": b"v", "uv": b"vt", "normal": b"vn", "face": b"f"}

@@ -89,10 +89,10 @@ class MeshFile(Description):
     materials: bool = False
     """True: import the materials of the file."""
     obscurance: str | None = None
-    """Path of a file with the obscurance of this mesh, which casts no obscurance rays then: an .npz, .ply or
-    .glb that `illum ao-bake` wrote for it, or an image over its uv, whose red channel is read. The mesh's own
-    file may be named, too. Occlusion textures of glTF count if vertices have no obscurance, or if the same
-    bake wrote both."""
+    """Path of a file with the obscurance of this mesh, which casts no obscurance rays then: an .npz, .ply,
+    .glb or .obj that `illum ao-bake` wrote for it, or an image over its uv, whose red channel is read. The
+    mesh's own file may be named, too. Occlusion textures of glTF count if vertices have no obscurance, or if
+    the same bake wrote both."""
 
 
 def _mesh_kind(value: Any) -> str:

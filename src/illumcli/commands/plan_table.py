@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 SHOWN = 3
-"""Stages that no earlier run had, of which the names are shown."""
+"""Stages that no earlier run had, and objects whose obscurance is baked, of which the names are shown."""
 
 
 def plan_table(parts: Sequence[Mapping[str, Any]]) -> str:
@@ -35,8 +35,8 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
         _row("tile", [name for name in part["tile"] if name not in reused]),
         _row("reused", list(reused)),
         _row("rays", [f"{name} {count:,}" for name, count in part["expected_rays"].items()]),
-        _row("baked", baked_lines(part["obscurance_files"])),
         _row("", [f"traced as {part['ray_loop']}"] if part["ray_loop"] else []),
+        _row("baked", ["; ".join(_baked(part))] if part["obscurance_files"] else []),
         _row("memory", [f"{name} {size / 2**20:,.1f} MiB" for name, size in part["expected_bytes"].items()]),
         _row("whole", [f"on clusters and in shards: {part['whole']}"] if part["whole"] else []),
         _time_row(part["expected_time"]),
@@ -51,9 +51,18 @@ def _lines(part: Mapping[str, Any]) -> list[str]:
     return [line for line in lines if line.strip()]
 
 
-def baked_lines(files: Mapping[str, str]) -> list[str]:
-    """What is said of the files of obscurance, by object."""
-    return [f"{name}: obscurance from {file}, 0 rays" for name, file in files.items()]
+def _baked(part: Mapping[str, Any]) -> list[str]:
+    """The files that obscurance is read from, with their objects."""
+    objects = defaultdict(list)
+    for name, file in part["obscurance_files"].items():
+        objects[file].append(name)
+    lines = []
+    for file, names in objects.items():
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        lines.append(f"{', '.join(names[:SHOWN])}{more}: obscurance from {file}, 0 rays")
+    if lines and "hemispheres" in part["tile"]:
+        lines.append("the scene's own settings are for the other objects")
+    return lines
 
 
 def _lines_of_variants(planned: Mapping[str, Any]) -> list[str]:

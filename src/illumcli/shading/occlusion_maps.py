@@ -65,38 +65,46 @@ def occlusion_maps(
     InputError
         An unreadable image, a mesh without uv, a file of another mesh; all of them in one error.
     """
-    uvs = scene_uvs(geometry)
-    known: dict[tuple[Path, int, str], list[OcclusionMap]] = {}
-    problems: list[str] = []
+    # Objects that share a mesh share its textures; those in a file of several objects go by name.
+    sharing: dict[tuple[Path, int, str], list[int]] = {}
+    users: dict[Path, list[int]] = {}
     for number, (name, file) in enumerate(files):
         in_mesh = None if obscurance_meshes is None else obscurance_meshes[number]
         if file is None or not has_textures(file, in_mesh):
             continue
-
-        # Objects that share a mesh share its textures; those of several objects go by name.
         is_single = in_mesh is None or is_of_one_object(geometry, number, in_mesh)
         key = file.path, int(geometry.placed_mesh[number]), "" if is_single else name
-        if key not in known:
-            user = User(
-                number, name, tuple(k for k, (_, each) in enumerate(files) if each and each.path == file.path)
-            )
-            try:
-                if in_mesh is None:
-                    known[key] = [_image(user, file.path, read, geometry, uvs)]
-                else:
-                    known[key] = _of_gltf(user, file.path, read, geometry, in_mesh)
-            except InputError as error:
-                problems += error.problems
-                continue
-        for each in known[key]:
-            each.objects[number] = True
+        sharing.setdefault(key, []).append(number)
+        users.setdefault(file.path, []).append(number)
+
+    # The textures of each.
+    uvs = scene_uvs(geometry)
+    maps: list[OcclusionMap] = []
+    problems: list[str] = []
+    for (path, _, _), numbers in sharing.items():
+        user = User(numbers[0], files[numbers[0]][0], tuple(users[path]))
+        in_mesh = None if obscurance_meshes is None else obscurance_meshes[user.number]
+        objects = np.isin(np.arange(len(files)), numbers)
+        try:
+            if in_mesh is None:
+                maps.append(_image(user, objects, path, read, uvs, geometry))
+            else:
+                maps += _of_gltf(user, objects, path, read, in_mesh, geometry)
+        except InputError as error:
+            problems += error.problems
     if problems:
         raise InputError(dict.fromkeys(problems))
-    maps = tuple(each for maps in known.values() for each in maps)
-    return OcclusionMaps(maps, np.array([file is not None for _, file in files], np.bool_))
+    return OcclusionMaps(tuple(maps), np.array([file is not None for _, file in files], np.bool_))
 
 
-def _image(user: User, path: Path, read: Read, geometry: SceneGeometry, uvs: CornerVectors) -> OcclusionMap:
+def _image(
+    user: User,
+    objects: NDArray[np.bool_],
+    path: Path,
+    read: Read,
+    uvs: CornerVectors,
+    geometry: SceneGeometry,
+) -> OcclusionMap:
     """An image over the uv of an object's mesh."""
     mesh = geometry.placed[geometry.placed_mesh[user.number]].mesh
     if mesh.uvs is None or mesh.corner_uvs is None:
@@ -106,10 +114,17 @@ def _image(user: User, path: Path, read: Read, geometry: SceneGeometry, uvs: Cor
         )
     no_materials = np.full(_polygon_count(geometry), -1, np.int32)
     image = read(str(path), "linear").select((0,)).clipped(0, 1)[0]
-    return OcclusionMap(_no_objects(geometry), no_materials, -1, uvs, image)
+    return OcclusionMap(objects, no_materials, -1, uvs, image)
 
 
-def _of_gltf(user: User, path: Path, read: Read, geometry: SceneGeometry, file: Mesh) -> list[OcclusionMap]:
+def _of_gltf(
+    user: User,
+    objects: NDArray[np.bool_],
+    path: Path,
+    read: Read,
+    file: Mesh,
+    geometry: SceneGeometry,
+) -> list[OcclusionMap]:
     """The occlusion textures of a glTF file, on an object's polygons."""
     found = file_vertices(geometry, user, file)
     if found is None or found.is_other:
@@ -142,7 +157,7 @@ def _of_gltf(user: User, path: Path, read: Read, geometry: SceneGeometry, file: 
         image = read(str(path.parent / keys["texture"]), "linear").select((0,)).clipped(0, 1)[0]
         looked_up = keys.get("filter", "bilinear"), keys.get("wrap", "repeat"), keys["strength"]
         uvs = tables[keys.get("uv")]
-        maps.append(OcclusionMap(_no_objects(geometry), materials, number, uvs, image, *looked_up))
+        maps.append(OcclusionMap(objects, materials, number, uvs, image, *looked_up))
     return maps
 
 
@@ -155,10 +170,6 @@ def _coordinates(file: Mesh, name: str | None) -> NDArray[np.float64]:
 
 def _polygon_count(geometry: SceneGeometry) -> int:
     return sum(each.mesh.polygon_count for each in geometry.placed)
-
-
-def _no_objects(geometry: SceneGeometry) -> NDArray[np.bool_]:
-    return np.zeros(len(geometry.placed_mesh), np.bool_)
 
 
 def mapped_obscurance(

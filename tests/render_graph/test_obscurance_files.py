@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,8 +49,10 @@ def path(tmp_path):
 
 
 def obscurance(path, file):
+    """(H, W, 1) w of the scene with a file, as a command in the folder above the scene's has it."""
     path.write_text(SCENE.replace(", obscurance: FILE", f", obscurance: {file}" if file else ""))
-    ((_, values),) = pictures(path, (), ("obscurance",)).items()
+    with contextlib.chdir(path.parents[1]):
+        ((_, values),) = pictures(Path(path.parent.name, path.name), (), ("obscurance",)).items()
     return np.where(values > 0, values, np.nan)  # NaN where nothing is
 
 
@@ -163,7 +167,8 @@ def test_occlusion_textures_of_gltf(tmp_path):
         "film: {width: 4, height: 4, samples: 1}\n"
         "objects: [{mesh: {file: a.gltf, obscurance: a.gltf}}]\n"
     )
-    made = pictures(scene, (), ("obscurance", "beauty"))
+    with contextlib.chdir(tmp_path.parent):
+        made = pictures(Path(tmp_path.name, scene.name), (), ("obscurance", "beauty"))
     expected = 1 + 0.5 * (rows[..., 0] / 255 - 1)
     np.testing.assert_allclose(made["main", "obscurance"][..., 0], expected, atol=1e-6)
     np.testing.assert_allclose(

@@ -113,7 +113,7 @@ def _image(
             "uv, or bake values at vertices"
         )
     no_materials = np.full(_polygon_count(geometry), -1, np.int32)
-    image = read(str(path), "linear").select((0,)).clipped(0, 1)[0]
+    image = read(str(path.absolute()), "linear").select((0,)).clipped(0, 1)[0]
     return OcclusionMap(objects, no_materials, -1, uvs, image)
 
 
@@ -154,7 +154,7 @@ def _of_gltf(
         )
         if keys is None:
             continue
-        image = read(str(path.parent / keys["texture"]), "linear").select((0,)).clipped(0, 1)[0]
+        image = read(str(path.absolute().parent / keys["texture"]), "linear").select((0,)).clipped(0, 1)[0]
         looked_up = keys.get("filter", "bilinear"), keys.get("wrap", "repeat"), keys["strength"]
         uvs = tables[keys.get("uv")]
         maps.append(OcclusionMap(objects, materials, number, uvs, image, *looked_up))

@@ -140,7 +140,7 @@ def test_workers_elsewhere_get_occluding_files(tmp_path):
     (folder / "scene.yaml").write_text("version: 1\nobjects: [{mesh: part.obj}]\n")
     texts = ("own", f"mesh={folder / 'scene.yaml'}")
     unit = BakeJob(cube(tmp_path / "cube.obj"), (tmp_path / "a.npz",), BakeSettings(occluders=texts))
-    assert {path.name for path in Inputs().of_all([unit])} == {"cube.obj", "scene.yaml", "part.obj"}
+    assert {path.name for path in Inputs().of_all([unit])} >= {"cube.obj", "scene.yaml", "part.obj"}
     assert with_files_at(texts, lambda path: Path("/there") / path.name) == ("own", "mesh=/there/scene.yaml")
 
 

@@ -177,7 +177,7 @@ def test_a_target_that_is_not_reached_is_told(tmp_path, monkeypatch):
 
 def test_ply_keeps_everything_and_gets_what_was_baked(tmp_path):
     path = wavy(tmp_path)
-    bake(path, tmp_path / "out.ply", channel="g")
+    bake(path, tmp_path / "out.ply", color="g")
     old, new = PlyData.read(path), PlyData.read(tmp_path / "out.ply")
     assert new.byte_order == old.byte_order
     assert "mine" in new.comments
@@ -247,7 +247,7 @@ def test_obj_goes_to_ply_and_glb_in_its_own_order(text_mesh, tmp_path):
 
 
 def test_a_glb_keeps_all_it_has(text_mesh, tmp_path):
-    bake(text_mesh(STEP), tmp_path / "first.glb", samples=16, channel="r")
+    bake(text_mesh(STEP), tmp_path / "first.glb", samples=16, color="r")
     bake(tmp_path / "first.glb", tmp_path / "second.glb", samples=64)
     first, second = read_mesh(tmp_path / "first.glb"), read_mesh(tmp_path / "second.glb")
     assert np.array_equal(first.attributes["color"], second.attributes["color"])
@@ -338,7 +338,7 @@ def test_an_obj_with_colours_has_no_place_for_values(text_mesh, tmp_path):
     path = text_mesh(CUBE.replace("v 1 1 1", "v 1 1 1 1 0 0"))
     with pytest.raises(InputError, match=r"out\.obj: the vertices have colours, .*--color"):
         bake(path, tmp_path / "out.obj")
-    bake(path, tmp_path / "out.obj", samples=4, channel="g")
+    bake(path, tmp_path / "out.obj", samples=4, color="g")
     assert read_mesh(tmp_path / "out.obj").attributes["color"].shape == (8, 3)
 
 

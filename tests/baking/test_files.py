@@ -89,7 +89,7 @@ def test_ply_of_shapes_keeps_normals_that_all_have(tmp_path):
 
 @pytest.mark.parametrize(
     ("channel", "expected"),
-    [("r", [85, 255, 255]), ("b", [255, 255, 85]), ("rgb", [85, 85, 85]), ("a", [255, 255, 255])],
+    [("r", [85, 255, 255]), ("b", [255, 255, 85]), ("replace", [156, 156, 156]), ("a", [255, 255, 255])],
 )
 def test_obscurance_goes_into_the_channel_asked_for(tmp_path, channel, expected):
     write_baked_ply(tmp_path / "a.ply", [shape()], baked(), None, channel)

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from illumcli.color import from_srgb, to_srgb
 from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.color_change import COLOR_CHANGES
 from illumcli.mesh_files.mtl_write import mtl_lines
 from illumcli.mesh_files.obj_write import NamedMesh, extend_obj, read_about, write_obj
 from illumcli.mesh_files.output_mesh import VertexData
@@ -64,13 +66,17 @@ def test_line_ends_are_kept(tmp_path: Path, end: str) -> None:
     assert (tmp_path / "b.obj").read_bytes().startswith(head.encode())
 
 
-def test_a_channel_replaces_one_component_of_the_colours(tmp_path: Path) -> None:
+def test_values_change_the_colours_as_asked(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text("v 0 0 0 1 0.5 0\nv 1 0 0 1 0.5 0\nv 0 1 0\nf 1 2 3\n")
     mesh = read_mesh(tmp_path / "a.obj")
-    data = values(3, color=np.zeros(3, np.uint8), channels=(2,))
-    extend_obj(tmp_path / "b.obj", tmp_path / "a.obj", mesh, data)
-    rows = [line.split()[4:] for line in (tmp_path / "b.obj").read_text().splitlines()[:3]]
-    np.testing.assert_allclose(np.array(rows, float), [[1, 0.5, 0], [1, 0.5, 0.125], [1, 1, 0.25]], atol=1e-6)
+    for name, wanted in {
+        "b": [[1, 0.5, 0], [1, 0.5, 0.125], [1, 1, 0.25]],
+        "replace": [[0, 0, 0], [0.125] * 3, [0.25] * 3],
+        "multiply": [[0, 0, 0], to_srgb(from_srgb(np.array([1, 0.5, 0])) / 8), to_srgb(np.full(3, 0.25))],
+    }.items():
+        extend_obj(tmp_path / "b.obj", tmp_path / "a.obj", mesh, values(3, color=COLOR_CHANGES[name]))
+        rows = [line.split()[4:] for line in (tmp_path / "b.obj").read_text().splitlines()[:3]]
+        np.testing.assert_allclose(np.array(rows, float), wanted, atol=1e-6)
 
 
 def test_meshes_are_read_back_as_they_were(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from illumcli.baking.resume import open_journal, write_beside
 from illumcli.baking.settings import AS_USUAL, BakeJob, BakeOptions, BakeSettings
 from illumcli.baking.texture_files import write_texture
 from illumcli.baking.values import baked_values
-from illumcli.baking.warnings import journal_warnings, warnings_of
+from illumcli.baking.warnings import color_warnings, journal_warnings, warnings_of
 from illumcli.files.journal import Journal, tidy
 from illumcli.files.outputs import refresh
 from illumcli.progress import Progress, no_progress
@@ -70,7 +70,8 @@ def bake_prepared(work: BakeWork, progress: Progress = no_progress) -> tuple[lis
         with closing(open_journal(work.outputs[0], work.content)) as journal:
             values = baked_of(work, due, bake_context(work, progress, journal))
             left_out = write_beside(journal, partial(write_files, work, due, values))
-            warnings = [*warnings_of(values), *pose_warnings(work.path), *journal_warnings(work, journal)]
+            warnings = [*warnings_of(values), *color_warnings(work, due)]
+            warnings += [*pose_warnings(work.path), *journal_warnings(work, journal)]
             journal.remove()
         work.clock.lap("write")
     tidy(work.outputs[0])

@@ -15,6 +15,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.images.contents import image_contents, image_texts
 from illumcli.images.encoded import encoded_image
 from illumcli.mesh_files import obj_write, ply
+from illumcli.mesh_files.color_change import COLOR_CHANGES
 from illumcli.mesh_files.gltf import write as gltf
 from illumcli.mesh_files.gltf.extend import extend_glb
 from illumcli.mesh_files.obj_write import NamedMesh
@@ -27,12 +28,10 @@ from illumcli.visibility.channels import ply_columns
 ASSETS = (".ply", ".glb", ".obj")
 """Files that have everything of the input that their format can hold."""
 SUFFIXES = (".npz", *ASSETS)
-CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
-"""Option -> the channels of red, green, blue, alpha that obscurance is written to."""
 
 
 def write_baked_ply(
-    path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, channel: str | None
+    path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, color: str | None
 ) -> None:
     """Write a PLY with a float property for each name in `Channel.ply`; `quality`, which MeshLab shows, is
     obscurance.
@@ -41,45 +40,45 @@ def write_baked_ply(
     ----------
     source
         A PLY whose content is kept and extended; None to write `meshes`.
-    channel : {"r", "g", "b", "a", "rgb"}, optional
-        Channels in which obscurance is written as 8-bit colour; others are kept, or are white.
+    color : str, optional
+        What obscurance does to the colours of vertices, by the names of `COLOR_CHANGES`.
     """
-    ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, channel), source)
+    ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, color), source)
 
 
 def write_baked_glb(
     path: Path,
     meshes: Sequence[OutputMesh],
     baked: Baked,
-    channel: str | None,
+    color: str | None,
     occlusion: OcclusionMaps = NO_MAPS,
 ) -> None:
-    """Write a GLB with an attribute for each channel: `_OBSCURANCE` and so on; `COLOR_0` only if a `channel`
+    """Write a GLB with an attribute for each channel: `_OBSCURANCE` and so on; `COLOR_0` only if a `color`
     is given, or the meshes have colours."""
-    data = _vertex_data(baked.channels, baked, channel)
+    data = _vertex_data(baked.channels, baked, color)
     gltf.write_glb(path, meshes, data, encoded_image, occlusion)
 
 
 def add_baked_to_glb(
-    path: Path, source: Path, baked: Baked, channel: str | None, occlusion: OcclusionMaps = NO_MAPS
+    path: Path, source: Path, baked: Baked, color: str | None, occlusion: OcclusionMaps = NO_MAPS
 ) -> list[str]:
     """Write a GLB with all that a glTF file has and the attributes of `write_baked_glb`.
 
     Returns the parts of the source that it does not have.
     """
-    return extend_glb(path, source, _vertex_data(baked.channels, baked, channel), occlusion)
+    return extend_glb(path, source, _vertex_data(baked.channels, baked, color), occlusion)
 
 
-def extend_baked_obj(path: Path, source: Path, mesh: Mesh, baked: Baked, channel: str | None) -> None:
-    """Write the lines of an OBJ with obscurance as grey of vertices, or in a `channel` of their colour."""
-    obj_write.extend_obj(path, source, mesh, _vertex_data(baked.channels, baked, channel))
+def extend_baked_obj(path: Path, source: Path, mesh: Mesh, baked: Baked, color: str | None) -> None:
+    """Write the lines of an OBJ with obscurance as grey of vertices, or their colours with its change."""
+    obj_write.extend_obj(path, source, mesh, _vertex_data(baked.channels, baked, color))
 
 
 def write_baked_obj(
-    path: Path, meshes: Sequence[NamedMesh], baked: Baked, channel: str | None, library: str | None
+    path: Path, meshes: Sequence[NamedMesh], baked: Baked, color: str | None, library: str | None
 ) -> None:
     """Write meshes as an OBJ with the colours of `extend_baked_obj`; `library` is its material library."""
-    obj_write.write_obj(path, meshes, _vertex_data(baked.channels, baked, channel), library)
+    obj_write.write_obj(path, meshes, _vertex_data(baked.channels, baked, color), library)
 
 
 def baked_contents(path: Path) -> list[str]:
@@ -120,20 +119,6 @@ def baked_about(path: Path) -> dict[str, Any]:
     return readers[path.suffix.lower()](path)
 
 
-def _vertex_data(columns: Mapping[str, NDArray[np.float32]], baked: Baked, channel: str | None) -> VertexData:
-    at_corners = baked.corner_channels
-    if channel is None:
-        return VertexData(columns, baked.about, corner_columns=at_corners)
-    of_corners = at_corners.get("obscurance")
-    return VertexData(
-        columns,
-        baked.about,
-        _eight_bit(baked.obscurance),
-        CHANNELS[channel],
-        at_corners,
-        None if of_corners is None else _eight_bit(of_corners),
-    )
-
-
-def _eight_bit(w: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return np.rint(w * 255).astype(np.uint8)
+def _vertex_data(columns: Mapping[str, NDArray[np.float32]], baked: Baked, color: str | None) -> VertexData:
+    change = None if color is None else COLOR_CHANGES[color]
+    return VertexData(columns, baked.about, change, baked.corner_channels)

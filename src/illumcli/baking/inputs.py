@@ -122,6 +122,7 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     path, outputs, settings, options = job.path, job.outputs, job.settings, job.options
     refuse_outputs(outputs)
     refuse_textures(outputs, settings)
+    refuse_color(outputs, settings)
     if settings.split and not any(each.suffix.lower() == ".ply" for each in outputs):
         raise InputError("--split belongs to .ply outputs; .glb is split where it must be, .npz has corners")
 
@@ -215,13 +216,23 @@ def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
 def refuse_lost_colors(outputs: Sequence[Path], meshes: Sequence[Mesh], settings: BakeSettings) -> None:
     """Raise InputError for an OBJ that has no place for values, because its vertices have colours."""
     files = [each for each in outputs if each.suffix.lower() == ".obj"]
-    if files and settings.channel is None and any("color" in mesh.attributes for mesh in meshes):
+    if files and settings.color is None and any("color" in mesh.attributes for mesh in meshes):
         raise InputError(
             f"{files[0]}: the vertices have colours, which an OBJ would hold in place of values; "
             "choose a channel with --color, or bake to .npz"
         )
     if files and "ao" not in settings.what:
         raise InputError(f"{files[0]}: an OBJ holds ao; add it to --what")
+
+
+def refuse_color(outputs: Sequence[Path], settings: BakeSettings) -> None:
+    """Raise InputError for a change of colours without values, or without files that have colours."""
+    if settings.color is None:
+        return
+    if "ao" not in settings.what:
+        raise InputError(f"--color {settings.color}: writes ao; add it to --what")
+    if not any(each.suffix.lower() in ASSETS for each in outputs):
+        raise InputError(f"--color {settings.color}: belongs to outputs with colours, {', '.join(ASSETS)}")
 
 
 def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh]) -> None:

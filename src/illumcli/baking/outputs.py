@@ -75,7 +75,7 @@ class _Writer:
 
     def __init__(self, work: BakeWork, baked: Baked, textures: BakedTextures) -> None:
         self._work, self._baked, self._textures = work, baked, textures
-        self._source, self._channel, self._split = work.path, work.settings.channel, work.settings.split
+        self._source, self._color, self._split = work.path, work.settings.color, work.settings.split
         self._is_mesh = is_mesh_file(work.path)
         self._names = (work.path.stem,) if self._is_mesh else work.scene.object_names()
 
@@ -91,12 +91,12 @@ class _Writer:
         if kind == ".glb":
             if source_kind in GLTF:
                 occlusion = occlusion_maps(self._textures, self._work.surfaces)
-                return add_baked_to_glb(path, self._source, self._baked, self._channel, occlusion)
+                return add_baked_to_glb(path, self._source, self._baked, self._color, occlusion)
             return self._write_glb(path)
         if kind == ".obj":
             return self._write_obj(path)
         if source_kind == ".ply" and not self._split:
-            write_baked_ply(path, [], self._baked, self._source, self._channel)
+            write_baked_ply(path, [], self._baked, self._source, self._color)
             return ()
         return self._write_ply(path)
 
@@ -113,7 +113,7 @@ class _Writer:
         elif self._has_materials(meshes):
             left_out.append("materials")
         occlusion = occlusion_maps(self._textures, self._work.surfaces)
-        write_baked_glb(path, meshes, split.baked, self._channel, occlusion)
+        write_baked_glb(path, meshes, split.baked, self._color, occlusion)
         for mesh in meshes:
             wide = [name for name, values in mesh.attributes.items() if not fits_attribute(values)]
             left_out += [f"the vertex property {name} of {mesh.name}" for name in wide]
@@ -128,7 +128,7 @@ class _Writer:
             written = split_meshes(self._names, surfaces, baked, fill=False)
         else:
             written = whole_meshes(self._names, surfaces, baked)
-        write_baked_ply(path, written.meshes, written.baked, None, self._channel)
+        write_baked_ply(path, written.meshes, written.baked, None, self._color)
 
         # What a PLY has no place for.
         left_out = list(written.left_out)
@@ -149,7 +149,7 @@ class _Writer:
     def _write_obj(self, path: Path) -> list[str]:
         """Write an OBJ: the lines of an OBJ with colours, or the meshes, with their materials beside it."""
         placed, force = self._work.surfaces.geometry.placed, self._work.job.options.force
-        channel = self._channel
+        channel = self._color
         if self._source.suffix.lower() == ".obj":
             extend_baked_obj(path, self._source, placed[0].mesh, self._baked, channel)
             copy_materials(path, self._source, force)

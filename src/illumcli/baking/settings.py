@@ -25,7 +25,7 @@ class BakeSettings(Value):
     occluders: tuple[str, ...] = ("scene",)  # as `occluder_choices` takes them
     ground: str | None = None  # as `Ground.of` takes it
     what: tuple[str, ...] = ("ao",)  # words of `--what`, in the order of `channels.whats`
-    channel: str | None = None  # of 8-bit vertex colours
+    color: str | None = None  # of `COLOR_CHANGES`
     split: bool = False  # vertices of a PLY
     texture: tuple[int, int] | None = None  # width and height of textures [texels]
     bits: int = 8  # of textures as PNG

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.baking.context import BakedChannels, PointChannels
+from illumcli.baking.files import ASSETS
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.sampling import MAX_SAMPLES
 from illumcli.baking.texel_points import TexturePoints
 from illumcli.files.journal import Journal
+from illumcli.mesh_files.color_change import COLOR_CHANGES
 
 DARK, MOSTLY = 0.01, 0.9
 """If more than the share `MOSTLY` of the values is below `DARK`, the mesh seems to be inside out."""
@@ -44,6 +49,19 @@ def _of_points(values: PointChannels) -> list[str]:
 def dark_share(w: NDArray[np.float32]) -> float:
     """Share of values below `DARK`."""
     return float(np.mean(w < DARK)) if len(w) else 0.0
+
+
+def color_warnings(work: BakeWork, due: Sequence[Path]) -> list[str]:
+    """A line if vertex colours that the meshes have are replaced."""
+    change = COLOR_CHANGES[work.settings.color or "multiply"]
+    if change.multiplies or not any(path.suffix.lower() in ASSETS for path in due):
+        return []
+    has = "alpha" if change.channels == (3,) else "color"
+    names = zip(work.scene.object_names(), work.surfaces.geometry.placed, strict=True)
+    replaced = [name for name, placed in names if has in placed.mesh.attributes]
+    which = ", ".join(("red", "green", "blue", "alpha")[channel] for channel in change.channels)
+    line = f"--color {work.settings.color}: replaces {which} of the vertex colours of {', '.join(replaced)}"
+    return [line] if replaced else []
 
 
 def journal_warnings(work: BakeWork, journal: Journal) -> list[str]:

@@ -241,9 +241,9 @@ def _request(options: dict[str, Any]) -> BakeRequest:
 )
 @click.option(
     "--color",
-    "channel",
-    type=click.Choice(["r", "g", "b", "a", "rgb"]),
-    help="Also write values as 8-bit vertex colour, into this channel of .ply and .glb.",
+    type=click.Choice(["multiply", "replace", "r", "g", "b", "a"]),
+    help="What obscurance does to vertex colours: multiply, replace, or fill a channel. By default they "
+    "are kept.",
 )
 @click.option(
     "--split",

@@ -92,20 +92,24 @@ def _write(path: Path, lines: Iterable[bytes], data: VertexData) -> None:
 
 
 def _colors(meshes: Sequence[Mesh], data: VertexData) -> list[bytes]:
-    """The colour of each vertex as text: grey of the value, or that of the mesh with channels replaced."""
-    w = data.columns["obscurance"].astype(np.float64)
-    if not data.channels:
+    """The colour of each vertex as text: the value as it is, or the mesh's sRGB colour with the change."""
+    w, change = data.columns["obscurance"].astype(np.float64), data.color
+    if change is None:
         return [b"%.9g %.9g %.9g" % (each, each, each) for each in w.tolist()]
-    count = 4 if 3 in data.channels or any("alpha" in mesh.attributes for mesh in meshes) else 3
+    count = 4 if 3 in change.channels or any("alpha" in mesh.attributes for mesh in meshes) else 3
     colors = np.ones((len(w), count))
     first = 0
     for mesh in meshes:
         rows = slice(first, first := first + len(mesh.vertices))
         if "color" in mesh.attributes:
-            colors[rows, :3] = to_srgb(np.clip(mesh.attributes["color"].astype(np.float64), 0, 1))
+            colors[rows, :3] = np.clip(mesh.attributes["color"], 0, 1)
         if "alpha" in mesh.attributes:
             colors[rows, 3] = mesh.attributes["alpha"]
-    colors[:, data.channels] = w[:, None]
+    if change.multiplies:
+        colors = change.applied(colors, w)
+    colors[:, :3] = to_srgb(colors[:, :3])
+    if not change.multiplies:  # values are plain numbers
+        colors = change.applied(colors, w)
     form = b" ".join([b"%.9g"] * count)
     return [form % tuple(row) for row in colors.tolist()]
 

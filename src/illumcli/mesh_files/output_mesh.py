@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.files.seal import BLANK
+from illumcli.mesh_files.color_change import ColorChange
 from illumcli.mesh_files.pbr import PbrMaterial
 from illumcli.records import Record
 
@@ -40,11 +41,9 @@ class VertexData(Record):
 
     columns: Mapping[str, NDArray[np.float32]]  # (V,) or (V, k) by name
     about: Mapping[str, Any]  # JSON metadata
-    color: NDArray[np.uint8] | None = None  # (V,) linear, written into the colour channels `channels`
-    channels: tuple[int, ...] = ()  # of 0 red, 1 green, 2 blue, 3 alpha
+    color: ColorChange | None = None  # what the column `obscurance` does to colours
     corner_columns: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     """(C,) or (C, k) by the names of columns, where vertices have several values."""
-    corner_color: NDArray[np.uint8] | None = None  # (C,)
 
     def sealed_about(self) -> dict[str, Any]:
         """`about`, with a placeholder for the file's own hash."""

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.arrays import Floats
 from illumcli.color import from_srgb, to_srgb
 from illumcli.errors import InputError
 from illumcli.files.atomic import AtomicFile
@@ -38,6 +39,7 @@ from illumcli.records import Value
 
 _NORMAL = ("nx", "ny", "nz")
 _UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _TEXTURE = re.compile(rb"comment[ \t]+texturefile[ \t]([^\r\n]*)", re.IGNORECASE)
 _CORNERS = ("vertex_indices", "vertex_index")
@@ -344,7 +346,7 @@ def _with_columns(element: Any, data: VertexData, added: Mapping[str, NDArray[An
     """The element with columns and the colour of `data` added; properties of the same name are replaced."""
     from plyfile import PlyElement, PlyProperty
 
-    columns = dict(added) | _colors(element.data.dtype.names, data)
+    columns = dict(added) | _colors(element.data, data)
     if not columns:
         return element
     kept = [each for each in element.properties if each.name not in columns]
@@ -354,25 +356,46 @@ def _with_columns(element: Any, data: VertexData, added: Mapping[str, NDArray[An
         table[each.name] = element.data[each.name]
     for name, values in columns.items():
         table[name] = values
-    properties = [
-        PlyProperty(name, "uchar" if each.dtype == np.uint8 else "float") for name, each in columns.items()
-    ]
+    properties = [PlyProperty(name, each.dtype.str[1:]) for name, each in columns.items()]
     new = PlyElement("vertex", [*kept, *properties], len(table), list(element.comments))
     new.data = table
     return new
 
 
-def _colors(present: Sequence[str], data: VertexData) -> dict[str, NDArray[np.uint8]]:
-    """Columns of the colour of `data`; red, green and blue that are not present become white."""
+def _colors(vertex: NDArray[Any], data: VertexData) -> dict[str, NDArray[Any]]:
+    """The colours of vertices with the change of `data`, by property; bytes, or of the type that they have.
+
+    A number packed into one channel is a share of the type's largest value, colours of integers are sRGB.
+    """
     if data.color is None:
         return {}
-    columns = {}
-    for channel, name in enumerate(("red", "green", "blue", "alpha")):
-        if channel in data.channels:
-            columns[name] = data.color
-        elif name not in present and channel < 3:
-            columns[name] = np.full(len(data.color), 255, np.uint8)
-    return columns
+    present = vertex.dtype.names or ()
+    names = next((names for names in _COLORS if set(names) <= set(present)), _COLORS[0])
+    w = data.columns["obscurance"]
+    if data.color.is_packed:
+        white = {name: np.full(len(w), 255, np.uint8) for name in names if name not in present}
+        name = (*names, "alpha")[data.color.channels[0]]
+        return white | {name: _shares(w, _kind(vertex[name]) if name in present else BYTE)}
+    colors: Floats = np.ones((len(w), 3))
+    kind = BYTE
+    if set(names) <= set(present):
+        given = np.stack([vertex[name] for name in names], axis=1)
+        colors, kind = _color(given.astype(np.float64), given.dtype), _kind(given)
+    colors = data.color.applied(colors, w)
+    code = colors if kind.kind == "f" else to_srgb(np.clip(colors, 0, 1))
+    return {name: _shares(column, kind) for name, column in zip(names, code.T, strict=True)}
+
+
+def _kind(values: NDArray[Any]) -> np.dtype[Any]:
+    """The type in which changed colours are written: that which they have, unless bytes hold them."""
+    largest = values.max(initial=0)
+    fits = 1 < largest <= 255 or (values.dtype.kind != "f" and largest <= 255)
+    return BYTE if fits else values.dtype.newbyteorder("=")
+
+
+def _shares(values: Floats, kind: np.dtype[Any]) -> NDArray[Any]:
+    """Values in [0, 1] in a type; integers hold shares of its largest value."""
+    return values.astype(kind) if kind.kind == "f" else np.rint(np.iinfo(kind).max * values).astype(kind)
 
 
 def _joined(meshes: Sequence[OutputMesh]) -> dict[str, NDArray[Any]]:

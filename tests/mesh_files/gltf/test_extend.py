@@ -12,6 +12,7 @@ from gltf_validator import faults
 from illumcli.geometry.mesh import Mesh
 from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.color_change import COLOR_CHANGES
 from illumcli.mesh_files.gltf.accessors import stored, table
 from illumcli.mesh_files.gltf.document import Document, open_document
 from illumcli.mesh_files.gltf.extend import extend_glb
@@ -290,9 +291,8 @@ def test_sparse_tables_are_kept(tmp_path: Path, Scene: Any) -> None:
 
 def test_colour_channels_are_replaced_and_the_others_kept(tmp_path: Path, Scene: Any) -> None:
     source = whole(Scene()).write(tmp_path / "a.glb")
-    color = np.array([0, 85, 170, 255], np.uint8)
-    _, mesh, _ = extended(source, color=color, channels=(1,))
-    np.testing.assert_allclose(mesh.attributes["color"][:, 1], color / 255, rtol=1e-6)
+    _, mesh, _ = extended(source, color=COLOR_CHANGES["g"])
+    np.testing.assert_allclose(mesh.attributes["color"][:, 1], [0, 1 / 3, 2 / 3, 1], rtol=1e-6)
     assert mesh.attributes["color"][:, 0].tolist() == [1, 0, 0, 1]
     assert mesh.attributes["color"][:, 2].tolist() == [0, 0, 1, 1]
     assert faults(tmp_path / "out.glb") == []

@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from illumcli.mesh_files.color_change import ColorChange
 from illumcli.mesh_files.gltf.document import Document, extensions, open_document
 from illumcli.mesh_files.gltf.embed import embedded
 from illumcli.mesh_files.gltf.glb_writer import VERTICES, GlbWriter
 from illumcli.mesh_files.gltf.instances import distinct_meshes, forget_extension
 from illumcli.mesh_files.gltf.placed_values import PrimitiveValues, placed_values
-from illumcli.mesh_files.gltf.reindex import reindex, vertex_colors
+from illumcli.mesh_files.gltf.reindex import reindex
 from illumcli.mesh_files.gltf.set_occlusion import set_occlusion
+from illumcli.mesh_files.gltf.vertex_colors import vertex_colors, write_colors
 from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import TEXTURE_UV, VertexData
 from illumcli.mesh_files.split import split_vertices
 
+OBSCURANCE = "_OBSCURANCE"
 COMPRESSION = "KHR_draco_mesh_compression"
 
 
@@ -58,7 +61,7 @@ def extend_glb(path: Path, source: Path, data: VertexData, occlusion: OcclusionM
             if COMPRESSION in extensions(primitive):
                 del primitive["extensions"][COMPRESSION]
                 left_out.append(f"the compressed form of primitives ({COMPRESSION})")
-            left_out += _add_values(document, writer, primitive, values, data.channels, owned)
+            left_out += _add_values(document, writer, primitive, values, data.color, owned)
             by_slot.setdefault(values.material, []).append(primitive)
 
     # Add the textures, all for one uv set.
@@ -76,15 +79,15 @@ def _add_values(
     writer: GlbWriter,
     primitive: dict[str, Any],
     values: PrimitiveValues,
-    channels: tuple[int, ...],
+    color: ColorChange | None,
     owned: set[int],
 ) -> list[str]:
     """Add values to a primitive. Returns the attributes that it loses.
 
     Parameters
     ----------
-    channels
-        Of the colour that receive `COLOR_0` of the values.
+    color
+        What obscurance does to `COLOR_0`.
     owned
         Accessors that may be replaced.
     """
@@ -95,17 +98,17 @@ def _add_values(
     tables = [each.reshape(len(corners), -1) for each in values.at_corners.values()]
     split = split_vertices(corners, count, tables)
     attributes = primitive["attributes"]
-    former = {name: attributes.pop(name, None) for name in values.columns if name != "COLOR_0"}
+    former = {name: attributes.pop(name, None) for name in values.columns}
     if len(split.source) > count:
         left_out += reindex(document, writer, primitive, split.source, split.of_corner)
 
     # Add the columns.
-    for name, column in split.columns(values.columns, values.at_corners).items():
-        if name == "COLOR_0":
-            colors = vertex_colors(document, attributes, len(column))
-            colors[:, channels] = column[:, None] / 255
-            attributes[name] = writer.table(np.rint(255 * colors).astype(np.uint8), VERTICES, normalized=True)
-        elif (number := former[name]) in owned:
+    columns = split.columns(values.columns, values.at_corners)
+    if color is not None:
+        colors, kind = vertex_colors(document, attributes, len(columns[OBSCURANCE]))
+        write_colors(writer, attributes, color.applied(colors, columns[OBSCURANCE]), kind)
+    for name, column in columns.items():
+        if (number := former[name]) in owned:
             writer.replace_table(number, column.astype(np.float32), VERTICES)
             attributes[name] = number
         else:

@@ -43,11 +43,6 @@ def placed_values(
     corner_columns: dict[str, NDArray[Any]] = {
         f"_{name.upper()}": each for name, each in data.corner_columns.items()
     }
-    if data.color is not None:
-        columns["COLOR_0"] = data.color
-    if data.corner_color is not None:
-        corner_columns["COLOR_0"] = data.corner_color
-
     if texture_uvs is not None:
         corner_columns[TEXTURE_UV] = texture_uvs * [1, -1] + [0, 1]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
-from illumcli.mesh_files.gltf.accessors import stored, table
+from illumcli.mesh_files.gltf.accessors import stored
 from illumcli.mesh_files.gltf.document import Document, printable
 from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter
 
@@ -58,12 +58,3 @@ def reindex(
 def fitting(indices: NDArray[Any], count: int) -> NDArray[Any]:
     """Indices into `count` vertices in a type whose largest value, which is reserved, is not in use."""
     return indices.astype(np.uint16 if count < 65536 else np.uint32)
-
-
-def vertex_colors(document: Document, attributes: dict[str, Any], count: int) -> NDArray[np.float64]:
-    """(N, 4) linear colours of vertices, white and opaque if they have none."""
-    colors = np.ones((count, 4))
-    if "COLOR_0" in attributes:
-        rows = table(document, attributes["COLOR_0"], (3, 4), fractions=True)
-        colors[:, : rows.shape[1]] = rows
-    return colors

@@ -13,6 +13,7 @@ from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.glb_writer import INDICES, VERTICES, GlbWriter, appended
 from illumcli.mesh_files.gltf.pbr import Encoded, MaterialWriter
 from illumcli.mesh_files.gltf.reindex import fitting
+from illumcli.mesh_files.gltf.vertex_colors import write_colors
 from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import (
     STANDARD,
@@ -159,11 +160,13 @@ def _add_values(
     for name, column in data.columns.items():
         attributes[f"_{name.upper()}"] = writer.table(column[rows].astype(np.float32), VERTICES)
     if data.color is not None:
-        color = np.full((len(vertices), 4), 255, np.uint8)
+        colors = np.ones((len(vertices), 4))
+        kind: np.dtype[Any] = np.dtype(np.float32 if "color" in mesh.attributes else np.uint8)
         if "color" in mesh.attributes:
-            color[:, :3] = np.rint(255 * np.clip(mesh.attributes["color"][vertices], 0, 1))
-        color[:, data.channels] = data.color[rows, None]
-        attributes["COLOR_0"] = writer.table(color, VERTICES, normalized=True)
+            colors[:, :3] = mesh.attributes["color"][vertices]
+        if "alpha" in mesh.attributes:
+            colors[:, 3] = mesh.attributes["alpha"][vertices]
+        write_colors(writer, attributes, data.color.applied(colors, data.columns["obscurance"][rows]), kind)
 
 
 def read_about(path: Path) -> dict[str, Any]:

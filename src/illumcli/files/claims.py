@@ -66,7 +66,7 @@ class Claims:
     def _created(self, path: Path) -> int | None:
         """The descriptor of a new claim, or of one that is taken over; None if another process holds it."""
         try:
-            handle = created(path, 0o644)
+            handle = _new(path)
         except FileExistsError:
             about = os.lstat(path)
             if not stat.S_ISREG(about.st_mode) or about.st_uid != os.geteuid():
@@ -92,7 +92,7 @@ class Claims:
                 self._seen[path] = touched, now
             elif now - since > STALE:
                 path.unlink()
-                return created(path, 0o644)
+                return _new(path)
         except (FileNotFoundError, FileExistsError):  # removed just now, or a third process was faster
             pass
         return None
@@ -163,6 +163,22 @@ def tidy(folder: Path) -> None:
                 os.close(handle)
                 remove_left_over(folder, again=True)
     _tidied.add(folder)
+
+
+def _new(path: Path) -> int:
+    """The descriptor of a new claim.
+
+    Raises
+    ------
+    OSError
+        FileExistsError if another process holds it.
+    """
+    track(path)  # before it exists, because a signal may interrupt at any point
+    try:
+        return created(path, 0o644)
+    except OSError:
+        untrack(path)
+        raise
 
 
 def _stale(path: Path) -> int | None:

@@ -117,6 +117,13 @@ class Client:
             assert self.process.poll() is None, self.process.communicate()
             time.sleep(0.02)
 
+    def read_until(self, text: str) -> str:
+        """The line of its errors that has this text; waits for it."""
+        for line in self.process.stderr:
+            if text in line:
+                return line
+        raise AssertionError(f"ended without a word of '{text}'")
+
     def finish(self, code: int = 0, seconds: float = 100) -> str:
         """The errors that it printed."""
         errors = self.process.communicate(timeout=seconds)[1]

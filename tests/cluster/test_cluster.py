@@ -8,12 +8,14 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
+from math import inf
 
 import pytest
 
 from cluster.machines import HIDDEN
 from illumcli.cluster.address import Address, address_of
-from illumcli.cluster.facts import facts, refuse_differences
+from illumcli.cluster.block import Block, block_size
+from illumcli.cluster.facts import differences, facts
 from illumcli.errors import InputError
 
 SWEEP = ["sweep", "s.yaml", "-D", "materials.clay.exponent=1:100:6", "--no-cache"]
@@ -60,16 +62,30 @@ def test_addresses_that_name_no_cluster_are_refused(text):
         address_of(text)
 
 
-def test_workers_that_differ_are_named_with_what_differs():
+def test_what_differs_between_a_worker_and_the_client():
     own = facts()
-    refuse_differences(own, {"a:1": own})
-    with pytest.raises(InputError) as caught:
-        refuse_differences(
-            own, {"tcp://a:1": own, "tcp://b:2": {**own, "numpy": "1.0", "instructions": "AVX"}}
-        )
-    assert len(caught.value.problems) == 3
-    assert "worker tcp://b:2: has numpy 1.0, this process" in str(caught.value)
-    assert "--mixed-workers" in str(caught.value)
+    assert differences(own, own) == ()
+    assert differences({**own, "numpy": "1.0"}, own) == (f"has numpy 1.0, not {own['numpy']}",)
+    without = {name: value for name, value in own.items() if name != "instructions"}
+    assert differences(without, own) == (f"has instructions of no known version, not {own['instructions']}",)
+    assert differences(own, {}) == ()
+
+
+@pytest.mark.parametrize(
+    ("left", "workers", "seconds", "size"),
+    [(200, 2, inf, 1), (200, 2, 0.05, 20), (200, 2, 0.01, 25), (200, 2, 3.0, 1), (3, 2, 0.01, 1)],
+)
+def test_a_block_takes_a_second_and_the_last_ones_are_small(left, workers, seconds, size):
+    assert block_size(left, workers, seconds) == size
+
+
+def test_workers_that_may_do_a_block():
+    both = frozenset({"a", "b"})
+    assert Block((1,)).among(both) == both
+    assert Block((1,), failed_on=frozenset({"a"})).among(both) == {"b"}
+    assert Block((1,), failed_on=both).among(both) == both
+    assert Block((1,), asker="a").among(both) == {"a"}
+    assert Block((1,), asker="c").among(both) == both
 
 
 def test_local_workers_write_the_same_files(scene, expected):

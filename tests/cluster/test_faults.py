@@ -17,8 +17,9 @@ from cluster.machines import COUNT, Client, is_clean, pictures
 pytestmark = pytest.mark.parametrize(
     "turn", [0, *(pytest.param(turn, marks=pytest.mark.slow) for turn in range(1, 10))]
 )
-LITTLE_MEMORY = ["prlimit", "--as=700000000"]
+LITTLE_MEMORY = ["prlimit", "--as=500000000"]
 """Enough for a worker to start, too little for a large picture."""
+LARGE = "film={width: 1000, height: 800, samples: 1}"
 
 
 def kill(process):
@@ -71,7 +72,7 @@ def test_a_scheduler_that_is_started_again_gets_the_rest(scene, expected, machin
     time.sleep(1)
     machines.start_scheduler()
     machines.start_worker()
-    client.finish()  # Dask may connect again before the client sees that it was lost
+    assert client.finish().count("the scheduler is lost") == 1
     check(machines, scene, expected, again=1, kept=1)
 
 
@@ -119,6 +120,17 @@ def test_a_variant_of_which_all_workers_die_is_named(scene, machines, turn):
     words = ["-D", "film.width=9000", "-D", "film.height=9000"]
     errors = Client(scene.parent, "--cluster", machines.address, *words).finish(4)
     assert "exponent 1: " in errors
+
+
+def test_a_worker_with_little_memory_beside_another(scene, machines, turn):
+    Client(scene.parent, "-D", LARGE).finish()
+    expected = pictures(scene.parent)
+    for name in expected:
+        (scene.parent / name).unlink()
+    machines.start_worker(LITTLE_MEMORY)
+    machines.start_worker()
+    Client(scene.parent, "-D", LARGE, "--cluster", machines.address).finish()
+    check(machines, scene, expected, again=COUNT)
 
 
 def test_a_full_disk_of_a_worker_without_a_shared_folder(scene, expected, machines, turn):

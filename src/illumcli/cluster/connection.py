@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
 
+from illumcli.cluster import local
 from illumcli.cluster.address import Address
 from illumcli.cluster.handshake import address_in, shake_hands
 from illumcli.errors import IllumError, InputError
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
+    from distributed import Client, Future, LocalCluster, WorkerPlugin
 
 PATIENCE = 300.0
 """Seconds that a lost scheduler, or the first worker, is waited for."""
 TIMEOUT = 15.0
 """Seconds that one attempt to connect takes at most."""
-IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
-"""What local workers run first: an interrupt reaches all processes of a terminal; the client handles it."""
-LONGEST_TASK = "24 hours"
-"""Silence after which a local worker counts as dead. Whether its process lives is seen at once."""
+LOOK = 0.25
+"""Seconds between two looks at which workers are there."""
+
+
+LOST = "--cluster: the scheduler is lost"
+
+
+class SchedulerLost(IllumError):
+    """The scheduler is gone, and with it all tasks that it had."""
 
 
 class Connection:
-    """A client of a cluster, which is started here if its address is local."""
+    """A client of a cluster, which is started here if its address is local.
+
+    Its methods raise `SchedulerLost` if the scheduler is gone; `reconnect` waits for it, or for another.
+    """
 
     def __init__(self, address: Address, tell: Callable[[str], None]) -> None:
         try:
@@ -46,27 +55,12 @@ class Connection:
             }
         )
         self._address, self._distributed, self._tell = address, distributed, tell
-        self._cluster: LocalCluster | None = self._started() if address.local else None
-        self.client: Client = self._connected(until=time.monotonic())
-        scheduler = str(self.client.scheduler_info()["address"])
+        self._outcomes: SimpleQueue[tuple[Future, Any]] = SimpleQueue()
+        self._cluster: LocalCluster | None = local.started(address.local) if address.local else None
+        self._client: Client = self._connected(until=time.monotonic())
+        scheduler = str(self._client.scheduler_info()["address"])
         if not address.local and not scheduler.startswith("tls://"):
             tell(f"{scheduler}: without TLS; who reaches this scheduler can run code on it and its workers")
-
-    def _started(self) -> LocalCluster:
-        """Worker processes on this machine, which nobody reaches from others."""
-        import dask
-
-        dask.config.set({"distributed.scheduler.worker-ttl": LONGEST_TASK})
-        return self._distributed.LocalCluster(
-            n_workers=self._address.local,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # no fixed port, which others may have
-            silence_logs=logging.CRITICAL,
-            preload=[IGNORE_INTERRUPTS],
-        )
 
     def _connected(self, until: float) -> Client:
         """A client; attempts are repeated until this time.
@@ -100,19 +94,24 @@ class Connection:
         shake_hands(scheduler, TIMEOUT)
         return scheduler
 
-    @property
-    def is_lost(self) -> bool:
-        """True if the scheduler is gone."""
-        return self.client.status != "running"
-
     def reconnect(self) -> None:
-        """Connect to the scheduler that took the place of the lost one."""
-        self._tell(f"the scheduler is lost; waiting up to {PATIENCE:.0f} s for it or another in its place")
-        self.client.close(timeout=1)
-        self.client = self._connected(time.monotonic() + PATIENCE)
+        """Connect to the scheduler that took the place of the lost one.
 
-    def workers(self) -> list[str]:
-        """The addresses of all workers, of which there is at least one.
+        Raises
+        ------
+        IllumError
+            There is none.
+        """
+        self._tell(f"the scheduler is lost; waiting up to {PATIENCE:.0f} s for it or another in its place")
+        self._client.close(timeout=1)
+        self._client = self._connected(time.monotonic() + PATIENCE)
+
+    @property
+    def _is_lost(self) -> bool:
+        return bool(self._client.status != "running")
+
+    def workers(self) -> frozenset[str]:
+        """The addresses of all workers; waits for one if there is none.
 
         Raises
         ------
@@ -120,28 +119,73 @@ class Connection:
             No worker came.
         """
         began, is_told = time.monotonic(), False
-        while not (workers := list(self.client.scheduler_info(n_workers=-1)["workers"])):
+        while True:
+            about = self._client.scheduler_info(n_workers=-1)
+            if self._is_lost:
+                raise SchedulerLost(LOST)
+            if workers := frozenset(about["workers"]):
+                return workers
             waited = time.monotonic() - began
             if waited > PATIENCE:
                 raise IllumError("--cluster: the scheduler has no workers; start some")
             if waited > TIMEOUT and not is_told:
                 self._tell(f"the scheduler has no workers; waiting up to {PATIENCE:.0f} s for one")
                 is_told = True
-            time.sleep(0.2)
-        return workers
+            time.sleep(LOOK)
+
+    def register(self, plugin: WorkerPlugin) -> None:
+        """Give all workers a plugin, also those that come later."""
+        with self._request():
+            self._client.register_plugin(plugin)
+
+    def submit(self, function: Callable[..., Any], *arguments: object, **options: Any) -> Future:
+        """Give a task to the scheduler; `outcomes` brings its result."""
+        with self._request():
+            future = self._client.submit(function, *arguments, **options)
+        assert self._client.loop is not None
+        self._client.loop.add_callback(self._fetch, self._client, future)
+        return future
+
+    async def _fetch(self, client: Client, future: Future) -> None:
+        """Wait for the result of a task; results on a worker that stands still delay no others."""
+        try:
+            outcome = await client.gather(future, asynchronous=True)
+        except Exception as error:
+            outcome = error
+        self._outcomes.put((future, outcome))
+
+    def outcomes(self) -> Iterator[tuple[Future, Any]]:
+        """Tasks that are done with their results, or their errors; waits a little for the first."""
+        seconds = LOOK
+        with suppress(Empty):
+            while True:
+                future, outcome = self._outcomes.get(timeout=seconds)
+                # Dask may have connected again by itself: what it had before is cancelled
+                if isinstance(outcome, (OSError, self._distributed.CancelledError)):
+                    outcome = SchedulerLost(f"{LOST}: {outcome}")
+                yield future, outcome
+                seconds = 0
+
+    def cancel(self, future: Future) -> None:
+        """Take a task back."""
+        with self._request():
+            future.cancel()
+
+    @contextmanager
+    def _request(self) -> Iterator[None]:
+        """Raise SchedulerLost instead of the errors of requests to a scheduler that is gone."""
+        try:
+            yield
+        except (OSError, self._distributed.CancelledError) as error:
+            raise SchedulerLost(f"{LOST}: {error}") from error
 
     def close(self, plugin: str) -> None:
         """End the connection, and the workers that were started here; others give up this plugin."""
-        if self._cluster is None and not self.is_lost:
-            with suppress(OSError, TimeoutError, ValueError):  # never registered, or the scheduler is gone
-                self.client.unregister_worker_plugin(plugin)
-        self.client.close(timeout=2)
+        scheduler = self._client.scheduler
+        if self._cluster is None and scheduler is not None and not self._is_lost:
+            # a worker may stand still; the scheduler be gone; the plugin not be registered yet
+            with suppress(OSError, ValueError):
+                self._client.sync(scheduler.unregister_worker_plugin, name=plugin, callback_timeout=TIMEOUT)
+        self._client.close(timeout=2)
         if self._cluster is not None:
             self._cluster.close(timeout=5)
-
-
-def threads_of(address: Address, threads: int | None) -> int | None:
-    """Threads of each worker: as asked for; the cores of this machine are shared among local ones."""
-    if threads is None and address.local:
-        return max(1, len(os.sched_getaffinity(0)) // address.local)
-    return threads

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from importlib import import_module
 
 from illumcli import __version__
-from illumcli.errors import InputError
 from illumcli.versions import versions
 
 CLASSES = {"AVX512_SKX": "AVX-512", "AVX2": "AVX2", "AVX": "AVX", "SSE42": "SSE4.2", "ASIMD": "NEON"}
 """Feature of a processor -> the class of instructions that Embree and numpy choose by it, widest first."""
 ADVICE = (
-    "install the same versions, and use processors of one class; or give --mixed-workers, and the last digits"
-    " of pixels depend on who renders them"
+    "install the client's versions on all workers, and use processors of its class; or give --mixed-workers,"
+    " and the last digits of pixels depend on who renders them"
 )
 WITHOUT_EFFECT = ("python", "pydantic")
 """Versions that no pixel depends on."""
@@ -34,19 +33,10 @@ def instruction_class() -> str:
     return next((name for feature, name in CLASSES.items() if features.get(feature)), "scalar")
 
 
-def refuse_differences(own: Mapping[str, str], others: Mapping[str, Mapping[str, str]]) -> None:
-    """Raise InputError if a worker differs from this process.
-
-    Parameters
-    ----------
-    others : mapping
-        Address of a worker -> its facts.
-    """
-    problems = [
-        f"worker {address}: has {name} {its.get(name, 'of no known version')}, this process {value}"
-        for address, its in others.items()
-        for name, value in own.items()
-        if its.get(name) != value
-    ]
-    if problems:
-        raise InputError([*problems, ADVICE])
+def differences(own: Mapping[str, str], wanted: Mapping[str, str]) -> tuple[str, ...]:
+    """How the facts of a worker differ from those of the client."""
+    return tuple(
+        f"has {name} {own.get(name, 'of no known version')}, not {value}"
+        for name, value in wanted.items()
+        if own.get(name) != value
+    )

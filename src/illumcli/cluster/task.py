@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import platform
 import shutil
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field, replace
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, cast
 from distributed import WorkerPlugin, get_worker
 
 from illumcli.baking.occluder_choice import with_files_at
-from illumcli.cluster.facts import ADVICE, facts
+from illumcli.cluster.facts import differences, facts
 from illumcli.cluster.inputs import Mirror, is_shared
 from illumcli.commands.options import RenderJob
 from illumcli.commands.unit import Unit, Worker
@@ -47,8 +47,7 @@ class Command(Value):
     token: Mapping[Path, str]
     """Files of the client by their hashes: a worker that sees them shares its file system."""
     facts: Mapping[str, str]
-    is_mixed: bool
-    """True if workers may differ from the client."""
+    """Those of the client that workers must share."""
     allowed: str
     """The client's ILLUM_ALLOW."""
 
@@ -74,8 +73,10 @@ class BlockResult(Value):
     """True if nothing was done: the worker does not see the client's files."""
     lacking: tuple[Path, ...] = ()
     """Files that it is known to need first."""
-    refusal: str = ""
-    """How the worker differs from the client, if it may not."""
+    seconds: float = 0.0
+    """What they took."""
+    differences: tuple[str, ...] = ()
+    """How the worker differs from the client, if it may not: nothing was done."""
     fault: str = ""
     """Traceback of a fault of the program. Dask's client waits for ever for errors that cannot be pickled."""
 
@@ -125,22 +126,11 @@ class CommandPlugin(WorkerPlugin):
         if self.mirror is not None:
             shutil.rmtree(self.mirror.root, ignore_errors=True)
 
-    def refusal(self) -> str:
-        """How this process differs from the client; an empty text if it may do so, or does not."""
-        own, wanted = facts(), self.command.facts
-        differing = [
-            f"{name} is {own.get(name)}, not {value}"
-            for name, value in wanted.items()
-            if own.get(name) != value
-        ]
-        if not differing or self.command.is_mixed:
-            return ""
-        return f"worker {platform.node()}: {'; '.join(differing)}; {ADVICE}"
-
 
 def do(
     command: Command,
     units: Sequence[Unit],
+    following: Unit | None,
     digests: Mapping[Path, str] | None,
     contents: Mapping[Path, bytes] | None,
 ) -> BlockResult:
@@ -150,6 +140,8 @@ def do(
     ----------
     command : Command
         Workers of a scheduler that was started again do not know it yet.
+    following : Unit, optional
+        What is likely to come next: buffers that it reads, too, stay in memory.
     digests : mapping, optional
         Every file that the units read, and its hash; not given until a worker lacks files.
     contents : mapping, optional
@@ -158,8 +150,9 @@ def do(
     dask_worker = get_worker()
     address = dask_worker.address
     plugin = cast(CommandPlugin, dask_worker.plugins.setdefault(command.name, CommandPlugin(command)))
-    if refusal := plugin.refusal():
-        return BlockResult(address, refusal=refusal)
+    if differing := differences(facts(), command.facts):
+        return BlockResult(address, differences=differing)
+    began = time.perf_counter()
     try:
         with plugin.entered(dask_worker.local_directory) as worker:
             if (mirror := plugin.mirror) is not None:
@@ -168,27 +161,30 @@ def do(
                 if digests is None or lacking:
                     return BlockResult(address, lacks_files=True, lacking=tuple(lacking))
                 units = [_mirrored(unit, mirror) for unit in units]
-            done = _all_done(plugin, worker, units)
+                following = following and _mirrored(following, mirror)
+            done = _all_done(plugin, worker, units, following)
             worker.finish()
     except Exception as error:
         if known(error) is None:
             return BlockResult(address, fault="".join(format_exception(error)))
         done = (_failed(error, has_own_disk=True),) * len(units)
-    return BlockResult(address, done)
+    return BlockResult(address, done, seconds=time.perf_counter() - began)
 
 
-def _all_done(plugin: CommandPlugin, worker: Worker, units: Sequence[Unit]) -> tuple[UnitResult, ...]:
+def _all_done(
+    plugin: CommandPlugin, worker: Worker, units: Sequence[Unit], following: Unit | None
+) -> tuple[UnitResult, ...]:
     """The results of units in their order, until the client ends.
 
     Buffers that the next one reads stay in memory.
     """
     done, work = [], _prepared(worker, units[0])
-    for upcoming in (*units[1:], None):
+    for unit in (*units[1:], following):
         if plugin.is_ended:
             break
-        following = None if upcoming is None else _prepared(worker, upcoming)
-        done.append(work if isinstance(work, UnitResult) else _done(worker, work, following, plugin.mirror))
-        work = following or work
+        upcoming = None if unit is None else _prepared(worker, unit)
+        done.append(work if isinstance(work, UnitResult) else _done(worker, work, upcoming, plugin.mirror))
+        work = upcoming or work
     return tuple(done)
 
 

@@ -13,6 +13,7 @@ import pytest
 from illumcli.geometry.shapes.torus import Torus
 
 SCRIPTS = {
+    "clusters": "same bytes: 8 of 8",
     "startup": "ratio tiny render / six libraries",
     "stages": "beside the job",
     "threads": "what the machine gives",

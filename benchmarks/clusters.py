@@ -24,7 +24,8 @@ def main() -> None:
     options.add_argument("--small", action="store_true", help="see that it runs")
     options.add_argument("--repeats", type=int, default=REPEATS)
     said = options.parse_args()
-    header("sweep by a local cluster / by one process", variants=said.variants, repeats=said.repeats)
+    question = "what does a sweep by two local workers of one thread take, against a process of two threads?"
+    header(question, variants=said.variants, repeats=said.repeats)
     with tempfile.TemporaryDirectory() as folder:
         for width, height in SIZES:
             film = f"film={{width: {width}, height: {height}, samples: 4}}"

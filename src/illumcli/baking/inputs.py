@@ -32,6 +32,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
 from illumcli.geometry.scene_geometry import SceneGeometry, corner_normals
 from illumcli.mesh_files import companions, is_mesh_file
+from illumcli.mesh_files.gltf.extend import copyable
 from illumcli.records import Record
 from illumcli.render_graph.build import build
 from illumcli.render_graph.costs import BYTES
@@ -141,6 +142,8 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     if is_mesh_file(path) and any(each.suffix.lower() in ASSETS for each in outputs):
         content = digest((content, FileFingerprint(lambda: path, companions)))
     refuse_lost_colors(outputs, meshes, settings)
+    if path.suffix.lower() in (".glb", ".gltf") and any(each.suffix.lower() == ".glb" for each in outputs):
+        copyable(path)
     if options.strict:
         refuse_repairs(str(path), repairs)
     slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)

@@ -33,8 +33,9 @@ def copy_materials(path: Path, source: Path, force: bool) -> None:
     """
     libraries = obj.libraries(source)
     images = [image for library in libraries for image in mtl.images(library, source.parent)]
-    for file in (*libraries, *images):
-        _put(path.parent / file.relative_to(source.parent), content(file), force)
+    folder = source.parent.resolve()
+    for file in (*libraries, *images):  # all of them in the folder or below it, links followed
+        _put(path.parent / file.resolve().relative_to(folder), content(file), force)
 
 
 def write_materials(path: Path, meshes: Sequence[Mesh], force: bool) -> str | None:

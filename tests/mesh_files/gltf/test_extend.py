@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from gltf_validator import faults
+from illumcli.errors import InputError, LimitError
 from illumcli.geometry.mesh import Mesh
 from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.color_change import COLOR_CHANGES
+from illumcli.mesh_files.gltf import glb_writer
 from illumcli.mesh_files.gltf.accessors import stored, table
 from illumcli.mesh_files.gltf.document import Document, open_document
-from illumcli.mesh_files.gltf.extend import extend_glb
+from illumcli.mesh_files.gltf.extend import copyable, extend_glb
 from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import VertexData
 
@@ -314,6 +316,41 @@ def test_the_document_read_is_not_changed(tmp_path: Path, Scene: Any) -> None:
     before = source.read_bytes()
     extended(source)
     assert source.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("nodes", 0, "mesh"), 7),
+        (("accessors", 3, "bufferView"), "x"),
+        (("bufferViews", 1, "byteOffset"), -1),
+        (("images", 0), None),
+        (("textures", 0, "source"), 9),
+        (("meshes", 0, "primitives", 0, "attributes", "_MINE"), 99),
+        (("meshes", 0, "primitives", 0, "targets", 0), []),
+        (("meshes", 0, "primitives", 0, "material"), -1),
+        (("materials", 0, "occlusionTexture"), 1),
+        (("nodes", 1, "children"), {}),
+    ],
+)
+def test_a_malformed_part_is_refused_by_name(tmp_path: Path, Scene: Any, path: Any, value: Any) -> None:
+    scene = whole(Scene())
+    part = scene.json
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] = value
+    source = scene.write(tmp_path / "a.glb")
+    with pytest.raises(InputError, match=rf"a\.glb: {path[0]}.*malformed.*bake to \.npz"):
+        copyable(source)
+
+
+def test_a_file_beyond_the_limit_of_the_format_is_refused(
+    tmp_path: Path, Scene: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = whole(Scene()).write(tmp_path / "a.glb")
+    monkeypatch.setattr(glb_writer, "LARGEST", 1000)
+    with pytest.raises(LimitError, match=r"out\.glb: would be larger than 4 GiB"):
+        extended(source)
 
 
 # ------------------------------------------------------------------ occlusion textures

@@ -17,6 +17,7 @@ from illumcli.mesh_files.gltf.placed_values import PrimitiveValues, placed_value
 from illumcli.mesh_files.gltf.reindex import reindex
 from illumcli.mesh_files.gltf.set_occlusion import set_occlusion
 from illumcli.mesh_files.gltf.vertex_colors import vertex_colors, write_colors
+from illumcli.mesh_files.gltf.well_formed import refuse_malformed
 from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import TEXTURE_UV, VertexData
 from illumcli.mesh_files.split import split_vertices
@@ -46,7 +47,7 @@ def extend_glb(path: Path, source: Path, data: VertexData, occlusion: OcclusionM
     """
     # The document in one chunk, with a mesh for each distinct set of values.
     left_out: list[str] = []
-    document, writer = embedded(open_document(source), left_out)
+    document, writer = embedded(copyable(source), left_out)
     asset = document.json["asset"]
     extras = asset.get("extras")
     asset["extras"] = {**(extras if isinstance(extras, dict) else {}), "illum": data.sealed_about()}
@@ -72,6 +73,19 @@ def extend_glb(path: Path, source: Path, data: VertexData, occlusion: OcclusionM
         forget_extension(document.json, COMPRESSION)
     writer.write(path)
     return list(dict.fromkeys(left_out))
+
+
+def copyable(source: Path) -> Document:
+    """The document of a glTF file.
+
+    Raises
+    ------
+    InputError
+        It cannot be written again because a part of it is malformed.
+    """
+    document = open_document(source)
+    refuse_malformed(document)
+    return document
 
 
 def _add_values(

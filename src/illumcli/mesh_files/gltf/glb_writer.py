@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.errors import LimitError
 from illumcli.files.atomic import AtomicFile
 from illumcli.files.seal import seal
 
 VERTICES, INDICES = 34962, 34963
 """Targets of buffer views."""
+LARGEST = 0xFFFFFFFF  # [bytes]
 _TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _ALIGNMENT = 16
@@ -81,6 +83,8 @@ class GlbWriter:
             self.json["buffers"] = [first, *self.json.get("buffers", [])[1:]]
         text = json.dumps(self.json, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
+        if 28 + len(text) + len(data) > LARGEST:
+            raise LimitError(f"{path}: would be larger than 4 GiB, the limit of a GLB; bake to .npz or .ply")
         with AtomicFile(path) as part:
             with part.path.open("wb") as file:
                 file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data)))

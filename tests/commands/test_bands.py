@@ -79,7 +79,7 @@ def test_shards_of_bands_are_merged_to_the_picture(illum, scene, tmp_path, monke
     assert [line.split(";")[0] for line in lines] == ["shard 1/2: 3 of 5", "shard 2/2: 2 of 5"]
     done = illum("merge", "a", "-o", "all", "-q")
     assert done.returncode == 1
-    assert "rows 192 to 255: shard-2-of-2.json is missing" in done.stderr
+    assert "rows 64 to 127: shard-2-of-2.json is missing" in done.stderr
     assert done.stderr.endswith("1 unit is missing\n")
     done = illum("merge", "a", "b", "-o", "all", "-q")
     assert done.returncode == 0, done.stderr

@@ -72,7 +72,8 @@ class _Picture(Value):
     def bands(self, count: int) -> Iterator[tuple[RenderJob, PlannedUnit]]:
         """At most `count` units."""
         whole, rows_of_each = self.planned, rows_of_bands(self.targets[0].view, count)
-        cost = Cost(whole.cost.alone // len(rows_of_each), whole.cost.after // len(rows_of_each))
+        each = whole.cost.alone // len(rows_of_each)
+        cost = Cost(each, each)  # bands are spread: those near each other cost more, or less, than the others
         picture = {"name": whole.name, "files": whole.files, "contents": whole.about["contents"]}
         for rows in rows_of_each:
             parts = [band_of(target, rows) for target in self.targets]

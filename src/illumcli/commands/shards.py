@@ -9,17 +9,17 @@ from illumcli.render_graph.costs import Cost
 
 def shard_of_each(costs: Sequence[Cost], count: int) -> list[int]:
     """The shard of each unit, from 1: the division whose most expensive shard costs least, of two; where both
-    are equal the second most expensive one decides, and so on.
+    are equal the second most expensive one decides, and so on, and at last the first division is taken.
 
-    In the first one, shards are runs of units that follow each other, which share buffers, with the least
-    possible greatest cost. In the other, each unit, the most expensive first, goes to the shard that has
-    least so far (Graham 1969, longest processing time). Both depend on the costs alone.
+    In the first one, each unit, the most expensive first, goes to the shard that has least so far (Graham
+    1969, longest processing time). In the other, shards are runs of units that follow each other, which share
+    buffers, with the least possible greatest cost. Both depend on the costs alone.
 
     References
     ----------
     Graham, R. L. (1969). Bounds on multiprocessing timing anomalies. SIAM J. Appl. Math. 17(2).
     """
-    divisions = _runs(costs, count), _greedy(costs, count)
+    divisions = _greedy(costs, count), _runs(costs, count)
     return min(divisions, key=lambda shards: sorted(loads(costs, shards, count), reverse=True))
 
 

@@ -1,8 +1,8 @@
-"""Cells of up to eight points of one object that lie together and whose normals agree, and cells near each.
+"""Cells of a few points of one object that lie together and whose normals agree, and cells near each.
 
-Points along a compact order are cut into groups of eight, and a group whose normals disagree (both sides of a
-thin sheet, a hard edge) into cells of its own. Cells replace points where neighbours are searched: there are
-eight times fewer of them.
+Points along a compact order are cut into groups of a size, and a group whose normals disagree (both sides of
+a thin sheet, a hard edge) into cells of its own. Cells replace points where neighbours are searched: there
+are eight times fewer of them, or more.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from illumcli.geometry.spatial_order import compact
 from illumcli.records import Record
 
 SIZE = 8
-"""Points of a cell, at most: those of the smallest boxes of a compact order."""
+"""Points of a cell, at most: those of the smallest boxes of a compact order; a power of 2."""
 SAME_CELL = 0.7
 """Least cosine between the normals of a cell's points and its first point's."""
 AGREE = 0.5
@@ -35,17 +35,18 @@ APART = 8.0
 class Cells(Record):
     """C cells over M points."""
 
-    points: NDArray[np.int64]  # (C, 8) points of each cell; its first again where it has fewer
-    filled: NDArray[np.bool_]  # (C, 8) False where it has fewer
+    points: NDArray[np.int64]  # (C, size) points of each cell; its first again where it has fewer
+    filled: NDArray[np.bool_]  # (C, size) False where it has fewer
     near: NDArray[np.int64]  # (C, K) nearest cells that agree, itself first; C where there are fewer
 
 
-def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int) -> Cells:
-    """Cells over points at (M, 3) positions with (M, 3) unit normals, and the `near` nearest of each."""
-    # groups of eight along the order, one object after the other
+def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int, size: int = SIZE) -> Cells:
+    """Cells of up to `size` points at (M, 3) positions with (M, 3) unit normals, and the `near` nearest of
+    each."""
+    # groups along the order, one object after the other
     order = compact(position)
     order = order[np.argsort(objects[order], kind="stable")]
-    group = np.arange(len(order)) // SIZE
+    group = np.arange(len(order)) // size
     normal, owner = n[order].astype(np.float64), objects[order]
 
     # cells are called after their first point: the first of each group, then of what disagrees with it
@@ -63,7 +64,7 @@ def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int) -> Cells:
     by_cell = np.argsort(first, kind="stable")
     begins = np.flatnonzero(np.diff(first[by_cell], prepend=-1))
     count = np.diff(np.append(begins, len(order)))
-    slot = np.arange(SIZE)
+    slot = np.arange(size)
     filled = slot < count[:, None]
     points = order[by_cell[np.where(filled, begins[:, None] + slot, begins[:, None])]]
 

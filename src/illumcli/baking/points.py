@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, take_rows
+from illumcli.baking.cells import SIZE
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.rays.interaction import interact
 from illumcli.rays.offsets import offset_ray_origins
@@ -30,6 +31,8 @@ class Points(Record):
 
     kind: ClassVar[str] = ""
     """Tells the units of work over points of one kind from those over others."""
+    cell_size: ClassVar[int] = SIZE
+    """Points of a cell where values are reconstructed."""
 
     geometry: SceneGeometry
     n: Vectors  # (M, 3) float32 unit shading normals

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, column_major, unit
-from illumcli.baking.cells import SIZE, Cells, cells_of
+from illumcli.baking.cells import Cells, cells_of
 from illumcli.baking.points import Points
 from illumcli.records import Record
 from illumcli.visibility.regression import FEATURES, MOMENTS, Planes, moments, polynomials
@@ -75,7 +75,7 @@ def rotated_cells(points: Points, threads: int) -> list[Cells]:
 def _rotated_cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
     x, y, z = points.position.T.astype(np.float64)
     turned = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
-    return cells_of(turned, points.n, points.objects, WINDOWS[-1])
+    return cells_of(turned, points.n, points.objects, WINDOWS[-1], points.cell_size)
 
 
 def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, threads: int) -> Reconstruction:
@@ -100,7 +100,7 @@ def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, thread
                     bent[index] += at_points.bent[:, is_point].T
             chosen += np.bincount(best.window, minlength=len(chosen)) / len(best.window)
     count = len(rotated)
-    sizes = (1, *(SIZE * each for each in WINDOWS))
+    sizes = (1, *(points.cell_size * each for each in WINDOWS))
     windows = dict(zip(sizes, (chosen / count).tolist(), strict=True))
     directions = None if bent is None else unit(column_major(bent, F))
     return Reconstruction(np.clip(hidden / count, 0, 1), risk / count, windows, directions)
@@ -127,9 +127,9 @@ class ChosenFits(Record):
 class Fitted(Record):
     """Values at the points of B cells."""
 
-    hidden: NDArray[np.float64]  # (B, 8)
-    risk: NDArray[np.float64]  # (B, 8)
-    bent: NDArray[np.float64] | None  # (3, B, 8)
+    hidden: NDArray[np.float64]  # (B, size)
+    risk: NDArray[np.float64]  # (B, size)
+    bent: NDArray[np.float64] | None  # (3, B, size)
 
 
 class Directions(Record):
@@ -195,7 +195,7 @@ class CellValues:
     def fitted(self, best: ChosenFits, block: slice) -> Fitted:
         """The values at the points of a block."""
         index, is_raw = self._cells.points[block], best.window[block, None] == 0
-        value = np.repeat(best.coefficients[0, block, None], SIZE, axis=1)
+        value = np.repeat(best.coefficients[0, block, None], index.shape[1], axis=1)
         for slope, feature in zip(best.coefficients[1:, block, None], self._features, strict=True):
             value += slope * feature[index]
         return Fitted(
@@ -207,7 +207,7 @@ class CellValues:
     def _fitted_directions(
         self, directions: Directions, best: ChosenFits, block: slice
     ) -> NDArray[np.float64]:
-        """(3, B, 8) mean unoccluded directions, from polynomials in the windows that were chosen for w."""
+        """(3, B, size) mean unoccluded directions, from polynomials in the windows that were chosen for w."""
         # moments over the cells of each window
         index, near = self._cells.points[block], self._cells.near[block]
         size = np.array([1, *WINDOWS])[best.window[block]]

@@ -32,6 +32,7 @@ class TexelPoints(PointsOnTriangles):
     """Points at texels."""
 
     kind = "texel"
+    cell_size = 32  # texels are small beside what w follows
 
 
 class TexturePoints(Record):

@@ -83,6 +83,12 @@ class Header(Value):
     textures: list[tuple[str, int]] = field(default_factory=list)  # images named in comments, and their lines
 
 
+def head(data: bytes) -> bytes:
+    """The lines of a header before its end; all bytes if it has none."""
+    end = _END.search(data, 0, LONGEST_HEADER)
+    return data if end is None else data[: end.start()]
+
+
 def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
     """Parse the header; lines that do not concern the rows are left out."""
     # Its extent.

@@ -124,7 +124,7 @@ def read(path: Path) -> Mesh:
 
 def companions(path: Path) -> list[Path]:
     """The images that a PLY may name."""
-    return files_named(path, _TEXTURE.findall, most=_ply.LONGEST_HEADER)
+    return files_named(path, lambda data: _TEXTURE.findall(_ply.head(data)), most=_ply.LONGEST_HEADER)
 
 
 def holds_obscurance(path: Path) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
+from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_or_all, take_rows, unit
 from illumcli.errors import LimitError
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
@@ -53,7 +53,7 @@ class SurfaceInteraction(Record):
 
 def interaction(geometry: SceneGeometry, rays: Rays, hits: Hits) -> SurfaceInteraction:
     """Surface interactions of the hits of camera rays."""
-    towards_eye = -take_rows(rays.directions, hits.sample)
+    towards_eye = -take_or_all(rays.directions, hits.sample)
     return interact(geometry, hits.objects, hits.triangle, hits.u, hits.v, towards_eye)
 
 
@@ -72,7 +72,8 @@ def interact(
     normal = cross(e1, e2)
     area = length(normal)
     back_facing = dot(normal, towards_eye) < 0
-    scale = np.divide(1 - 2 * back_facing.astype(np.float64), area, out=np.zeros_like(area), where=area > 0)
+    scale = np.where(back_facing, -1.0, 1.0)
+    scale /= np.maximum(area, np.finfo(np.float64).tiny)
     normal *= scale[:, None]
 
     # position = v0 + u e1 + v e2, in place

@@ -1,8 +1,9 @@
 """EXR files, written through OpenImageIO and read back.
 
 OpenImageIO reports success for files that a full disk truncated, so an image counts as written only if the
-pixels read back from the temporary file have the checksum of those written. The JPEG and TIFF libraries may end
-the process on a full disk: neither format is written. A process must not fork once this module has written.
+pixels read back from the temporary file have the checksum of those written. The JPEG and TIFF libraries may
+end the process on a full disk: neither format is written. A process must not fork once this module has
+written.
 """
 
 from __future__ import annotations

@@ -8,7 +8,19 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_or_all, take_rows, unit
+from illumcli.arrays import (
+    F,
+    Floats,
+    Ids,
+    Vectors,
+    column_major,
+    cross,
+    dot,
+    length,
+    take_or_all,
+    take_rows,
+    unit,
+)
 from illumcli.errors import LimitError
 from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -194,7 +195,7 @@ def test_the_command_names_textures_by_material(text_mesh, tmp_path):
         (["-o", "x.png"], "give its size, as in --texture 1024"),
         (["-o", "x.npz", "--texture", "64"], "--texture belongs to"),
         (["-o", "x.png", "--texture", "0"], "is no size"),
-        (["-o", "x.png", "--texture", "8", "--what", "bent_normal"], "textures hold ao"),
+        (["-o", "x.glb", "--texture", "8", "--what", "bent_normal"], "the textures of a GLB hold ao"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(text_mesh, arguments, said):
@@ -268,3 +269,57 @@ def test_a_changed_uv_is_another_texture(text_mesh, tmp_path):
     assert bake(path, out)[1].kept == [str(out)]
     path.write_text(CORNER.replace("vt 0.9 0.2", "vt 0.8 0.2"))
     assert bake(path, out, force=True)[1].written == [str(out)]
+
+
+# ------------------------------------------------------------------ bent normals and thickness
+
+EVERYTHING = ("ao", "bent_normal", "thickness")
+
+
+def test_an_exr_has_every_channel_and_a_png_one(text_mesh, tmp_path):
+    path = text_mesh(CORNER)
+    falloff = {"falloff": "step", "max_distance": 0.5}
+    settings = BakeSettings(texture=(32, 32), samples=64, what=EVERYTHING, bits=16, falloff=falloff)
+    bake(path, tmp_path / "a.exr", settings)
+    exr = read_image(tmp_path / "a.exr").channels
+    names = {"Y", "error.Y", "coverage.Y", "thickness.Y", "thickness_error.Y"}
+    assert set(exr) == names | {f"bent_normal.{axis}" for axis in "XYZ"}
+    bake(path, tmp_path / "a.{what}.png", settings)
+    png = {word: read_image(tmp_path / f"a.{word}.png").channels for word in EVERYTHING}
+    np.testing.assert_allclose(png["ao"]["Y"], exr["Y"], atol=1e-5)
+    np.testing.assert_allclose(0.5 * png["thickness"]["Y"], exr["thickness.Y"], atol=1e-5)
+    for name, axis in zip("RGB", "XYZ", strict=True):
+        np.testing.assert_allclose(2 * png["bent_normal"][name] - 1, exr[f"bent_normal.{axis}"], atol=2e-5)
+    assert read_texts(tmp_path / "a.thickness.png")["illum:limit"] == "0.5"
+
+
+def test_pngs_of_several_words_need_names(text_mesh, tmp_path):
+    said = r"a\.png: a PNG holds one of ao, thickness; .* as in .*a\.\{what\}\.png"
+    with pytest.raises(InputError, match=said):
+        bake(text_mesh(CORNER), tmp_path / "a.png", replace(SETTINGS, what=("ao", "thickness")))
+    bake(text_mesh(CORNER), tmp_path / "b.png", replace(SETTINGS, what=("thickness",)))
+    assert texels(tmp_path / "b.png").max() == 1  # sheets have no thickness: the limit
+
+
+CHARTS = {
+    "u along x": ("1/1 2/2 3/3 4/4", (-1, 0)),
+    "u against x": ("1/2 2/1 3/4 4/3", (1, 0)),  # mirrored
+    "v along x": ("1/2 2/3 3/4 4/1", (0, -1)),
+    "v along x, mirrored": ("1/1 2/4 3/3 4/2", (0, -1)),
+}
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_bent_normals_are_in_tangent_space(text_mesh, tmp_path, chart):
+    """A wall at x = 1 bends the normals of the floor towards -x."""
+    corners, away = CHARTS[chart]
+    settings = BakeSettings(texture=(64, 64), samples=256, what=("ao", "bent_normal"))
+    bake(text_mesh(CORNER.replace("1/1 2/2 3/3 4/4", corners)), tmp_path / "a.exr", settings)
+    exr = read_image(tmp_path / "a.exr").channels
+    x, y, z = (exr[f"bent_normal.{axis}"] for axis in "XYZ")
+    np.testing.assert_allclose(x * x + y * y + z * z, 1, atol=1e-5)
+    floor = np.s_[14:50, 8:24]
+    assert z[floor].min() > 0
+    lean = np.array([x[floor].mean(), y[floor].mean()])
+    assert lean @ away > 0.1
+    assert abs(lean @ away[::-1]) < 0.03

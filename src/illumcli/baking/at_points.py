@@ -69,6 +69,7 @@ def _statistics(
         cast=len(sampled.samples),
         rmse=scale * sampled.rmse,
         target=None if target is None else scale * target,
+        scale=scale,
         rays={purpose: cast for purpose, cast in sampled.rays.items() if cast},
         resumed=sampled.resumed,
         samples=dict(zip(count.tolist(), number.tolist(), strict=True)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from illumcli.atlas.triangles import TextureSize
 from illumcli.baking.at_points import channels_at
 from illumcli.baking.baked_texture import BakedTexture
 from illumcli.baking.context import BakeContext, PointChannels, TexelChannels
-from illumcli.baking.texel_points import TexturePoints, texel_points
+from illumcli.baking.tangent_space import texel_tangents, to_tangent
+from illumcli.baking.texel_points import Texels, TexturePoints, texel_points
 from illumcli.baking.texture_slots import Slot
 from illumcli.baking.unwrapped import unwrapped_uvs
 from illumcli.visibility.channels import CHANNELS
@@ -25,7 +27,21 @@ def sampled_at_texels(context: BakeContext, slots: Sequence[Slot]) -> TexelChann
     size = TextureSize(*context.settings.texture)
     uvs = unwrapped_uvs(context, slots, size)
     texels = texel_points(context.surfaces, slots, size, uvs, context.threads)
-    return TexelChannels(texels, channels_at(context, texels.points), uvs)
+    return TexelChannels(texels, in_tangent_space(texels, channels_at(context, texels.points)), uvs)
+
+
+def in_tangent_space(texels: Texels, values: PointChannels) -> PointChannels:
+    """Values at texels with their directions in tangent space."""
+    directions = {name: each for name, each in values.channels.items() if CHANNELS[name].kind == "direction"}
+    if not directions:
+        return values
+    turned = {name: np.empty_like(each) for name, each in directions.items()}
+    for texture in texels.textures:
+        own = texture.points
+        tangents, sign = texel_tangents(texture, texels.points)
+        for name, each in directions.items():
+            turned[name][own] = to_tangent(each[own], texels.points.n[own], tangents, sign)
+    return replace(values, channels={**values.channels, **turned})
 
 
 def baked_texture(texture: TexturePoints, values: PointChannels) -> BakedTexture:

@@ -91,7 +91,7 @@ def bake_context(work: BakeWork, progress: Progress, journal: Journal) -> BakeCo
 def baked_of(work: BakeWork, due: Sequence[Path], context: BakeContext) -> BakedChannels:
     """Values at vertices by the method of the settings, and at texels, as the files need them."""
     at_vertices = at_texels = None
-    if any(path not in work.slot_of for path in due):
+    if any(path not in work.texture_of for path in due):
         at_vertices = METHODS[work.settings.method](context)
     if any(work.has_textures(path) for path in due):
         at_texels = sampled_at_texels(context, work.slots)
@@ -110,8 +110,9 @@ def write_files(work: BakeWork, due: Sequence[Path], values: BakedChannels) -> S
         ]
         for slot, texture in of_slots:
             for path in due:
-                if work.slot_of.get(path) == slot:
-                    write_texture(path, texture, about, work.settings.bits)
+                file = work.texture_of.get(path)
+                if file is not None and file.slot == slot:
+                    write_texture(path, texture, file.what, about, work.settings.bits)
         textures = BakedTextures(tuple(texture for _, texture in of_slots), values.at_texels.unwrapped)
 
     # Values at vertices, in all other files.
@@ -119,7 +120,7 @@ def write_files(work: BakeWork, due: Sequence[Path], values: BakedChannels) -> S
         return ()
     about = description(work, values.at_vertices.of_points.statistics)
     baked = replace(baked_values(values.at_vertices), about=about)
-    return write_outputs(work, [path for path in due if path not in work.slot_of], baked, textures)
+    return write_outputs(work, [path for path in due if path not in work.texture_of], baked, textures)
 
 
 def description(work: BakeWork, statistics: Mapping[str, SampleStatistics]) -> dict[str, Any]:

@@ -57,6 +57,7 @@ class SampleStatistics(Record):
     cast: int  # points that cast rays
     rmse: float  # root mean square error over all points
     target: float | None  # the error that was asked for
+    scale: float  # the largest value: 1, or the limit of thickness
     rays: Mapping[str, int]  # purpose -> rays
     resumed: int  # of these, rays that an earlier run cast
     samples: Mapping[int, int]  # rays per point -> points
@@ -65,7 +66,8 @@ class SampleStatistics(Record):
     def as_data(self) -> dict[str, Any]:
         """What files say of their values: the same whether or not the bake was interrupted."""
         rays = sum(self.rays.values())
-        return {"rmse": self.rmse, "rays": rays, "reconstruction": self.reconstruction}
+        about = {"rmse": self.rmse, "scale": self.scale, "rays": rays}
+        return {**about, "reconstruction": self.reconstruction}
 
     def summary(self) -> str:
         """The error of the values, and what they took."""

@@ -74,6 +74,7 @@ def fitted_to_surface(context: BakeContext) -> VertexChannels:
         cast=len(closed),
         rmse=float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))) if len(error) else 0.0,
         target=None,
+        scale=1.0,
         rays={"values": estimates.rays} if estimates.rays else {},
         resumed=0,
         samples={settings.samples: len(closed)},

@@ -23,7 +23,7 @@ from illumcli.baking.occluders import OccludingMesh
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
-from illumcli.baking.texture_slots import Slot, is_texture, texture_files, texture_slots
+from illumcli.baking.texture_slots import Slot, TextureFile, is_texture, texture_files, texture_slots
 from illumcli.cache.fingerprint import FileFingerprint, digest
 from illumcli.errors import InputError
 from illumcli.files.claims import claim_path
@@ -55,8 +55,8 @@ class BakeWork(Record):
     """The files of the bake."""
     slots: tuple[Slot, ...]
     """The textures of the bake, if it has any."""
-    slot_of: Mapping[Path, Slot]
-    """File of a texture -> its slot."""
+    texture_of: Mapping[Path, TextureFile]
+    """File of a texture -> what it holds."""
     scene: Scene
     surfaces: Surfaces
     occluding: Mapping[Path, OccludingMesh]
@@ -81,7 +81,7 @@ class BakeWork(Record):
     def has_textures(self, path: Path) -> bool:
         """True for files that hold textures: a texture, or a GLB if the settings ask for textures."""
         has_glb = self.settings.texture is not None and path.suffix.lower() == ".glb"
-        return has_glb or path in self.slot_of
+        return has_glb or path in self.texture_of
 
     @property
     def contents(self) -> tuple[str, ...]:
@@ -147,15 +147,15 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     if options.strict:
         refuse_repairs(str(path), repairs)
     slots = texture_slots(loaded.scene.object_names(), surfaces.geometry)
-    slot_of = texture_files(outputs, slots)
+    texture_of = texture_files(outputs, slots, settings.what)
     if settings.texture is not None and settings.unwrap is None:
         refuse_missing_uv(str(path), slots, meshes)
-    outputs = (*(each for each in outputs if not is_texture(each)), *slot_of)
+    outputs = (*(each for each in outputs if not is_texture(each)), *texture_of)
     work = BakeWork(
         job,
         outputs,
         slots,
-        slot_of,
+        texture_of,
         loaded.scene,
         surfaces,
         occluding,
@@ -209,11 +209,11 @@ def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
         return
     if settings.unwrap is not None:
         refuse_missing_library()
-    files += [each for each in outputs if each.suffix.lower() == ".glb"]
-    if not files:
+    assets = [each for each in outputs if each.suffix.lower() == ".glb"]
+    if not files and not assets:
         raise InputError("--texture belongs to .png, .exr and .glb outputs; name one with -o")
-    if "ao" not in settings.what:
-        raise InputError(f"{files[0]}: textures hold ao; add it to --what")
+    if assets and "ao" not in settings.what:
+        raise InputError(f"{assets[0]}: the textures of a GLB hold ao; add it to --what")
 
 
 def refuse_lost_colors(outputs: Sequence[Path], meshes: Sequence[Mesh], settings: BakeSettings) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from illumcli.arrays import Ids
 from illumcli.errors import InputError
-from illumcli.files.names import expand
+from illumcli.files.names import expand, fields
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.records import Value
 
@@ -62,20 +63,36 @@ def is_texture(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def texture_files(patterns: Sequence[Path], slots: Sequence[Slot]) -> Mapping[Path, Slot]:
-    """The files of textures that patterns name, each with its slot.
+class TextureFile(Value):
+    """What a file of a texture holds."""
+
+    slot: Slot
+    what: tuple[str, ...]  # words of `--what`
+
+
+def texture_files(
+    patterns: Sequence[Path], slots: Sequence[Slot], what: Sequence[str]
+) -> Mapping[Path, TextureFile]:
+    """The files of textures that patterns name: of `{what}` one for each word, otherwise of all words one.
 
     Raises
     ------
     InputError
-        Several textures would have the same name, or none has one.
+        Several textures would have the same name, or none has one; a PNG would hold several words.
     """
-    files: dict[Path, Slot] = {}
+    files: dict[Path, TextureFile] = {}
     problems = []
     for pattern in filter(is_texture, patterns):
-        for slot in slots:
-            fields = {"object": slot.object_name, "material": slot.material_name}
-            path = Path(expand(str(pattern), fields))
+        parts = [(word,) for word in what] if "what" in fields(str(pattern)) else [tuple(what)]
+        if pattern.suffix.lower() == ".png" and len(parts[0]) > 1:
+            better = pattern.with_name(f"{pattern.stem}.{{what}}{pattern.suffix}")
+            problems.append(
+                f"{pattern}: a PNG holds one of {', '.join(what)}; name them apart, as in {better}"
+            )
+            continue
+        for slot, words in itertools.product(slots, parts):
+            named = {"object": slot.object_name, "material": slot.material_name, "what": words[0]}
+            path = Path(expand(str(pattern), named))
             if path in files:
                 several = {
                     name: len({getattr(each, f"{name}_name") for each in slots}) > 1 for name in FIELDS
@@ -87,7 +104,7 @@ def texture_files(patterns: Sequence[Path], slots: Sequence[Slot]) -> Mapping[Pa
                     f"let names differ, as in {better}"
                 )
                 break
-            files[path] = slot
+            files[path] = TextureFile(slot, words)
     if problems:
         raise InputError(problems)
     return files

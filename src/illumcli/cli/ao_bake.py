@@ -174,7 +174,8 @@ def _request(options: dict[str, Any]) -> BakeRequest:
     metavar="OUT",
     multiple=True,
     required=True,
-    help=".npz, .ply, .obj, .glb; may be repeated, may hold {name}, the name of the input.",
+    help=".npz, .ply, .obj, .glb, of textures .png, .exr; may be repeated, may hold {name}, the name of the "
+    "input, and those of textures {object}, {material}, {what}.",
 )
 @click.option("--samples", type=click.IntRange(1, 65536), help="Rays per vertex, by default 256.")
 @click.option(

@@ -12,11 +12,13 @@ from plyfile import PlyData, PlyElement
 
 from gltf_validator import faults
 from illumcli.baking.bake import bake_mesh
-from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.baked_texture import BakedTextures
+from illumcli.baking.inputs import mesh_alone, prepare_bake, surfaces_of
 from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import occluders_of
+from illumcli.baking.outputs import write_outputs
 from illumcli.baking.sampling import BakeSampler, RayCounts
-from illumcli.baking.settings import BakeOptions, BakeSettings
+from illumcli.baking.settings import BakeJob, BakeOptions, BakeSettings
 from illumcli.baking.vertex_points import vertex_points
 from illumcli.cli import illum
 from illumcli.color import to_srgb
@@ -28,7 +30,7 @@ from illumcli.mesh_files.gltf.document import open_document
 from illumcli.progress import no_progress
 from illumcli.rays.sampling import compact_spiral_table
 from illumcli.scene.load import load
-from illumcli.visibility.baked import read_npz
+from illumcli.visibility.baked import Baked, read_npz
 from illumcli.visibility.falloffs.step import Step
 from illumcli.visibility.obscurance import Method
 from illumcli.visibility.open_hemisphere import ClusterTree
@@ -351,6 +353,31 @@ def test_a_mirrored_object_keeps_its_outside(text_mesh, tmp_path):
         made = read_mesh(tmp_path / f"out.{kind}")
         a, b, c = (made.vertices[made.corners[made.starts[:-1] + k]] for k in range(3))
         assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all(), kind
+
+
+def test_a_split_ply_keeps_all_it_has(tmp_path):
+    head = (
+        "ply\nformat ascii 1.0\ncomment mine\nelement vertex 8\nproperty float x\nproperty float y\n"
+        "property float z\nproperty int mark\nelement face 6\nproperty list uchar uchar vertex_index\n"
+        "property uchar red\nelement edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+    )
+    points = [line.split()[1:] for line in CUBE.splitlines() if line.startswith("v ")]
+    faces = [[int(each) - 1 for each in line.split()[1:]] for line in CUBE.splitlines() if line[:2] == "f "]
+    rows = [f"{' '.join(point)} {k}" for k, point in enumerate(points)]
+    rows += [f"4 {' '.join(map(str, face))} {10 * k}" for k, face in enumerate(faces)]
+    (tmp_path / "in.ply").write_text(head + "\n".join([*rows, "2 5"]) + "\n")
+    work = prepare_bake(BakeJob(tmp_path / "in.ply", (tmp_path / "out.ply",), BakeSettings(split=True)))
+    w, at_corners = np.linspace(0, 1, 8, dtype=np.float32), np.linspace(0, 1, 24, dtype=np.float32)
+    baked = Baked({"obscurance": w}, {"content": "c"}, {"obscurance": at_corners})
+    assert write_outputs(work, [tmp_path / "out.ply"], baked, BakedTextures()) == ()
+    made, mesh = PlyData.read(tmp_path / "out.ply"), read_mesh(tmp_path / "out.ply")
+    assert made.text
+    assert made.comments[0] == "mine"
+    assert made["face"]["red"].tolist() == [0, 10, 20, 30, 40, 50]
+    assert made["edge"].data[0].tolist() == (2, 5)
+    assert made["vertex"].count == 24
+    np.testing.assert_array_equal(mesh.attributes["mark"][mesh.corners], np.ravel(faces))
+    np.testing.assert_allclose(mesh.attributes["obscurance"][mesh.corners], at_corners, rtol=1e-6)
 
 
 def test_an_asset_is_written_again_if_an_image_or_material_changes(text_mesh, tmp_path):

@@ -21,6 +21,7 @@ from illumcli.mesh_files.gltf.extend import extend_glb
 from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import NO_MAPS, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh, VertexData
+from illumcli.mesh_files.split import SplitVertices
 from illumcli.visibility import baked as npz
 from illumcli.visibility.baked import Baked
 from illumcli.visibility.channels import ply_columns
@@ -31,7 +32,12 @@ SUFFIXES = (".npz", *ASSETS)
 
 
 def write_baked_ply(
-    path: Path, meshes: Sequence[OutputMesh], baked: Baked, source: Path | None, color: str | None
+    path: Path,
+    meshes: Sequence[OutputMesh],
+    baked: Baked,
+    source: Path | None,
+    color: str | None,
+    split: SplitVertices | None = None,
 ) -> None:
     """Write a PLY with a float property for each name in `Channel.ply`; `quality`, which MeshLab shows, is
     obscurance.
@@ -42,8 +48,10 @@ def write_baked_ply(
         A PLY whose content is kept and extended; None to write `meshes`.
     color : str, optional
         What obscurance does to the colours of vertices, by the names of `COLOR_CHANGES`.
+    split : SplitVertices, optional
+        Of the vertices of `source`; `baked` has a value for each of them.
     """
-    ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, color), source)
+    ply.write(path, meshes, _vertex_data(ply_columns(baked.channels), baked, color), source, split)
 
 
 def write_baked_glb(

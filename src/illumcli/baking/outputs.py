@@ -19,7 +19,13 @@ from illumcli.baking.files import (
 from illumcli.baking.inputs import BakeWork
 from illumcli.baking.obj_files import copy_materials, placed_mesh, write_materials
 from illumcli.baking.points import Surfaces
-from illumcli.baking.split import corners_of_triangles, split_meshes, whole_meshes, with_materials
+from illumcli.baking.split import (
+    corners_of_triangles,
+    split_by_values,
+    split_meshes,
+    whole_meshes,
+    with_materials,
+)
 from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import is_mesh_file
 from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
@@ -29,6 +35,7 @@ from illumcli.mesh_files.materials import pbr_materials
 from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh
+from illumcli.mesh_files.ply import has_plain_faces
 from illumcli.visibility.baked import Baked, write_npz
 
 GLTF = (".glb", ".gltf")
@@ -95,8 +102,13 @@ class _Writer:
             return self._write_glb(path)
         if kind == ".obj":
             return self._write_obj(path)
+        mesh = self._work.surfaces.geometry.placed[0].mesh
         if source_kind == ".ply" and not self._split:
             write_baked_ply(path, [], self._baked, self._source, self._color)
+            return ()
+        if source_kind == ".ply" and has_plain_faces(self._source, len(mesh.corners)):
+            part, baked = split_by_values(mesh, self._baked)
+            write_baked_ply(path, [], baked, self._source, self._color, part)
             return ()
         return self._write_ply(path)
 

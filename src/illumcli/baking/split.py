@@ -85,6 +85,13 @@ def corners_of_triangles(geometry: SceneGeometry, index: int) -> NDArray[np.int3
     return np.asarray(geometry.corners[geometry.objects == index] - np.int32(first))
 
 
+def split_by_values(mesh: Mesh, baked: Baked) -> tuple[SplitVertices, Baked]:
+    """The vertices of a mesh baked alone, split where corners have several values, and their values."""
+    values = [each.reshape(len(mesh.corners), -1) for each in baked.corner_channels.values()]
+    part = split_vertices(mesh.corners, len(mesh.vertices), values)
+    return part, split_values(baked, [mesh], [part])
+
+
 def corner_tables(surfaces: Surfaces, index: int, fill: bool) -> dict[str, NDArray[np.float64]]:
     """Normals, in scene directions, and uv of the corners of an object's file, (C, k) each, by name.
 

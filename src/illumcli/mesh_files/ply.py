@@ -35,6 +35,7 @@ from illumcli.mesh_files._ply import Element, Lists, Table
 from illumcli.mesh_files._polygons import Ints, RawMesh, check_range, checked_mesh, starts_of, strip
 from illumcli.mesh_files._text import Text
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
+from illumcli.mesh_files.split import SplitVertices
 from illumcli.records import Value
 
 _NORMAL = ("nx", "ny", "nz")
@@ -297,19 +298,27 @@ _ABOUT = "illum "  # begins the comment that holds `VertexData.about`
 _LABELS = {"normal": ["nx", "ny", "nz"], "uv": ["s", "t"], "color": ["red", "green", "blue"]}
 
 
-def write(path: Path, meshes: Sequence[OutputMesh], data: VertexData, source: Path | None = None) -> None:
+def write(
+    path: Path,
+    meshes: Sequence[OutputMesh],
+    data: VertexData,
+    source: Path | None = None,
+    split: SplitVertices | None = None,
+) -> None:
     """Write meshes with the columns of `data` as properties, (V,) float each; `about` becomes a comment.
 
-    With a PLY `source`, its elements and properties are written, too, in its own encoding. Other meshes are
-    written in binary, with normals, uv and colours if every vertex has its own.
+    With a PLY `source`, its elements and properties are written, too, in its own encoding, and with a `split`
+    of a file that `has_plain_faces`, its vertices are split; `data` has a row for each of them. Other meshes
+    are written in binary, with normals, uv and colours if every vertex has its own.
     """
     from plyfile import PlyData, PlyElement
 
     comment = _ABOUT + json.dumps(data.sealed_about())
     if source is not None:
         old = PlyData.read(source)
+        elements = list(old) if split is None else [_split(each, split) for each in old]
         elements = [
-            _with_columns(each, data, data.columns) if each.name == "vertex" else each for each in old
+            _with_columns(each, data, data.columns) if each.name == "vertex" else each for each in elements
         ]
         comments = [each for each in old.comments if not each.startswith(_ABOUT)]
         file = PlyData(elements, old.text, old.byte_order, [*comments, comment], list(old.obj_info))
@@ -325,6 +334,45 @@ def write(path: Path, meshes: Sequence[OutputMesh], data: VertexData, source: Pa
     with AtomicFile(path) as part:
         file.write(str(part.path))
         seal(part.path)
+
+
+def has_plain_faces(path: Path, corners: int) -> bool:
+    """True if all polygons of a PLY, which have so many corners, are its faces in their order."""
+    from plyfile import PlyData
+
+    file = PlyData.read(path)
+    if "face" not in file or "tristrips" in file:
+        return False
+    return sum(map(len, file["face"].data[_corners_of(file["face"])])) == corners
+
+
+def _corners_of(element: Any) -> str:
+    """The name of the list of a face's corners."""
+    from plyfile import PlyListProperty
+
+    lists = [each.name for each in element.properties if isinstance(each, PlyListProperty)]
+    return next(name for name in (*_CORNERS, *lists) if name in lists and name != "texcoord")
+
+
+def _split(element: Any, split: SplitVertices) -> Any:
+    """An element with copies of vertices, or with the corners that are these copies."""
+    from plyfile import PlyElement, PlyListProperty
+
+    if element.name not in ("vertex", "face"):
+        return element
+    properties = list(element.properties)
+    if element.name == "vertex":
+        table = element.data[split.source]
+    else:
+        name, table = _corners_of(element), element.data.copy()
+        ends = np.cumsum([len(row) for row in table[name]])
+        table[name][:] = [*np.split(split.of_corner, ends[:-1]), None][:-1]  # not one array of equal rows
+        properties = [
+            PlyListProperty(name, each.len_dtype, "i4") if each.name == name else each for each in properties
+        ]
+    new = PlyElement(element.name, properties, len(table), list(element.comments))
+    new.data = table
+    return new
 
 
 def read_about(path: Path) -> dict[str, Any]:

@@ -141,6 +141,7 @@ def test_split_vertices_keep_everything(tmp_path: Path, Scene: Any) -> None:
     np.testing.assert_array_equal(mesh.vertices[mesh.corners], before.vertices[before.corners])
     np.testing.assert_array_equal(mesh.uvs[mesh.corner_uvs], before.uvs[before.corner_uvs])
     np.testing.assert_allclose(mesh.attributes["_OBSCURANCE"][mesh.corners], np.linspace(0, 1, 6))
+    assert len(document.json["accessors"]) == len(open_document(source).json["accessors"]) + 2
     primitive = document.json["meshes"][0]["primitives"][0]
     old = open_document(source)
     corners = stored(document, primitive["indices"], (1,))[:, 0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from base64 import b64decode
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -276,6 +277,18 @@ def extensions(entry: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def extension(entry: dict[str, Any], name: str) -> dict[str, Any]:
     """One extension of a part of the JSON; empty if it has none of that name."""
     return extensions(entry).get(name, {})
+
+
+def values_of(value: Any, key: str) -> Iterator[Any]:
+    """The values of a key anywhere in a part of the JSON."""
+    if isinstance(value, dict):
+        if key in value:
+            yield value[key]
+        for each in value.values():
+            yield from values_of(each, key)
+    elif isinstance(value, list):
+        for each in value:
+            yield from values_of(each, key)
 
 
 def printable(name: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from illumcli.mesh_files.color_change import ColorChange
-from illumcli.mesh_files.gltf.document import Document, extensions, open_document
+from illumcli.mesh_files.gltf.document import Document, extensions, is_index, open_document, values_of
 from illumcli.mesh_files.gltf.embed import embedded
 from illumcli.mesh_files.gltf.glb_writer import VERTICES, GlbWriter
 from illumcli.mesh_files.gltf.instances import distinct_meshes, forget_extension
@@ -114,7 +114,7 @@ def _add_values(
     attributes = primitive["attributes"]
     former = {name: attributes.pop(name, None) for name in values.columns}
     if len(split.source) > count:
-        left_out += reindex(document, writer, primitive, split.source, split.of_corner)
+        left_out += reindex(document, writer, primitive, split, owned)
 
     # Add the columns.
     columns = split.columns(values.columns, values.at_corners)
@@ -148,21 +148,18 @@ def _number_texture_uvs(by_slot: dict[int, list[dict[str, Any]]]) -> int:
 
 
 def _replaceable(document: Document) -> set[int]:
-    """Accessors that one attribute of one primitive refers to, alone with their buffer view."""
-    tables = [
-        each
-        for primitive in _primitives(document)
-        for each in (primitive.get("attributes", {}), *primitive.get("targets", []))
-    ]
-    uses = Counter(number for each in tables for number in each.values())
+    """Accessors that one primitive refers to, once, and that alone refer to their buffer view."""
+    uses: Counter[int] = Counter()
+    for primitive in _primitives(document):
+        for each in (primitive.get("attributes", {}), *primitive.get("targets", [])):
+            uses.update(each.values())
+        uses.update([primitive["indices"]] if "indices" in primitive else [])
+    views = Counter(each for each in values_of(document.json, "bufferView") if is_index(each))
     accessors = document.items("accessors")
-    views = Counter(each.get("bufferView") for each in accessors)
     return {
         number
         for number, count in uses.items()
-        if count == 1
-        and views[accessors[number].get("bufferView")] == 1
-        and "sparse" not in accessors[number]
+        if count == 1 == views[accessors[number].get("bufferView")] and "sparse" not in accessors[number]
     }
 
 

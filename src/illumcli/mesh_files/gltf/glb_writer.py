@@ -48,10 +48,10 @@ class GlbWriter:
         """Append an array, (N,) or (N, k); the number of its accessor, whose further keys are `more`."""
         return appended(self.json.setdefault("accessors", []), self._accessor(values, target, None, more))
 
-    def replace_table(self, accessor: int, values: NDArray[Any], target: int) -> None:
-        """Replace an accessor, and the buffer view that only it refers to."""
+    def replace_table(self, accessor: int, values: NDArray[Any], target: int, **more: Any) -> None:
+        """Replace an accessor, whose further keys are `more`, and the buffer view that only it refers to."""
         accessors = self.json["accessors"]
-        accessors[accessor] = self._accessor(values, target, accessors[accessor]["bufferView"], {})
+        accessors[accessor] = self._accessor(values, target, accessors[accessor]["bufferView"], more)
 
     def _accessor(
         self, values: NDArray[Any], target: int, replaced: int | None, more: dict[str, Any]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from typing import Any
 
-from illumcli.mesh_files.gltf.document import Document, is_index
+from illumcli.mesh_files.gltf.document import Document, is_index, values_of
 from illumcli.mesh_files.gltf.glb_writer import GlbWriter, appended
 from illumcli.mesh_files.gltf.pbr import occlusion_texture
 from illumcli.mesh_files.occlusion import OcclusionMap
@@ -63,10 +63,9 @@ def _replaced(document: Document, writer: GlbWriter, former: Any, occlusion: Occ
     index: Any = former.get("index") if isinstance(former, dict) else None
     texture = _only(textures, index, _texture_numbers(document.items("materials")), uses=0)
     number: Any = texture.get("source")
-    image = _only(images, number, _values(textures, "source"), uses=1)
-    parts = [images, document.items("accessors")]
+    image = _only(images, number, values_of(textures, "source"), uses=1)
     view = image.get("bufferView")
-    if not _only(document.items("bufferViews"), view, _values(parts, "bufferView"), uses=1):
+    if not _only(document.items("bufferViews"), view, values_of(document.json, "bufferView"), uses=1):
         return False
     images[number] = {
         "bufferView": writer.view(occlusion.png, view),
@@ -99,15 +98,3 @@ def _texture_numbers(value: Any) -> Iterator[int]:
     elif isinstance(value, list):
         for each in value:
             yield from _texture_numbers(each)
-
-
-def _values(value: Any, key: str) -> Iterator[Any]:
-    """The values of a key anywhere in a part of the JSON."""
-    if isinstance(value, dict):
-        if key in value:
-            yield value[key]
-        for each in value.values():
-            yield from _values(each, key)
-    elif isinstance(value, list):
-        for each in value:
-            yield from _values(each, key)

@@ -90,7 +90,14 @@ def test_what_cannot_be_shown_is_refused_before_the_bake(illum, tmp_path):
     (tmp_path / "s.yaml").write_text("version: 1\nobjects: [{mesh: box.obj}, {mesh: {shape: plane}}]\n")
     for words, told in (
         (("box.obj", "-o", "a.npz", "--preview", "a.svg"), "a.svg"),
-        (("s.yaml", "-o", "a.npz", "--preview", "a.png"), "a preview of a scene shows a .ply or .glb"),
+        (
+            ("s.yaml", "-o", "a.npz", "--preview", "a.png"),
+            "a preview shows no scene without its mesh; add a .glb",
+        ),
+        (
+            ("box.obj", "-o", "a.obj", "--color", "r", "--preview", "a.png"),
+            "a preview shows no OBJ with --color",
+        ),
         (("box.obj", "s.yaml", "-o", "{name}.glb", "--preview", "a.png"), "write {name} into the pattern"),
     ):
         done = illum("ao-bake", *words)

@@ -59,7 +59,7 @@ def refuse_preview(work: BakeWork) -> None:
     Raises
     ------
     InputError
-        It is no PNG; no obscurance is baked; a scene has no mesh among its outputs.
+        It is no PNG; no obscurance is baked; the outputs cannot be shown.
     OutputError
         A different file exists.
     """
@@ -67,11 +67,8 @@ def refuse_preview(work: BakeWork) -> None:
     refuse_suffix(path, "a preview", ".png")
     if "ao" not in work.settings.what:
         raise InputError(f"{path}: a preview shows ao; add it to --what")
-    if not is_mesh_file(_shown(work)):
-        if not is_mesh_file(work.path):
-            raise InputError(f"{path}: a preview of a scene shows a .ply or .glb; add one with -o")
-        if len(work.outputs) > 1 and _shown(work).suffix.lower() != ".npz":
-            raise InputError(f"{path}: a preview of several textures shows a .glb; add one with -o")
+    if (what := _not_shown(work)) is not None:
+        raise InputError(f"{path}: a preview shows no {what}; add a .glb or .ply with -o")
     is_kept(path, [_content(work)], image_contents, work.job.options.force)
 
 
@@ -93,8 +90,30 @@ def _preview(work: BakeWork) -> Path:
 
 
 def _shown(work: BakeWork) -> Path:
-    """The output that the preview shows: the first one that is a mesh, or the first one."""
-    return next((each for each in work.outputs if is_mesh_file(each)), work.outputs[0])
+    """The output that the preview shows: the first mesh with its values, or the first output."""
+    return next((each for each in work.outputs if _is_asset(work, each)), work.outputs[0])
+
+
+def _is_asset(work: BakeWork, path: Path) -> bool:
+    """True for a mesh file from which w can be read: no OBJ that has it in some channel of its colours."""
+    return is_mesh_file(path) and (path.suffix.lower() != ".obj" or work.settings.channel is None)
+
+
+def _not_shown(work: BakeWork) -> str | None:
+    """What the outputs are, if no preview can show them on the input."""
+    shown = _shown(work)
+    if _is_asset(work, shown):
+        return None
+    if is_mesh_file(shown):
+        return "OBJ with --color"
+    if not is_mesh_file(work.path):
+        return "scene without its mesh"
+    if shown.suffix.lower() == ".npz":
+        return None
+    has_uv = all(placed.mesh.uvs is not None for placed in work.surfaces.geometry.placed)
+    if work.settings.unwrap == "all" or not has_uv:
+        return "texture over uv that the bake makes"
+    return "several textures without their mesh" if len(work.slot_of) > 1 else None
 
 
 def _content(work: BakeWork) -> str:
@@ -182,6 +201,8 @@ def _facts(
 ) -> Sequence[str]:
     """Lines about the values and how they were computed."""
     settings, sampled = work.settings, about["sampled"]["obscurance"]
+    of_both = settings.texture is not None and is_mesh_file(_shown(work))
+    at = ", at vertices" if of_both else ""
     where = f"method: {settings.method}"
     if settings.texture is not None and not is_mesh_file(_shown(work)):
         where = "texture: {} x {}".format(*settings.texture)
@@ -189,7 +210,7 @@ def _facts(
     if settings.target_error is not None:
         rays = f"for an error of {settings.target_error:g}"
     return [
-        f"error {sampled['rmse']:.2g} (root mean square)",
+        f"error {sampled['rmse']:.2g} (root mean square{at})",
         f"{sampled['rays']:,} rays, {rays}",
         f"{len(work.surfaces.geometry.vertices):,} vertices, "
         f"{len(work.surfaces.geometry.triangles):,} triangles",

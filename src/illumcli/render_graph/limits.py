@@ -14,7 +14,7 @@ from illumcli.geometry.instances import MOST_STRETCH
 from illumcli.geometry.shapes._base import TRIANGLE_BYTES, Shape
 from illumcli.layers import Layer
 from illumcli.memory import in_words, refuse_beyond
-from illumcli.mesh_files import companions
+from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture
 from illumcli.render_graph import needs
@@ -62,15 +62,26 @@ def expected_memory(loaded: SceneFile, scene: Scene, shares_meshes: bool = True)
             continue
         path = loaded.folder / (source.file if isinstance(source, MeshFile) else str(source))
         if path not in of_file:
-            factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
-            of_file[path] = factor * path.stat().st_size if path.is_file() else 0
+            of_file[path] = _mesh_bytes(path)
         sizes["meshes"] += of_file[path] if is_stored else 0
         if needs.imports(scene, thing):
             importing[path] = None
     images = dict.fromkeys(image for path in importing for image in _images_of(path))
     sizes["textures"] = sum(_texture_bytes(loaded, texture) for texture in _textures(scene))
     sizes["textures"] += sum(_image_bytes(image) for image in images)
+    for file in dict.fromkeys(needs.files_of_obscurance(scene).values()):
+        path = loaded.folder / file
+        if is_mesh_file(path):
+            sizes["meshes"] += 0 if path in of_file else _mesh_bytes(path)
+        elif path.suffix.lower() != ".npz":
+            sizes["textures"] += _texture_bytes(loaded, (file, None))
     return {name: count for name, count in sizes.items() if count}
+
+
+def _mesh_bytes(path: Path) -> int:
+    """Memory of a mesh, from the size of its file; 0 if there is none."""
+    factor = BYTES_OF_FILES.get(path.suffix.lower(), BYTES_OF_OTHER_FILES)
+    return factor * path.stat().st_size if path.is_file() else 0
 
 
 def _stretch(thing: Object) -> float:

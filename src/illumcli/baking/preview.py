@@ -28,6 +28,7 @@ from illumcli.images.contents import image_contents
 from illumcli.images.histogram import histogram_picture, text_picture
 from illumcli.images.sheet_layout import Sheet
 from illumcli.mesh_files import is_mesh_file
+from illumcli.mesh_files.obj import GREY
 from illumcli.rays.corner_weights import TriangleCorners
 from illumcli.records import Record
 from illumcli.render_graph.build import build
@@ -90,13 +91,16 @@ def _preview(work: BakeWork) -> Path:
 
 
 def _shown(work: BakeWork) -> Path:
-    """The output that the preview shows: the first mesh with its values, or the first output."""
-    return next((each for each in work.outputs if _is_asset(work, each)), work.outputs[0])
+    """The output that the preview shows: the first mesh with its values, or the first output with w."""
+    with_w = [
+        each for each in work.outputs if each not in work.texture_of or "ao" in work.texture_of[each].what
+    ]
+    return next((each for each in with_w if _is_asset(work, each)), with_w[0])
 
 
 def _is_asset(work: BakeWork, path: Path) -> bool:
     """True for a mesh file from which w can be read: no OBJ that has it in some channel of its colours."""
-    return is_mesh_file(path) and (path.suffix.lower() != ".obj" or work.settings.channel is None)
+    return is_mesh_file(path) and (path.suffix.lower() != ".obj" or work.settings.color in GREY)
 
 
 def _not_shown(work: BakeWork) -> str | None:
@@ -113,7 +117,7 @@ def _not_shown(work: BakeWork) -> str | None:
     has_uv = all(placed.mesh.uvs is not None for placed in work.surfaces.geometry.placed)
     if work.settings.unwrap == "all" or not has_uv:
         return "texture over uv that the bake makes"
-    return "several textures without their mesh" if len(work.slot_of) > 1 else None
+    return "several textures without their mesh" if len(work.slots) > 1 else None
 
 
 def _content(work: BakeWork) -> str:

@@ -118,10 +118,14 @@ def read(path: Path) -> Mesh:
     return checked_mesh(path, raw, lambda part, n: f":{text.number(int(lines[_PARTS[part]][n]))}")
 
 
+GREY = (None, "replace")
+"""What `--color` may be for colours that are the value."""
+
+
 def holds_obscurance(path: Path) -> bool:
-    """True if illum baked the colours of the vertices, all channels of them."""
+    """True if the colours of the vertices are values that illum baked, alike in all channels."""
     try:
-        return dict(read_about(path)["parameters"])["channel"] is None
+        return dict(read_about(path)["parameters"])["color"] in GREY
     except (StopIteration, LookupError, TypeError, ValueError):
         return False
 

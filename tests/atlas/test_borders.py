@@ -84,13 +84,13 @@ def test_border_texels_have_the_nearest_place(seed):
 
 
 def test_a_chart_smaller_than_a_texel_has_texels():
-    texels = texels_of(triangles_of(0.5 + SQUARE[:3] / 1000, [0, 1, 2]))
+    texels = texels_of(triangles_of(0.5 + SQUARE[:3] / 1000, [0, 1, 2])).places
     assert len(texels.texel) == len(set(texels.texel.tolist())) == 4
 
 
 def test_places_are_inside_their_triangles():
     triangles = triangles_of(0.25 + SQUARE / 2, [[0, 1, 2], [0, 2, 3]])
-    texels = texels_of(triangles)
+    texels = texels_of(triangles).places
     border = ~np.isin(texels.texel, covered_centres(triangles).texel)
     least = np.minimum.reduce([texels.u, texels.v, 1 - texels.u - texels.v])
     assert least[border].min() > 0

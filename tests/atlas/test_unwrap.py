@@ -32,7 +32,7 @@ def test_uv_neither_overlap_nor_are_mirrored_at_any_scale(scale):
     triangles = atlas_triangles(SIZE, made.uvs, made.corner_uvs, np.arange(12, dtype=np.int32))
     assert len(triangles.triangle) == 12
     assert not triangles.is_mirrored.any()
-    facts = overlaps(triangles, texels_of(triangles))
+    facts = overlaps(triangles, texels_of(triangles).places)
     assert facts.several == 0
     assert facts.read > 0.4 * SIZE.texels
 

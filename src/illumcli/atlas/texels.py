@@ -8,19 +8,27 @@ from illumcli.arrays import F
 from illumcli.atlas.borders import BorderTexels, border_texels
 from illumcli.atlas.centres import TexelsOnTriangles, covered_centres, joined
 from illumcli.atlas.triangles import AtlasTriangles
+from illumcli.records import Record
 
 INSET = 1 / 16
 """How far inside its triangle the place of a border texel is [texels], and at most which share of the way to
 the triangle's centroid: at a concave edge, a ray from the edge itself would pass through the other side."""
 
 
-def texels_of(triangles: AtlasTriangles) -> TexelsOnTriangles:
-    """The centres that triangles cover, one place for each triangle, then the texels along borders, each at
-    the nearest place of a chart."""
+class Texels(Record):
+    """The texels that lookups read: those whose centres triangles cover, then those along borders."""
+
+    places: TexelsOnTriangles  # of a border texel the nearest place of a chart
+    border: BorderTexels  # the last of the places
+
+
+def texels_of(triangles: AtlasTriangles) -> Texels:
+    """The texels of a texture; a centre that several triangles cover has a place on each."""
     centres = covered_centres(triangles)
     is_covered = np.zeros(triangles.size.texels, bool)
     is_covered[centres.texel] = True
-    return joined([centres, _on_triangles(triangles, border_texels(triangles, is_covered))])
+    border = border_texels(triangles, is_covered)
+    return Texels(joined([centres, _on_triangles(triangles, border)]), border)
 
 
 def _on_triangles(triangles: AtlasTriangles, border: BorderTexels) -> TexelsOnTriangles:

@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, cross, length, row_blocks
 from illumcli.atlas.centres import TexelsOnTriangles, joined
 from illumcli.atlas.overlaps import Overlaps, overlaps
+from illumcli.atlas.texels import Texels as AtlasTexels
 from illumcli.atlas.texels import texels_of
 from illumcli.atlas.triangles import AtlasTriangles, TextureSize, atlas_triangles
 from illumcli.baking.baked_texture import TextureUvs
 from illumcli.baking.points import PointsOnTriangles, Surfaces
+from illumcli.baking.seams import Places, across_seams
 from illumcli.baking.texture_slots import Slot, slot_triangles
 from illumcli.geometry.planar import planar_polygons
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
@@ -85,9 +87,10 @@ def texel_points(
     first = 0
     for slot in slots:
         triangles = _triangles(geometry, slot, size, unwrapped.get(slot.object))
-        texels = texels_of(triangles)
+        of_texture = texels_of(triangles)
+        texels = of_texture.places
         textures.append(TexturePoints(slot, triangles, overlaps(triangles, texels), texels.texel, first))
-        places.append(replace(texels, number=triangles.triangle[texels.number]))
+        places.append(_on_surface(surfaces, triangles, of_texture))
         first += len(texels.texel)
     every = joined(places)
 
@@ -140,3 +143,14 @@ def _triangles(
     assert mesh.corner_uvs is not None
     corner = geometry.corners[own] - np.int32(placed.first_corner)
     return atlas_triangles(size, mesh.uvs, mesh.corner_uvs[corner], own)
+
+
+def _on_surface(surfaces: Surfaces, triangles: AtlasTriangles, texels: AtlasTexels) -> TexelsOnTriangles:
+    """The places of texels on stored triangles; those of border texels across seams."""
+    places = replace(texels.places, number=triangles.triangle[texels.places.number])
+    rest = slice(len(places.texel) - len(texels.border.texel), None)
+    near = Places(places.number[rest], places.u[rest], places.v[rest])
+    beyond = across_seams(surfaces, triangles, texels.border, near)
+    for values, new in ((places.number, beyond.triangle), (places.u, beyond.u), (places.v, beyond.v)):
+        values[rest] = new
+    return places

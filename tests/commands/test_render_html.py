@@ -34,7 +34,7 @@ def test_frames_are_entries_whose_commands_make_their_pictures(illum, folder):
     done = illum("render", *words, "-o", "out/{frame:02d}.png", "--html", "html")
     assert done.returncode == 0, done.stderr
     data = report_data(folder)
-    assert data["title"] == "a"
+    assert (data["title"], data["noun"]) == ("a", "frame")
     assert data["labels"] == ["a, frame 2", "a, frame 4", "a, frame 6"]
     assert [(each["label"], each["values"]) for each in data["parameters"]] == [("frame", ["2", "4", "6"])]
     assert data["states"] == ["rendered"] * 3
@@ -58,6 +58,8 @@ def test_scenes_with_several_cameras_and_one_that_fails(illum, folder):
     assert done.returncode == 2
     data = report_data(folder)
     assert data["states"] == ["rendered", "rendered", "failed"]
+    assert data["noun"] == "scene"
+    assert "<title>a, b, c: 3 scenes</title>" in (folder / "html" / "index.html").read_text()
     assert "film.samples" in data["errors"][2]
     assert data["pictureNames"] == ["beauty", "left beauty", "right beauty"]
     (folder / "c.yaml").write_text(SCENE)

@@ -44,10 +44,11 @@ class RenderPage:
         entries = tuple(self._entry(number, failures) for number in range(len(self._jobs)))
         scenes = dict.fromkeys(job.scene.stem for job in self._jobs)
         title = ", ".join(scenes) if len(scenes) < 4 else f"{len(scenes)} scenes"
+        noun = "frame" if any(job.frame is not None for job in self._jobs) else "scene"
         seconds = sum(report.total_seconds for report in self._reports.values())
         first = next(iter(self._planned.values()), None)
         ratio = first.height / first.width if first is not None else 1.0
-        write_html(self._folder, Contents(title, entries, seconds, ratio))
+        write_html(self._folder, Contents(title, entries, seconds, ratio, noun))
         return []
 
     def _contents(self) -> list[str]:

@@ -27,6 +27,7 @@ def data_script(contents: Contents, folder: Path) -> str:
     data: dict[str, Any] = {
         "illum": __version__,
         "title": contents.title,
+        "noun": contents.noun,
         "seconds": contents.seconds,
         "ratio": contents.ratio,
         "parameters": [
@@ -50,7 +51,7 @@ def data_script(contents: Contents, folder: Path) -> str:
 
 
 def data_contents(path: Path) -> Sequence[str]:
-    """The content hashes of the variants in such a script.
+    """The content hashes of the entries in such a script.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def data_contents(path: Path) -> Sequence[str]:
 def data_pictures(path: Path) -> set[str]:
     """The identities of all pictures that such a script names."""
     data = _stored(path)
-    named = {identity for variant in data["pictures"] for identity in variant}
+    named = {identity for of_entry in data["pictures"] for identity in of_entry}
     return (named | set(data["references"])) - {None}
 
 

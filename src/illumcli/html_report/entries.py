@@ -1,4 +1,4 @@
-"""What a report shows: an entry for every variant, with its pictures."""
+"""What a report shows: an entry for every variant, scene or frame, with its pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Picture(Value):
 
 
 class Entry(Value):
-    """A variant."""
+    """A variant, a scene or a frame."""
 
     label: str
     values: Mapping[str, str]
@@ -42,7 +42,7 @@ class Entry(Value):
     command: str
     """The command that makes its pictures."""
     error: str | None = None
-    """The message of a variant that failed."""
+    """The message of one that failed."""
     measures: Mapping[str, float] = field(default_factory=dict)
     """Name -> number, such as seconds and rays."""
     pictures: Mapping[str, Picture] = field(default_factory=dict)
@@ -65,3 +65,5 @@ class Contents(Value):
     """Duration of the whole run."""
     ratio: float
     """Height of thumbnails over their width."""
+    noun: str = "variant"
+    """What the page calls an entry; its plural has an s."""

@@ -28,6 +28,7 @@ def page(contents: Contents) -> str:
     text: str = environment.get_template("index.html").render(
         version=__version__,
         title=contents.title,
+        noun=contents.noun,
         count=len(entries),
         states=Counter(entry.state for entry in entries),
         parameters=parameters_of(contents),

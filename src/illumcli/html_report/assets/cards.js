@@ -31,7 +31,7 @@ function card(index, caption = true) {
 }
 
 function variantLabel(index) {
-  return REPORT.labels[index] || `variant ${index + 1}`;
+  return REPORT.labels[index] || `${REPORT.noun} ${index + 1}`;
 }
 
 // The value that cards are sorted by, where the label lacks it.

@@ -87,7 +87,7 @@ function openCompare(a, b) {
   for (const slot of $$(".slot", compare)) {
     const { label, index } = compared[slot.dataset.slot];
     const step = (by, name, sign) => el("button", {
-      type: "button", "aria-label": `${name} variant as ${slot.dataset.slot.toUpperCase()}`, disabled: index === undefined,
+      type: "button", "aria-label": `${name} ${REPORT.noun} as ${slot.dataset.slot.toUpperCase()}`, disabled: index === undefined,
       onclick: () => stepCompared(slot.dataset.slot, by),
     }, sign);
     slot.replaceChildren(el("b", {}, slot.dataset.slot.toUpperCase()), step(-1, "Previous", "←"),

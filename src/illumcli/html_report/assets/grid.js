@@ -4,7 +4,7 @@
 class Grid {
   constructor(root) {
     this.root = root;
-    this.table = el("div", { class: "grid", role: "grid", "aria-label": "Variants by two parameters" });
+    this.table = el("div", { class: "grid", role: "grid", "aria-label": `${REPORT.noun}s by two parameters` });
     root.append(this.table);
   }
 
@@ -65,7 +65,7 @@ class Grid {
       const [index, ...more] = this.cells.get(`${this.columns[c]},${this.rows[r]}`) ?? [];
       const cell = el("span", { role: "gridcell", class: "cell", "aria-colindex": c + 2 },
         ...(index === undefined ? [] : card(index, false)),
-        more.length ? el("span", { class: "more", title: "more variants have these values" }, `+${more.length}`) : null);
+        more.length ? el("span", { class: "more", title: `more ${REPORT.noun}s have these values` }, `+${more.length}`) : null);
       cell.style.left = `${side + c * x}px`;
       return cell;
     });

@@ -20,7 +20,7 @@ const app = {
   update() {
     app.order = ordered(matching(chosenFilters(), $("#search").value), app.sort.key, app.sort.descending);
     if (!app.order.includes(app.active)) app.active = app.order[0] ?? -1;
-    $("#count").textContent = `${app.order.length.toLocaleString("en")} of ${COUNT.toLocaleString("en")} variants`;
+    $("#count").textContent = `${app.order.length.toLocaleString("en")} of ${COUNT.toLocaleString("en")} ${REPORT.noun}s`;
     main.scrollTop = 0;
     app.view.show(app.order);
     main.classList.toggle("none", !app.order.length);
@@ -145,7 +145,7 @@ function showTray() {
   for (const slot of $$(".slot", $("#tray"))) {
     const side = slot.dataset.slot;
     const index = app.sides[side];
-    const label = index === null ? `take a variant as ${side.toUpperCase()}` : `${index + 1}: ${variantLabel(index)}`;
+    const label = index === null ? `take a ${REPORT.noun} as ${side.toUpperCase()}` : `${index + 1}: ${variantLabel(index)}`;
     slot.replaceChildren(el("b", {}, side.toUpperCase()), el("span", { class: "name", title: label }, label), index === null ? null
       : el("button", { type: "button", "aria-label": `Put ${side.toUpperCase()} back`, onclick: () => app.take(side, index) }, "✕"));
   }
@@ -192,7 +192,7 @@ document.addEventListener("keydown", (event) => {
   };
   const failed = REPORT.errors.filter(Boolean).length;
   $("#summary").textContent = [
-    `${COUNT.toLocaleString("en")} variants`, failed ? `${failed} failed` : "", `${shown(REPORT.seconds, 3)} s`,
+    `${COUNT.toLocaleString("en")} ${REPORT.noun}s`, failed ? `${failed} failed` : "", `${shown(REPORT.seconds, 3)} s`,
     `${shown(total("rays"))} rays`, `illum ${REPORT.illum}`,
   ].filter(Boolean).join(" · ");
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from illumcli.commands import bands
-from illumcli.commands.bands import LEAST, ROWS, band_counts, rows_of_bands
+from illumcli.commands.bands import LEAST, ROWS, band_counts, remove_bands, rows_of_bands
 from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions, Shard
 from illumcli.commands.render import render_scene
 from illumcli.commands.render_all import render_scenes
@@ -44,6 +44,19 @@ def test_joined_bands_are_the_bytes_of_the_picture(scene, tmp_path, overrides):
         join_bands([paths[number] for paths, _ in parts], path)
         assert path.read_bytes() == expected[path]
     assert sum(report.rays.get("obscurance", 0) for _, report in parts) == whole.rays["obscurance"]
+
+
+def test_bands_of_another_cut_are_removed_and_files_of_others_stay(scene, tmp_path):
+    job = RenderJob(scene, RenderOptions((LAYERS, "outputs.files=['{scene}.exr']"), cache=False))
+    for rows in ((0, 8), (8, 36), (0, 20)):
+        render_scene(replace(job, rows=rows))
+    other = replace(job, rows=(20, 36), options=replace(job.options, seed=5))
+    (band_of_other_content,), _ = render_scene(other)
+    foreign = tmp_path / "s.rows-00040-00050.exr"
+    foreign.write_text("an image?")
+    (picture,) = Worker().prepare(job).targets
+    remove_bands(picture)
+    assert sorted(Path().glob("*.exr")) == sorted([band_of_other_content, Path(foreign.name)])
 
 
 def test_large_pictures_are_cut_and_small_ones_stay_whole():
@@ -92,8 +105,10 @@ def test_shards_of_bands_are_merged_to_the_picture(illum, scene, tmp_path, monke
     assert "all/s.exr: kept" in again.stderr
 
 
-def test_the_plan_says_which_pictures_stay_whole(illum, scene):
+def test_plan_and_report_say_which_pictures_stay_whole(illum, scene):
     cut = illum("plan", scene, "-D", "obscurance.reconstruct=false")
     whole = illum("plan", scene, "-D", "obscurance.reconstruct=true")
     assert "whole" not in cut.stdout
     assert "whole   on clusters and in shards: obscurance is reconstructed" in whole.stdout
+    illum("render", scene, "-D", "obscurance.reconstruct=true", "--report", "r.json")
+    assert json.loads(Path("r.json").read_text())["whole"].startswith("obscurance is reconstructed")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from illumcli.commands.options import RenderJob
 from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.report import Report
+from illumcli.commands.targets import band_of
 from illumcli.commands.unit import Unit
 from illumcli.commands.unit_cost import cost_of
-from illumcli.commands.work import Work
-from illumcli.files.names import band_path
+from illumcli.errors import InputError
+from illumcli.files.names import band_path, rows_of_band_files
+from illumcli.film.develop import Target
 from illumcli.film.view import View
+from illumcli.images.contents import image_contents
 from illumcli.render_graph.costs import CostModel
-from illumcli.render_graph.needs import reconstructs
 
 LEAST = 1 << 24
 """A picture that costs less [obscurance rays] stays whole: some 2 s of a core."""
@@ -23,15 +26,6 @@ BANDS = 4
 """Bands of one worker's share: rows do not cost the same."""
 ROWS = 64
 """Bands begin at multiples of so many rows."""
-
-
-def whole_because(work: Work) -> str:
-    """Why large pictures of a work are not cut; empty if they are."""
-    if work.job.options.target_error is not None:
-        return "sample counts are chosen for its target error"
-    if reconstructs(work.scene):
-        return "obscurance is reconstructed from the pixels around, and audited"
-    return ""
 
 
 def band_counts(costs: Sequence[int], workers: int) -> list[int]:
@@ -54,6 +48,15 @@ def in_bands(job: RenderJob, camera: str, rows: Sequence[tuple[int, int]]) -> li
     return [replace(of_camera, rows=each) for each in rows] if len(rows) > 1 else [of_camera]
 
 
+def remove_bands(picture: Target) -> None:
+    """Remove the bands of a picture, also those that an interrupted command has cut otherwise."""
+    for rows in rows_of_band_files(picture.path):
+        band = band_of(picture, rows)
+        with suppress(InputError, KeyError, OSError, ValueError):  # a file of another program, or removed
+            if image_contents(band.path) == [band.content]:
+                band.path.unlink()
+
+
 class CutJobs:
     """Those jobs of `illum render` that are large beside the share of a worker, in bands."""
 
@@ -73,7 +76,7 @@ class CutJobs:
             views = {target.view.name: target.view for target in work.targets}
             rows = {name: rows_of_bands(view, count) for name, view in views.items()}
             is_cut = count > 1 and any(len(each) > 1 for each in rows.values())
-            if is_cut and not whole_because(work):
+            if is_cut and not work.whole_because:
                 self._rows[number] = rows
                 parts[number] = [unit for name in rows for unit in in_bands(work.job, name, rows[name])]
         return parts
@@ -87,8 +90,7 @@ class CutJobs:
         for target in due:
             bands = [band_path(target.path, each) for each in rows[target.view.name]]
             join_bands(bands, target.path)
-            for band in bands:
-                band.unlink(missing_ok=True)
+            remove_bands(target)
         paths = [target.path for target in work.targets]
         written = {str(target.path) for target in due} | {
             path for _, report in results for path in report.written

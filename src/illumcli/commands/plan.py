@@ -10,7 +10,6 @@ from typing import Any
 from illumcli.cache.location import open_store
 from illumcli.cache.recorder import Cache
 from illumcli.cache.speeds import by_stage, read_speeds
-from illumcli.commands.bands import whole_because
 from illumcli.commands.options import RenderOptions
 from illumcli.commands.plan_variants import own_variants, planned_variants
 from illumcli.commands.sweep_names import named
@@ -73,7 +72,7 @@ class ScenePlan:
         for plan in plans:
             time = time_of(by_stage(units_of(plan)), speeds, run.threads)
             part = plan_data(plan, self._expected)
-            parts.append(part | {"whole": whole_because(first), "expected_time": time.as_data()})
+            parts.append(part | {"whole": first.whole_because, "expected_time": time.as_data()})
 
         # What all variants take.
         if self._is_of_all:

@@ -110,6 +110,7 @@ def rendered(
         written=tuple(str(target.path) for target in due),
         kept=tuple(map(str, kept)),
         skipped=skipped,
+        whole=work.whole_because,
         repairs=repaired,
         reused=reused,
         obscurance_files=obscurance_files(graph, outputs),

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from illumcli.commands.bands import band_counts, rows_of_bands, whole_because
+from illumcli.commands.bands import band_counts, rows_of_bands
 from illumcli.commands.batch import Batch, Tell
 from illumcli.commands.batch_shard import BatchUnits, run_shard
 from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions
@@ -116,4 +116,4 @@ def _pictures(jobs: RenderJobs) -> Iterator[_Picture]:
             files = tuple(target.path for target in targets)
             facts = {**about, "contents": part.contents}
             planned = PlannedUnit(name, files, cost_of(part, model), facts)
-            yield _Picture(replace(job, cameras=names), planned, () if whole_because(work) else targets)
+            yield _Picture(replace(job, cameras=names), planned, () if work.whole_because else targets)

@@ -30,6 +30,8 @@ class Report(Value):
     written: tuple[str, ...] = ()
     kept: tuple[str, ...] = ()
     skipped: Mapping[str, str] = field(default_factory=dict)
+    whole: str = ""
+    """Why its pictures are not cut into bands for several workers; empty if large ones are."""
     repairs: Repairs = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)

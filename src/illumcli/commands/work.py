@@ -21,6 +21,7 @@ from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build
 from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_memory, refuse_rays
+from illumcli.render_graph.needs import reconstructs
 from illumcli.render_graph.schedule import error_is_audited, outputs_of
 from illumcli.scene.load import load
 from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
@@ -69,6 +70,15 @@ class Work(Value):
     def claim(self) -> Path | None:
         """The path of the claim on this work; None with `force`, which does it whoever has done it."""
         return None if self.job.options.force else claim_path(self.targets[0].path, self.content)
+
+    @property
+    def whole_because(self) -> str:
+        """Why its pictures are not cut into bands for several workers; empty if large ones are."""
+        if self.job.options.target_error is not None:
+            return "sample counts are chosen for its target error"
+        if reconstructs(self.scene):
+            return "obscurance is reconstructed from the pixels around, and audited"
+        return ""
 
     def due(self) -> list[Target]:
         """The files to write, without those that exist with the same content.

@@ -167,3 +167,11 @@ def _safe(text: str) -> str:
 def band_path(picture: Path, rows: tuple[int, int]) -> Path:
     """The file of some rows of a picture, from the first to before the second."""
     return picture.with_name(f"{picture.stem}.rows-{rows[0]:05d}-{rows[1] - 1:05d}{picture.suffix}")
+
+
+def rows_of_band_files(picture: Path) -> list[tuple[int, int]]:
+    """The rows of each file beside a picture that has the name of a band of it."""
+    stem, suffix = re.escape(picture.stem), re.escape(picture.suffix)
+    name = re.compile(rf"{stem}\.rows-(0\d{{4}}|[1-9]\d{{4,}})-(0\d{{4}}|[1-9]\d{{4,}}){suffix}")
+    matches = [name.fullmatch(entry) for entry in os.listdir(picture.parent)]
+    return [(int(match[1]), int(match[2]) + 1) for match in matches if match]

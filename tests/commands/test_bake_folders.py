@@ -71,7 +71,7 @@ def test_files_baked_into_their_own_folder_are_not_baked_again(illum, folder):
 
 
 def test_a_folder_without_meshes(illum, folder):
-    done = illum("ao-bake", "meshes/more", "-o", "{name}.npz")
+    done = illum("ao-bake", "meshes", "meshes/more", "-o", "{name}.npz")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "meshes/more: has no mesh files; name a folder that has some\n"
 

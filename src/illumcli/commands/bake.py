@@ -32,14 +32,6 @@ class BakeRequest(Value):
     shard: Shard | None = None
     """The part of the inputs that is baked; by default all."""
 
-    def outputs(self, path: Path) -> list[Path]:
-        """The files of one input."""
-        fields = {"name": path.stem, "scene": path.stem}
-        return [
-            Path((expand_some if is_texture(Path(pattern)) else expand)(pattern, fields))
-            for pattern in self.patterns
-        ]
-
     def refuse_shared_outputs(self, inputs: Sequence[Path]) -> None:
         """Raise InputError for all files that several inputs would write; an input may be given twice."""
         jobs = [self.job(path) for path in dict.fromkeys(inputs)]
@@ -49,8 +41,12 @@ class BakeRequest(Value):
     def job(self, path: Path) -> BakeJob:
         """The unit of work of one input."""
         fields = {"name": path.stem, "scene": path.stem}
+        outputs = [
+            Path((expand_some if is_texture(Path(pattern)) else expand)(pattern, fields))
+            for pattern in self.patterns
+        ]
         preview = None if self.preview is None else Path(expand(self.preview, fields))
-        return BakeJob(path, tuple(self.outputs(path)), self.settings, self.options, preview)
+        return BakeJob(path, tuple(outputs), self.settings, self.options, preview)
 
 
 def bake_inputs(

@@ -38,26 +38,28 @@ def with_folders(inputs: Sequence[Path]) -> BakeInputs:
         if not path.is_dir():
             paths.append(path)
             continue
-        meshes, others = _sorted_out(path, problems)
-        paths += meshes
-        lines += [f"{path}: passed over {_listed(names)}: {why}" for why, names in others.items()]
-        if not meshes:
-            problems.append("\n".join([f"{path}: has no mesh files; name a folder that has some", *lines]))
+        try:
+            meshes, others = _sorted_out(path)
+        except OSError as error:
+            problems.append(f"{path}: cannot be read ({error.strerror}); change its permissions")
+            continue
+        passed_over = [f"{path}: passed over {_listed(names)}: {why}" for why, names in others.items()]
+        if meshes:
+            paths += meshes
+            lines += passed_over
+        else:
+            fact = f"{path}: has no mesh files; name a folder that has some"
+            problems.append("\n".join([fact, *passed_over]))
     if problems:
         raise InputError(problems)
     return BakeInputs(tuple(paths), tuple(lines))
 
 
-def _sorted_out(folder: Path, problems: list[str]) -> tuple[list[Path], dict[str, list[str]]]:
+def _sorted_out(folder: Path) -> tuple[list[Path], dict[str, list[str]]]:
     """The mesh files of a folder, and the names of its other entries by the reason to pass them over."""
     meshes: list[Path] = []
     others: defaultdict[str, list[str]] = defaultdict(list)
-    try:
-        entries = sorted(folder.iterdir())
-    except OSError as error:
-        problems.append(f"{folder}: cannot be read ({error.strerror}); change its permissions")
-        return meshes, others
-    for path in entries:
+    for path in sorted(folder.iterdir()):
         if path.name.startswith("."):
             continue
         reason = _reason(path)

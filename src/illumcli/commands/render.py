@@ -13,7 +13,8 @@ from illumcli.cache.recorder import NO_CACHE, Cache
 from illumcli.commands.options import RenderJob
 from illumcli.commands.report import Report
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, unused_keys
+from illumcli.commands.unused import unused_keys
+from illumcli.commands.work import Work
 from illumcli.commands.write_view import write_view
 from illumcli.files.outputs import refresh
 from illumcli.geometry.repairs import Repairs

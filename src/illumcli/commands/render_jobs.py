@@ -10,7 +10,8 @@ from pathlib import Path
 from illumcli.commands.held_works import HeldWorks
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, unused_keys
+from illumcli.commands.unused import unused_keys
+from illumcli.commands.work import Work
 from illumcli.errors import InputError, unless_faulty
 from illumcli.scene.frames import FRAMES_PER_SECOND, MAX_FRAMES, frame_numbers
 from illumcli.scene.load import read_frames

@@ -11,7 +11,7 @@ from illumcli.commands.sweep_names import refuse_equal_names
 from illumcli.commands.sweep_outcome import Outcome
 from illumcli.commands.sweep_works import SweepWorks, planned_variant
 from illumcli.commands.unit_cost import cost_of
-from illumcli.commands.work import unused_keys
+from illumcli.commands.unused import unused_keys
 from illumcli.records import Record
 from illumcli.render_graph.costs import Cost, CostModel
 from illumcli.scene.variants import Variant

@@ -24,7 +24,7 @@ from illumcli.render_graph.limits import expected_memory, refuse_disk, refuse_me
 from illumcli.render_graph.needs import reconstructs
 from illumcli.render_graph.schedule import error_is_audited, outputs_of
 from illumcli.scene.load import load
-from illumcli.scene.scene_file import SceneFile, lacking_lines, unused_lines
+from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 
 if TYPE_CHECKING:
@@ -131,14 +131,6 @@ def refuse_large_errors(graph: Graph, outputs: Sequence[Layer]) -> None:
                 f"at most {MOST_PIXELS:,} pixels; leave it out, render a smaller film, or set "
                 "obscurance.reconstruct=false"
             )
-
-
-def unused_keys(work: Work) -> list[str]:
-    """A line for each value of the scene that has no effect, and for each part that its pictures lack."""
-    files = () if work.job.options.pattern else work.scene.outputs.files
-    layers = [layer.name for layer in work.outputs]
-    lacking = lacking_lines(work.loaded, work.scene, layers)
-    return lacking + unused_lines(work.loaded, work.scene, layers, files)
 
 
 def refuse_too_large(work: Work, due: Sequence[Target]) -> None:

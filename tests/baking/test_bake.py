@@ -311,6 +311,31 @@ def test_an_obj_goes_to_glb_with_its_groups_materials_and_images(text_mesh, tmp_
     assert faults(tmp_path / "out.glb") == []
 
 
+def test_textures_are_read_beside_the_mesh_that_names_them(text_mesh, tmp_path):
+    image = png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True)
+    (tmp_path / "a.mtl").write_text("newmtl clay\nmap_Kd brick.png\n")
+    (tmp_path / "brick.png").write_bytes(image)
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl clay\nf 1/1 2/2 3/3\n"
+    bake(text_mesh("mtllib a.mtl\n" + triangle), tmp_path / "whole.glb", samples=4)
+    ply = tmp_path / "named.ply"
+    ply.write_text(
+        "ply\nformat ascii 1.0\ncomment TextureFile brick.png\nelement vertex 3\nproperty float x\n"
+        "property float y\nproperty float z\nproperty float s\nproperty float t\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
+    )
+    scene = tmp_path / "scenes" / "a.yaml"
+    scene.parent.mkdir()
+    scene.write_text("version: 1\nobjects: [{mesh: {file: ../whole.glb, materials: true}}]\n")
+    for source, names in ((tmp_path / "whole.glb", "glb obj"), (ply, "glb obj"), (scene, "obj")):
+        for name in names.split():
+            out = tmp_path / f"{source.suffix[1:]}-{name}" / f"out.{name}"
+            bake(source, out, samples=4)
+            if name == "obj":
+                assert (out.parent / "out.0.png").read_bytes() == image
+            else:
+                assert len(open_document(out).json["images"]) == 1
+
+
 def test_an_obj_keeps_its_lines_and_takes_its_materials_along(text_mesh, tmp_path):
     (tmp_path / "maps").mkdir()
     (tmp_path / "maps/brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))

@@ -19,6 +19,7 @@ from illumcli.mesh_files import mtl, obj
 from illumcli.mesh_files._files import content
 from illumcli.mesh_files._polygons import runs
 from illumcli.mesh_files.mtl_write import mtl_lines
+from illumcli.shading.materials import textures_at
 
 _ENDINGS = {"image/png": ".png", "image/jpeg": ".jpg"}
 
@@ -68,6 +69,14 @@ def _put(target: Path, data: bytes, force: bool) -> None:
             raise OutputError(f"{target}: a different file is there; use --force to replace it")
     with AtomicFile(target) as part:
         part.path.write_bytes(data)
+
+
+def with_textures_in(folder: Path, mesh: Mesh) -> Mesh:
+    """A mesh with whole paths of its textures, which are relative to `folder`, that of its file."""
+    materials = {
+        name: textures_at(keys, lambda path: str(folder / path)) for name, keys in mesh.materials.items()
+    }
+    return replace(mesh, materials=materials)
 
 
 def placed_mesh(placed: PlacedMesh) -> Mesh:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from illumcli.baking.files import (
     write_baked_ply,
 )
 from illumcli.baking.inputs import BakeWork
-from illumcli.baking.obj_files import copy_materials, placed_mesh, write_materials
+from illumcli.baking.obj_files import copy_materials, placed_mesh, with_textures_in, write_materials
 from illumcli.baking.points import Surfaces
 from illumcli.baking.split import (
     corners_of_triangles,
@@ -26,6 +27,7 @@ from illumcli.baking.split import (
     whole_meshes,
     with_materials,
 )
+from illumcli.geometry.mesh import Mesh
 from illumcli.images.encoded import png_bytes
 from illumcli.mesh_files import is_mesh_file
 from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
@@ -36,6 +38,7 @@ from illumcli.mesh_files.obj_write import NamedMesh
 from illumcli.mesh_files.occlusion import OcclusionMap, OcclusionMaps
 from illumcli.mesh_files.output_mesh import OutputMesh
 from illumcli.mesh_files.ply import has_plain_faces
+from illumcli.render_graph.needs import mesh_name
 from illumcli.visibility.baked import Baked, write_npz
 
 GLTF = (".glb", ".gltf")
@@ -119,7 +122,7 @@ class _Writer:
         meshes = split.meshes
         left_out = []
         if self._is_mesh:
-            materials = pbr_materials(self._source, self._work.surfaces.geometry.placed[0].mesh)
+            materials = pbr_materials(self._source, self._meshes()[0])
             meshes = [with_materials(mesh, materials) for mesh in meshes]
             left_out += [each for mesh in meshes for material in mesh.materials for each in material.left_out]
         elif self._has_materials(meshes):
@@ -166,7 +169,10 @@ class _Writer:
             extend_baked_obj(path, self._source, placed[0].mesh, self._baked, channel)
             copy_materials(path, self._source, force)
             return []
-        meshes = [NamedMesh(name, placed_mesh(each)) for name, each in zip(self._names, placed, strict=True)]
+        moved = [
+            placed_mesh(replace(each, mesh=mesh)) for each, mesh in zip(placed, self._meshes(), strict=True)
+        ]
+        meshes = [NamedMesh(name, mesh) for name, mesh in zip(self._names, moved, strict=True)]
         library = write_materials(path, [each.mesh for each in meshes], force)
         write_baked_obj(path, meshes, self._baked, channel, library)
 
@@ -180,6 +186,12 @@ class _Writer:
         if self._source.suffix.lower() in GLTF:
             left_out += beside_mesh(open_document(self._source))
         return left_out
+
+    def _meshes(self) -> list[Mesh]:
+        """The mesh of each object, with whole paths of textures."""
+        scene, placed = self._work.scene, self._work.surfaces.geometry.placed
+        files = [self._source.parent / mesh_name(scene, thing.mesh) for thing in scene.objects]
+        return [with_textures_in(file.parent, each.mesh) for file, each in zip(files, placed, strict=True)]
 
     def _has_materials(self, meshes: Sequence[OutputMesh]) -> bool:
         """True if mesh files or the scene have materials."""

@@ -11,8 +11,8 @@ the process to the written file; meshes are the same PLY, nothing is kept betwee
 
     PEERS=/path/to/venv/bin/python PYTHONPATH=src python benchmarks/peers.py [--small] [mitsuba povray]
 
-PEERS has `pip install mitsuba mitsuba-oidn`, which wants an LLVM of 16 or later (DRJIT_LIBLLVM_PATH says
-where); POV-Ray is Debian's package `povray`.
+PEERS has `pip install numpy mitsuba mitsuba-oidn`, which wants an LLVM of 16 or later (DRJIT_LIBLLVM_PATH
+says where); POV-Ray is Debian's package `povray`.
 """
 
 from __future__ import annotations

@@ -143,10 +143,11 @@ def _faces(mesh: Mesh, first: Mapping[str, int]) -> Iterator[bytes]:
         "usemtl": _names(mesh.polygon_materials, mesh.material_names, mesh.polygon_count),
         "s": _smoothing(mesh),
     }
-    current: dict[str, str | None] = dict.fromkeys(states)
+    used = {word: names for word, names in states.items() if any(names)}
+    current: dict[str, str | None] = dict.fromkeys(used)
     starts = mesh.starts.tolist()
     for polygon in range(mesh.polygon_count):
-        for word, of_polygons in states.items():
+        for word, of_polygons in used.items():
             name = of_polygons[polygon]
             if name is not None and name != current[word]:
                 yield f"{word} {name}".encode()
@@ -162,6 +163,8 @@ def _corner_words(mesh: Mesh, first: Mapping[str, int]) -> list[bytes]:
             return [""] * len(mesh.corners)
         return [str(row + first[word]) if row >= 0 else "" for row in rows.tolist()]
 
+    if mesh.corner_uvs is None and mesh.corner_normals is None:
+        return [b"%d" % each for each in (mesh.corners + np.int64(first["v"])).tolist()]
     corners = zip(
         numbers(mesh.corners, "v"),
         numbers(mesh.corner_uvs, "vt"),

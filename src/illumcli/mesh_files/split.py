@@ -48,22 +48,37 @@ def split_vertices(
     tables : sequence of (C, k)
         Normals, uv or values of each corner.
     """
-    # Number the combinations of a vertex and its rows.
-    key = corners.astype(np.int64)
+    # The vertices whose corners all have the rows of the first one are not split.
+    first_corner = np.full(count, -1, np.int64)
+    first_corner[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)
+    several = np.zeros(count, np.bool_)
     for table in tables:
-        _, row = np.unique(table, axis=0, return_inverse=True)
-        _, key = np.unique(key * (len(table) + 1) + row.ravel(), return_inverse=True)
+        other = (table != table[first_corner[corners]]).any(axis=1)
+        several[corners[other]] = True
+    rest = np.flatnonzero(several[corners])
+    of_corner = corners.astype(np.int32)
+    if not len(rest):
+        return SplitVertices(np.arange(count), first_corner, of_corner)
+
+    # Number the combinations of each other vertex and its rows.
+    key = corners[rest].astype(np.int64)
+    for table in tables:
+        _, row = np.unique(table[rest], axis=0, return_inverse=True)
+        _, key = np.unique(key * (len(rest) + 1) + row.ravel(), return_inverse=True)
         key = key.ravel()
     _, first, key = np.unique(key, return_index=True, return_inverse=True)
 
-    # The first combination of each vertex keeps the vertex's index; the others follow after all vertices.
+    # The first combination of a vertex keeps the vertex's index; the others follow after all vertices.
     order = np.argsort(first, kind="stable")
-    vertex = corners[first[order]]
+    vertex = corners[rest[first[order]]]
     is_first = np.zeros(len(order), bool)
     is_first[np.unique(vertex, return_index=True)[1]] = True
     number = np.empty(len(order), np.int32)
     number[order] = np.where(is_first, vertex, count + np.cumsum(~is_first) - 1)
-    corner = np.full(count + int((~is_first).sum()), -1, np.int64)
-    corner[number] = first
-    source = np.concatenate([np.arange(count), vertex[~is_first]])
-    return SplitVertices(source, corner, number[key.ravel()])
+    of_corner[rest] = number[key.ravel()]
+    copies = order[~is_first]
+    return SplitVertices(
+        np.concatenate([np.arange(count), vertex[~is_first]]),
+        np.concatenate([first_corner, rest[first[copies]]]),
+        of_corner,
+    )

@@ -96,10 +96,18 @@ def _primitives(mesh: OutputMesh) -> Iterator[Rows]:
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
     for rows in np.split(order, starts[1:]):
-        vertices, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
-        yield Rows(
-            int(groups[rows[0]]), int(materials[rows[0]]), vertices.astype(np.int64), triangles.reshape(-1, 3)
-        )
+        vertices, triangles = _numbered(mesh.triangles[rows], len(mesh.vertices))
+        yield Rows(int(groups[rows[0]]), int(materials[rows[0]]), vertices, triangles.reshape(-1, 3))
+
+
+def _numbered(triangles: NDArray[np.int32], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The vertices of triangles, ascending, and the triangles over these; `count` vertices in all."""
+    if 3 * len(triangles) < count:
+        vertices, numbers = np.unique(triangles, return_inverse=True)
+        return vertices.astype(np.int64), numbers
+    is_used = np.zeros(count, np.bool_)  # without sorting
+    is_used[triangles] = True
+    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[triangles]
 
 
 def _offset(vertices: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -124,6 +124,17 @@ def test_frames_are_orthonormal_for_every_normal():
 
 
 @pytest.mark.parametrize("Falloff", members("illumcli.visibility.falloffs"), ids=lambda c: c.__name__)
+def test_occluders_out_of_reach_weigh_nothing_exactly(Falloff):
+    """Rays end a little beyond the reach, and distances are rounded."""
+    tag = Falloff.__module__.rpartition(".")[2]
+    under_a_lid = scene(FLOOR, 100 * FLOOR[::-1] + [0, 0, 1])
+    for radius in np.random.default_rng(4).uniform(0.1, 10, 20):
+        falloff = Falloff.model_validate({"falloff": tag, "max_distance": 0.99 * radius})
+        w = estimates(under_a_lid, [0, 0, 0], UP, falloff, scrambles=10, radius=radius)
+        assert (w == 1).all()
+
+
+@pytest.mark.parametrize("Falloff", members("illumcli.visibility.falloffs"), ids=lambda c: c.__name__)
 def test_every_falloff_rises_from_0_at_contact_to_1_out_of_reach(Falloff):
     tag = Falloff.__module__.rpartition(".")[2]
     falloff = Falloff.model_validate({"falloff": tag, "max_distance": 2.0})

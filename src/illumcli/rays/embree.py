@@ -111,7 +111,10 @@ class Tracer:
         return out if lowest > 0 else out & (reach > 0)
 
     def trace_patterns(self, rays: PatternRays, limit: float, out: PatternResults) -> None:
-        """Fill `out`, whose `open` is 0, with the results of rays that are `limit` long; a miss is at inf."""
+        """Fill `out`, whose `open` is 0, with the results of rays that are `limit` long.
+
+        A miss is at `limit` or beyond, at inf if there is none.
+        """
         if self._stop is not None and self._stop.is_set():
             raise Interrupted
         for name, array in (("origins", rays.origins), ("directions", rays.frames.reshape(-1, 3))):

@@ -27,6 +27,8 @@ Faces: TypeAlias = Literal["count", "ignore", "one_sided"]
 
 RAYS_AT_ONCE = 1 << 19
 """Rays per batch: so many that the arrays with a row per point cost little beside them."""
+BEYOND = 1 + 2.0**-20
+"""Length of rays whose distance counts, as a share of the reach: the weight of a miss is exactly 1."""
 MAX_BACK_FACES = 64
 """Back faces in a row that a ray passes through if back faces are ignored."""
 
@@ -178,17 +180,18 @@ def openness(tracer: Tracer, rays: PatternRays, method: Method, each_ray: bool, 
         What is needed beside w: mu and the direction of each ray. Otherwise it may be None.
     """
     reach = method.falloff.reach(method.radius)
+    limit = np.inf if reach == np.inf else reach / method.radius
     wanted = ["directions"] if directions else []
     if method.any_hit:
         results = PatternResults.room(rays.shape, *wanted, *(["is_open"] if each_ray else []))
-        tracer.trace_patterns(rays, np.inf if reach == np.inf else reach / method.radius, results)
+        tracer.trace_patterns(rays, limit, results)
         w = results.open.astype(F) / F(method.samples)  # exact: counts are below 2^24
         return Openness(w, results.is_open, results.directions)
 
     # The weight of what each ray meets first.
     if method.faces == "count":
         results = PatternResults.room(rays.shape, *wanted, "distance")
-        tracer.trace_patterns(rays, np.inf, results)
+        tracer.trace_patterns(rays, limit * BEYOND, results)
         distance, d = results.distance, results.directions
     else:
         d = rays.directions()

@@ -71,15 +71,3 @@ def test_workers_without_the_folder_send_their_bands(scene, machines, monkeypatc
     assert {path: path.read_bytes() for path in done.paths} == expected
     assert list(Path().glob("*rows*")) == []
     assert done.report.written == tuple(map(str, expected))
-
-
-@pytest.mark.parametrize("why", ["obscurance.reconstruct=true", "target_error"])
-def test_pictures_that_need_their_surroundings_stay_whole(scene, monkeypatch, why):
-    monkeypatch.chdir(scene.parent)
-    monkeypatch.setattr(bands, "LEAST", 1)
-    options = RenderOptions((*LARGE, why)) if "=" in why else RenderOptions(LARGE, target_error=0.1)
-    from illumcli.commands.render_jobs import RenderJobs
-
-    jobs = RenderJobs([Path("s.yaml")], options)
-    assert bands.CutJobs(jobs).parts([0], 2) == {}
-    assert jobs.work(0).whole_because

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from illumcli.commands import bands
-from illumcli.commands.bands import LEAST, ROWS, band_counts, remove_bands, rows_of_bands
+from illumcli.commands.bands import LEAST, ROWS, CutJobs, band_counts, remove_bands, rows_of_bands
 from illumcli.commands.options import RenderFiles, RenderJob, RenderOptions, Shard
 from illumcli.commands.render import render_scene
 from illumcli.commands.render_all import render_scenes
+from illumcli.commands.render_jobs import RenderJobs
 from illumcli.commands.render_shard import render_shard
 from illumcli.commands.runner import Here
 from illumcli.commands.unit import Worker
@@ -76,6 +77,17 @@ def test_bands_have_whole_blocks_and_end_with_the_picture(scene):
         assert [first for first, _ in rows] == [0, *(end for _, end in rows[:-1])]
         assert rows[-1][1] == height
         assert all(first % ROWS == 0 for first, _ in rows)
+
+
+@pytest.mark.parametrize(
+    "options", [RenderOptions(("obscurance.reconstruct=true",)), RenderOptions(target_error=0.1)]
+)
+def test_pictures_that_need_their_surroundings_stay_whole(scene, monkeypatch, options):
+    monkeypatch.setattr(bands, "LEAST", 1)
+    options = replace(options, overrides=(*options.overrides, "film.height=300"))
+    jobs = RenderJobs([scene], options)
+    assert CutJobs(jobs).parts([0], 2) == {}
+    assert jobs.work(0).whole_because
 
 
 def test_shards_of_bands_are_merged_to_the_picture(illum, scene, tmp_path, monkeypatch):

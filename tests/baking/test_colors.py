@@ -11,6 +11,7 @@ from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.color import from_srgb, to_srgb
 from illumcli.errors import InputError
 from illumcli.mesh_files import read_mesh
+from illumcli.mesh_files.gltf.document import open_document
 
 STEP = [(-1, 0, -3), (1, 0, -3), (1, 0, 0), (-1, 0, 0), (1, 1, 0), (-1, 1, 0)]
 BYTES = np.array([[255, 0, 0], [0, 128, 255], [9, 9, 9], [200, 100, 50], [1, 2, 3], [255, 255, 255]])
@@ -106,6 +107,11 @@ def test_a_glb_of_another_format_has_its_colours_with_the_change(tmp_path):
     expected = before.attributes["color"][number] * w[:, None]
     np.testing.assert_allclose(found.attributes["color"], expected, atol=1e-6)
     assert (found.attributes["alpha"] == 0.5).all()
+    document = open_document(tmp_path / "out.glb").json
+    (primitive,) = document["meshes"][0]["primitives"]
+    assert (
+        len(document["accessors"]) == len(primitive["attributes"]) + 1
+    )  # none is left of the colours before
 
 
 def test_a_glb_keeps_the_type_of_its_colours(tmp_path):

@@ -65,7 +65,7 @@ def write_glb(
         number_of_group: dict[int, int] = {}
         offset = _offset(mesh.vertices)
         for part in _primitives(mesh):
-            primitive = _primitive(writer, mesh, part, offset)
+            primitive = _primitive(writer, mesh, part, offset, with_color=data.color is None)
             _add_values(writer, primitive["attributes"], mesh, part.vertices, data, first)
             has_map = (index, part.material) in occlusion.maps
             if part.material >= 0 or has_map:
@@ -123,14 +123,17 @@ def _name(mesh: OutputMesh, group: int, alone: bool) -> str:
 
 
 def _primitive(
-    writer: GlbWriter, mesh: OutputMesh, part: Rows, offset: NDArray[np.float64] | None
+    writer: GlbWriter, mesh: OutputMesh, part: Rows, offset: NDArray[np.float64] | None, with_color: bool
 ) -> dict[str, Any]:
-    """Positions, attributes that glTF can hold (up to four numbers per vertex), and indices."""
+    """Positions, attributes that glTF can hold (up to four numbers per vertex), and indices; `with_color`
+    those of vertices as they are."""
     vertices = mesh.vertices[part.vertices] - (0 if offset is None else offset)
     attributes = {"POSITION": positions(writer, vertices)}
     for name, given in sorted(mesh.attributes.items(), key=lambda each: each[0] not in STANDARD):
         values = np.asarray(given)[part.vertices]
         if (name == "alpha" and "color" in mesh.attributes) or not fits_attribute(values):
+            continue
+        if name == "color" and not with_color:
             continue
         if name == "color":
             label = "COLOR_0"

@@ -86,6 +86,13 @@ def test_pictures_with_baked_values_agree_with_those_without(root, tmp_path, tor
     assert float(row[4]) < 0.05
 
 
+def test_textures_are_baked_and_their_error_is_checked(root, tmp_path, torus):
+    pytest.importorskip("xatlas")
+    row = printed(root, tmp_path, "texture_bake", str(torus)).splitlines()[-1]
+    assert row.startswith("ours")
+    assert float(row.partition("; error ")[2].partition(",")[0]) < 0.1
+
+
 def test_the_error_of_reconstructed_values_is_stated(root, tmp_path, torus):
     options = ["--seeds", "2", "--reference", "256", "--rays", "16"]
     row = printed(root, tmp_path, "ao_reconstruction", str(torus), *options).splitlines()[-1].split()

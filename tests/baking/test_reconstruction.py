@@ -57,6 +57,22 @@ def test_a_linear_surface_loses_its_noise():
     assert values.windows[128] > 0.7
 
 
+class DensePoints(Points):
+    is_dense = True
+
+
+def test_noise_beyond_what_is_stated_goes_where_points_are_dense():
+    sparse = plane(4000)
+    dense = DensePoints(**vars(sparse))
+    truth = 0.3 + 0.2 * sparse.position[:, 0].astype(float)
+    raw = noisy(truth, 0.1)
+    understated = RawValues(raw.hidden, raw.variance / 10)
+    assert reconstructed(sparse, understated).windows[1] > 0.9
+    values = reconstructed(dense, understated)
+    assert values.windows[1] == 0
+    assert rmse(values.hidden, truth) < 0.1 / 4
+
+
 def test_w_that_bends_from_point_to_point_keeps_its_raw_values():
     points = plane(300)
     truth = np.random.default_rng(5).random(300)

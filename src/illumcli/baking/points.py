@@ -33,6 +33,8 @@ class Points(Record):
     """Tells the units of work over points of one kind from those over others."""
     cell_size: ClassVar[int] = SIZE
     """Points of a cell where values are reconstructed."""
+    is_dense: ClassVar[bool] = False
+    """True if w hardly differs between consecutive points of a cell: what differs is noise."""
 
     geometry: SceneGeometry
     n: Vectors  # (M, 3) float32 unit shading normals

@@ -6,7 +6,8 @@ around it. Points are grouped into cells; a window is a cell and its nearest cel
 normals agree, so that no value crosses a hard edge.
 
 Each cell takes the window of the least risk, by Stein's unbiased estimate from the standard errors of the raw
-values; where no window promises less than the raw values they stay. The same is done over the cells of
+values; where no window promises less than the raw values they stay. Of dense points, as texels are, the
+differences between consecutive raw values also tell their errors. The same is done over the cells of
 another order of the points, and the mean taken, which smooths the steps between cells.
 
 References
@@ -88,7 +89,7 @@ def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, thread
     chosen = np.zeros(len(WINDOWS) + 1)
     with ThreadPoolExecutor(threads, thread_name_prefix="reconstruct") as pool:
         for cells in rotated:
-            values = CellValues(cells, features, raw)
+            values = CellValues(cells, features, raw, points.is_dense)
             best = chosen_fits(list(pool.map(values.fits, values.blocks())), cells)
             fitted = pool.map(partial(values.fitted, best), values.blocks())
             for block, at_points in zip(values.blocks(), fitted, strict=True):
@@ -113,6 +114,7 @@ class Fits(Record):
     residual: NDArray[np.float64]  # (windows, B) sum of the squared residuals of the cell's points
     leverage: NDArray[np.float64]  # (windows, B) sum of their leverages
     variance: NDArray[np.float64]  # (B,) sum of the stated variances
+    noise: NDArray[np.float64]  # (B,) the same, from the residuals of consecutive points; 0 if not dense
     count: NDArray[np.float64]  # (B,) points
 
 
@@ -142,8 +144,8 @@ class Directions(Record):
 class CellValues:
     """Raw values and features of the points of each cell, and the moments of cells."""
 
-    def __init__(self, cells: Cells, features: Planes, raw: RawValues) -> None:
-        self._cells, self._features, self._raw = cells, features, raw
+    def __init__(self, cells: Cells, features: Planes, raw: RawValues, is_dense: bool) -> None:
+        self._cells, self._features, self._raw, self._is_dense = cells, features, raw, is_dense
         # moments of every cell, and of an empty one that stands for neighbours that are not there
         self._moments = np.zeros((MOMENTS, len(cells.points) + 1))
         for block in self.blocks():
@@ -174,6 +176,7 @@ class CellValues:
         hidden, features = self._raw.hidden[index], self._features[:, index]
         coefficients = np.empty((len(WINDOWS), 1 + FEATURES, len(index)))
         residual, leverage = (np.empty((len(WINDOWS), len(index))) for _ in range(2))
+        noise = np.zeros(len(index))
         sums = np.zeros((MOMENTS, len(index)))
         first = 0
         for number, window in enumerate(WINDOWS):
@@ -182,13 +185,17 @@ class CellValues:
             first = window
             of_window = polynomials(sums[:, :, None].copy())
             coefficients[number] = of_window.coefficients()[:, :, 0]
-            _sum_rows(share * np.square(of_window.at(features) - hidden), residual[number])
+            off = of_window.at(features) - hidden
+            _sum_rows(share * np.square(off), residual[number])
+            if number == 0 and self._is_dense:
+                noise = _noise(off, share)
             _sum_rows(share * np.minimum(of_window.leverage(features), 1), leverage[number])
         return Fits(
             coefficients,
             residual,
             leverage,
             (share * self._raw.variance[index]).sum(axis=1),
+            noise,
             share.sum(axis=1),
         )
 
@@ -235,7 +242,11 @@ def chosen_fits(fits: Sequence[Fits], cells: Cells) -> ChosenFits:
     """
     # means over the points of the cells around
     count = _pooled(np.concatenate([each.count for each in fits]), cells)
-    stated = _pooled(np.concatenate([each.variance for each in fits]), cells) / count
+    stated, noise = (
+        _pooled(np.concatenate([getattr(each, name) for each in fits]), cells) / count
+        for name in ("variance", "noise")
+    )
+    stated = np.maximum(stated, noise)
     residual = _pooled(np.concatenate([each.residual for each in fits], axis=1), cells) / count
     leverage = _pooled(np.concatenate([each.leverage for each in fits], axis=1), cells) / count
 
@@ -263,6 +274,20 @@ def _pooled(values: NDArray[np.float64], cells: Cells) -> NDArray[np.float64]:
     for near in cells.near.T[:POOL]:
         out += padded.take(near, axis=-1)
     return out
+
+
+def _noise(residual: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(B,) variance of the raw values times their number: half the mean square of the differences between
+    consecutive ones, as bias hardly differs between these.
+
+    References
+    ----------
+    von Neumann, J. (1941). Distribution of the ratio of the mean square successive difference to the
+    variance. Annals of Mathematical Statistics 12(4).
+    """
+    both = share[:, 1:] * share[:, :-1]
+    square = (both * np.square(np.diff(residual, axis=1))).sum(axis=1)
+    return np.asarray(share.sum(axis=1) * square / (2 * np.maximum(both.sum(axis=1), 1)))
 
 
 def _sum_rows(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:

@@ -35,6 +35,7 @@ class TexelPoints(PointsOnTriangles):
 
     kind = "texel"
     cell_size = 32  # texels are small beside what w follows
+    is_dense = True
 
 
 class TexturePoints(Record):

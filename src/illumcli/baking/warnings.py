@@ -36,6 +36,12 @@ def _of_points(values: PointChannels) -> list[str]:
         at_limit = max(statistics.samples, default=0) >= MAX_SAMPLES
         reason = f"no point casts more than {MAX_SAMPLES} rays" if at_limit else "trials did not reach it"
         warnings.append(f"error of {name} {statistics.rmse:.2g} is above the {target:g} asked for: {reason}")
+    thickness = values.statistics.get("thickness")
+    if thickness is not None and thickness.open:
+        warnings.append(
+            f"nothing is behind {thickness.open} points, as on open sheets: their thickness is the limit, "
+            f"{thickness.scale:g}"
+        )
     w = values.channels.get("obscurance")
     dark = 0.0 if w is None else dark_share(w)
     if dark > MOSTLY:

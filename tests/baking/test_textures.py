@@ -10,11 +10,12 @@ import pytest
 from click.testing import CliRunner
 
 from gltf_validator import faults
+from illumcli import memory
 from illumcli.baking import unwrapped as unwrapped_module
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeOptions, BakeSettings
 from illumcli.cli import illum
-from illumcli.errors import InputError
+from illumcli.errors import InputError, LimitError
 from illumcli.images.png import read_texts
 from illumcli.images.reader import read_image, read_metadata
 from illumcli.mesh_files import embedded_image, read_mesh
@@ -202,6 +203,18 @@ def test_options_that_do_not_fit_are_refused(text_mesh, arguments, said):
     done = CliRunner().invoke(illum, ["ao-bake", str(text_mesh(CORNER)), *arguments])
     assert done.exit_code != 0
     assert said in done.output + str(done.exception)
+
+
+def test_uv_that_repeat_too_often_are_refused(text_mesh, tmp_path):
+    often = CORNER.replace("vt 0.9 0.2", "vt 900 0.2").replace("vt 0.9 0.8", "vt 900 0.8")
+    with pytest.raises(InputError, match=r"cover the texture 540 times.*--unwrap all"):
+        bake(text_mesh(often), tmp_path / "a.png")
+
+
+def test_textures_beyond_the_memory_are_refused_at_once(text_mesh, tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: 1 << 20)
+    with pytest.raises(LimitError, match=r"texels: takes about .*choose a smaller --texture"):
+        bake(text_mesh(CORNER), tmp_path / "a.png", BakeSettings(texture=(2048, 2048)))
 
 
 def test_meshes_without_uv_are_refused(text_mesh, tmp_path):

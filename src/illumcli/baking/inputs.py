@@ -22,6 +22,7 @@ from illumcli.baking.occluder_choice import occluding_files
 from illumcli.baking.occluders import OccludingMesh
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
+from illumcli.baking.texture_limits import refuse_large_textures
 from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
 from illumcli.baking.texture_slots import Slot, TextureFile, is_texture, texture_files, texture_slots
 from illumcli.cache.fingerprint import FileFingerprint, digest
@@ -150,6 +151,8 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     texture_of = texture_files(outputs, slots, settings.what)
     if settings.texture is not None and settings.unwrap is None:
         refuse_missing_uv(str(path), slots, meshes)
+    if settings.texture is not None:
+        refuse_large_textures(str(path), surfaces.geometry, slots, settings)
     outputs = (*(each for each in outputs if not is_texture(each)), *texture_of)
     work = BakeWork(
         job,

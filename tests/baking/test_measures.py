@@ -175,12 +175,12 @@ def test_thickness_is_that_of_closed_forms(tmp_path, case, limit):
 
 def test_a_sheet_without_a_back_is_told(tmp_path):
     path = mesh_of(tmp_path / "a.obj", rectangle([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]))
-    falloff = {"falloff": "step", "max_distance": 1.5}
+    falloff = {"falloff": "step", "max_distance": 0.5}
     channels, report = baked(path, what=("thickness",), falloff=falloff)
-    assert (channels["thickness"] == 1.5).all()
+    assert (channels["thickness"] == 0.5).all()
     assert (channels["thickness_error"] == 0).all()
     assert report.warnings == [
-        "nothing is behind 4 points, as on open sheets: their thickness is the limit, 1.5"
+        "nothing is behind 4 points, as on open sheets: their thickness is the limit, 0.5"
     ]
 
 

@@ -19,7 +19,8 @@ def triangles_of(uvs, corners, width=32, height=32):
 
 
 def grid(count, move=0.0, seed=0):
-    """uv of a square of [0, 1]^2 cut into 2 count^2 triangles, inner points moved at random."""
+    """uv of a square of [0, 1]^2 cut into 2 count^2 triangles, inner points moved at random, by less than a
+    quarter of a cell in u and v if no triangle shall be turned over."""
     u, v = np.meshgrid(np.linspace(0, 1, count + 1), np.linspace(0, 1, count + 1))
     uvs = np.stack([u.ravel(), v.ravel()], axis=1)
     inner = ((uvs > 0) & (uvs < 1)).all(axis=1)
@@ -31,7 +32,7 @@ def grid(count, move=0.0, seed=0):
 
 
 @settings(max_examples=50, deadline=None)
-@given(st.integers(1, 9), st.floats(0, 0.4), st.integers(1, 40), st.integers(1, 40), st.integers(0, 9))
+@given(st.integers(1, 9), st.floats(0, 0.24), st.integers(1, 40), st.integers(1, 40), st.integers(0, 9))
 def test_triangles_that_share_edges_cover_every_centre_once(count, move, width, height, seed):
     covered = covered_centres(triangles_of(*grid(count, move, seed), width, height))
     assert sorted(covered.texel) == list(range(width * height))

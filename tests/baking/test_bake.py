@@ -310,6 +310,38 @@ def test_an_obj_goes_to_glb_with_its_groups_materials_and_images(text_mesh, tmp_
     assert faults(tmp_path / "out.glb") == []
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"comment", b"Created by hand\ncomment"),
+        (b"comment", b"comment caf\xc3\xa9"),
+        (b"end_header\n", b"end_header\r\n"),
+        (b"ply", b"\xef\xbb\xbfply"),
+        (b"property float y", b" property float y"),
+        (b"property float w", b"property float x"),
+        (b"property float w", b"property int64 w"),
+        (b"property float w", "property float größe".encode()),
+        (b"list uchar", b"list float"),
+        (b"3 0 1 2", b"3 0 1\n2"),
+        (b"3 0 1 2", b"3 0 1 2 9\n3 0 1 2"),
+    ],
+)
+def test_a_ply_that_is_read_with_repairs_is_written_too(tmp_path, old, new):
+    path, out = tmp_path / "a.ply", tmp_path / "out.ply"
+    path.write_bytes(
+        (
+            b"ply\nformat ascii 1.0\ncomment one\nelement vertex 3\nproperty float x\nproperty float y\n"
+            b"property float z\nproperty float w\nelement face 1\nproperty list uchar int vertex_indices\n"
+            b"end_header\n0 0 0 7\n1 0 0 8\n0 1 0 9\n3 0 1 2\n"
+        ).replace(old, new)
+    )
+    bake(path, out, samples=4)
+    made = read_mesh(out)
+    np.testing.assert_array_equal(made.vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(made.corners, [0, 1, 2])
+    assert any(np.array_equal(each, [7, 8, 9]) for each in made.attributes.values())
+
+
 def test_textures_are_read_beside_the_mesh_that_names_them(text_mesh, tmp_path):
     (tmp_path / "a.mtl").write_text("newmtl clay\nmap_Kd brick.png\n")
     (tmp_path / "brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))

@@ -32,6 +32,7 @@ from illumcli.mesh_files._color import unit_range
 from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._ply import Element, Lists, Table
+from illumcli.mesh_files._ply_copy import read_copy
 from illumcli.mesh_files._polygons import Ints, RawMesh, check_range, checked_mesh, starts_of, strip
 from illumcli.mesh_files._text import Text
 from illumcli.mesh_files.output_mesh import STANDARD, OutputMesh, VertexData, fits_single, free_name
@@ -315,7 +316,7 @@ def write(
 
     comment = _ABOUT + json.dumps(data.sealed_about())
     if source is not None:
-        old = PlyData.read(source)
+        old = read_copy(source)
         elements = list(old) if split is None else [_split(each, split) for each in old]
         elements = [
             _with_columns(each, data, data.columns) if each.name == "vertex" else each for each in elements
@@ -338,9 +339,7 @@ def write(
 
 def has_plain_faces(path: Path, corners: int) -> bool:
     """True if all polygons of a PLY, which have so many corners, are its faces in their order."""
-    from plyfile import PlyData
-
-    file = PlyData.read(path)
+    file = read_copy(path)
     if "face" not in file or "tristrips" in file:
         return False
     return sum(map(len, file["face"].data[_corners_of(file["face"])])) == corners

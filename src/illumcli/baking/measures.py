@@ -26,13 +26,13 @@ def measures(settings: BakeSettings, radius: float) -> tuple[Measure, ...]:
     """What the settings ask for; `radius` is that of the scene [scene units]."""
     wanted = settings.obscurance()
     method = Method(settings.samples, wanted.falloff, radius, wanted.sampler, wanted.faces)
-    found = []
+    result = []
     if {"ao", "bent_normal"} & set(settings.what):
-        found.append(Measure(method, with_bent="bent_normal" in settings.what))
+        result.append(Measure(method, with_bent="bent_normal" in settings.what))
     if "thickness" in settings.what:
         # the mean of min(d, limit): no hit within a bounded object is farther than the scene's diameter
         reach = wanted.falloff.reach(radius)
         limit = min(reach, 2 * radius)
         inside = replace(method, falloff=Linear(falloff="linear", max_distance=limit))
-        found.append(Measure(inside, -1, "thickness", "thickness_error", limit))
-    return tuple(found)
+        result.append(Measure(inside, -1, "thickness", "thickness_error", limit))
+    return tuple(result)

@@ -72,8 +72,8 @@ class Tracer:
             o = take_rows(origins, missed // (len(directions) // len(origins)))
             turned = d + RETRY_TURN * np.abs(np.roll(d, -1, axis=1))
             again = np.flatnonzero(self._loop.occluded(o, turned, np.asarray(NO_LIMIT), coherent))
-            found = self._closest(take_rows(o, again), take_rows(turned, again), coherent)
-            hits.replace(missed[again], found)
+            closest = self._closest(take_rows(o, again), take_rows(turned, again), coherent)
+            hits.replace(missed[again], closest)
         return hits
 
     def _closest(self, origins: Vectors, directions: Vectors, coherent: bool) -> Closest:

@@ -126,8 +126,8 @@ def _of_gltf(
     geometry: SceneGeometry,
 ) -> list[OcclusionMap]:
     """The occlusion textures of a glTF file, on an object's polygons."""
-    found = file_vertices(geometry, user, file)
-    if found is None or found.is_other:
+    vertices = file_vertices(geometry, user, file)
+    if vertices is None or vertices.is_other:
         raise InputError(f"{path}: its mesh is not that of {user.name}; bake it again")
     placed = geometry.placed[geometry.placed_mesh[user.number]]
     mesh = placed.mesh
@@ -138,11 +138,11 @@ def _of_gltf(
         of_vertex[file.corners] = np.repeat(file.polygon_materials, np.diff(file.starts))
     materials = np.full(_polygon_count(geometry), -1, np.int32)
     polygons = slice(placed.first_polygon, placed.first_polygon + mesh.polygon_count)
-    materials[polygons] = of_vertex[found.of_corner[mesh.starts[:-1]]]
+    materials[polygons] = of_vertex[vertices.of_corner[mesh.starts[:-1]]]
 
     # Their uv are those of the file.
     index = np.full(sum(len(each.mesh.corners) for each in geometry.placed), -1, np.int32)
-    index[placed.first_corner : placed.first_corner + len(mesh.corners)] = found.of_corner
+    index[placed.first_corner : placed.first_corner + len(mesh.corners)] = vertices.of_corner
     tables = {
         name: CornerVectors(column_major(_coordinates(file, name), F), index)
         for name in {keys.get("uv") for keys in file.occlusion.values()}

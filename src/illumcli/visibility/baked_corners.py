@@ -125,14 +125,14 @@ def _values_of_mesh(
 ) -> tuple[NDArray[np.float32], bool]:
     """The same, of a mesh file."""
     values = obscurance_at_vertices(path, in_file)
-    found = file_vertices(geometry, user, in_file)
-    if found is None:
+    vertices = file_vertices(geometry, user, in_file)
+    if vertices is None:
         mesh = geometry.placed[geometry.placed_mesh[user.number]].mesh
         raise InputError(
             f"{path}: has {in_file.polygon_count} polygons of {len(in_file.vertices)} vertices, the mesh of "
             f"{user.name} has {mesh.polygon_count} of {len(mesh.vertices)}, or others; bake it again"
         )
-    return values[found.of_corner], found.is_other
+    return values[vertices.of_corner], vertices.is_other
 
 
 def baked_obscurance(geometry: SceneGeometry, baked: BakedValues, corner_weights: CornerWeights) -> Floats:

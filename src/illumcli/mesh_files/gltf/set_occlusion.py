@@ -78,8 +78,8 @@ def _replaced(document: Document, writer: GlbWriter, former: Any, occlusion: Occ
 
 def _only(items: list[Any], index: Any, references: Iterator[Any], uses: int) -> dict[str, Any]:
     """Item `index` of a list if there are as many references to it, otherwise an empty one."""
-    found = is_index(index) and index < len(items) and sum(each == index for each in references) == uses
-    item: dict[str, Any] = items[index] if found else {}
+    is_there = is_index(index) and index < len(items) and sum(each == index for each in references) == uses
+    item: dict[str, Any] = items[index] if is_there else {}
     return item
 
 

@@ -145,6 +145,22 @@ def test_shards_that_are_merged_are_the_whole(illum, folder, name, count):
     assert digests(ours) == digests(theirs)
 
 
+def test_textures_that_are_named_by_their_objects_are_merged(illum, folder):
+    square = "vt 0 0\nvt 1 0\nvt 1 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/1 2/2 3/3\n"
+    for name in ("p", "q"):
+        (folder / f"{name}.obj").write_text(square)
+    bake = ("ao-bake", "p.obj", "q.obj", "--texture", "8", "--samples", "4", "--what", "ao,thickness")
+    for number in (1, 2):
+        names = f"part-{number}/{{name}}.{{object}}.{{what}}.png"
+        run = illum(*bake, "-o", names, "--shard", f"{number}/2")
+        assert (run.returncode, len(run.stdout.splitlines())) == (0, 2), run.stderr
+    merged = illum("merge", "part-1", "part-2", "-o", "all")
+    assert merged.returncode == 0, merged.stderr
+    assert illum(*bake, "-o", "whole/{name}.{object}.{what}.png").returncode == 0
+    assert digests(folder / "all") == digests(folder / "whole")
+    assert len(digests(folder / "all")) == 4
+
+
 def test_shards_of_one_folder_are_merged_in_it(illum, folder):
     for number in (2, 1, 3):
         assert illum(*words("sweep", "out", "--shard", f"{number}/3")).returncode == 0

@@ -23,11 +23,19 @@ from illumcli.baking.occluders import OccludingMesh
 from illumcli.baking.points import Surfaces
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.baking.texture_limits import refuse_large_textures
+from illumcli.baking.texture_slots import (
+    FIELDS,
+    Slot,
+    TextureFile,
+    is_texture,
+    texture_files,
+    texture_slots,
+)
 from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
-from illumcli.baking.texture_slots import Slot, TextureFile, is_texture, texture_files, texture_slots
 from illumcli.cache.fingerprint import FileFingerprint, digest
 from illumcli.errors import InputError
 from illumcli.files.claims import claim_path
+from illumcli.files.names import fields
 from illumcli.files.outputs import is_kept
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
@@ -169,6 +177,23 @@ def prepare_bake(job: BakeJob) -> BakeWork:
     )
     work.due()
     return work
+
+
+def bake_files(job: BakeJob) -> tuple[Path, ...]:
+    """The files of a bake; its meshes are read only if names of textures depend on them.
+
+    Raises
+    ------
+    InputError
+        A fault of the input or of the names.
+    """
+    depending = {*FIELDS, "what"}
+    if not any(depending & set(fields(str(each))) for each in job.outputs if is_texture(each)):
+        return job.outputs
+    loaded = input_of(job.path, job.options.overrides)
+    slots = texture_slots(loaded.scene.object_names(), geometry_of(loaded))
+    textures = texture_files(job.outputs, slots, job.settings.what)
+    return (*(each for each in job.outputs if not is_texture(each)), *textures)
 
 
 def bake_cost(job: BakeJob) -> int:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from illumcli.baking.inputs import bake_cost
+from illumcli.baking.inputs import bake_cost, bake_files
 from illumcli.baking.report import BakeReport
 from illumcli.baking.settings import BakeJob
 from illumcli.commands.bake import BakeRequest
@@ -41,7 +41,7 @@ def bake_shard(
     request.refuse_shared_outputs(inputs)
     jobs = [request.job(path) for path in inputs]
     planned = [
-        PlannedUnit(str(job.path), job.outputs, _cost(job), {"entry": k, "of": {"input": str(job.path)}})
+        PlannedUnit(str(job.path), _files(job), _cost(job), {"entry": k, "of": {"input": str(job.path)}})
         for k, job in enumerate(jobs)
     ]
     settings = {"settings": request.settings.as_data()}
@@ -56,6 +56,11 @@ def bake_shard(
     batch = Batch("inputs", len(jobs), request.keep_going, tell)
     units = BatchUnits(jobs, sharding, request.options.force)
     return run_shard(units, batch, Worker(), runner, done)
+
+
+def _files(job: BakeJob) -> tuple[Path, ...]:
+    """The files of a bake; its outputs as they are named for an input with a fault."""
+    return unless_faulty(partial(bake_files, job)) or job.outputs
 
 
 def _cost(job: BakeJob) -> Cost:

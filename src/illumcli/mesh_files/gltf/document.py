@@ -22,8 +22,19 @@ from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files._files import TAKEN, beside, content, nearby
 from illumcli.records import Value
 
-READ = frozenset({"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"})
-"""Extensions that are fully supported."""
+READ = frozenset(
+    {
+        "EXT_mesh_gpu_instancing",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_unlit",
+        "KHR_mesh_quantization",
+        "KHR_node_visibility",
+        "KHR_texture_transform",
+    }
+)
+"""Extensions that are read, as docs/gltf.md says."""
 
 
 @dataclass(slots=True)
@@ -221,7 +232,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def _name_extensions(document: Document) -> None:
-    """Note the required extensions that are not fully supported.
+    """Note the required extensions that are not read.
 
     The core of the file is read nevertheless. Geometry that only an extension has is refused when it is read.
     """

@@ -342,6 +342,19 @@ def test_a_ply_that_is_read_with_repairs_is_written_too(tmp_path, old, new):
     assert any(np.array_equal(each, [7, 8, 9]) for each in made.attributes.values())
 
 
+def test_the_alpha_of_a_ply_is_a_share_in_a_glb(tmp_path):
+    path = tmp_path / "a.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0 255 0 0 255\n1 0 0 255 0 0 51\n0 1 0 255 0 0 0\n3 0 1 2\n"
+    )
+    bake(path, tmp_path / "out.glb", samples=4)
+    np.testing.assert_allclose(read_mesh(tmp_path / "out.glb").attributes["alpha"], [1, 0.2, 0])
+    assert faults(tmp_path / "out.glb") == []
+
+
 def test_textures_are_read_beside_the_mesh_that_names_them(text_mesh, tmp_path):
     (tmp_path / "a.mtl").write_text("newmtl clay\nmap_Kd brick.png\n")
     (tmp_path / "brick.png").write_bytes(png_bytes(np.zeros((2, 2, 3), np.uint8), srgb=True))

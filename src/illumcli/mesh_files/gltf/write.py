@@ -138,7 +138,7 @@ def _primitive(
         if name == "color":
             label = "COLOR_0"
             if "alpha" in mesh.attributes:
-                values = np.column_stack([values, mesh.attributes["alpha"][part.vertices]])
+                values = np.column_stack([values, _opacity(mesh)[part.vertices]])
         elif name == "normal":
             label, values = "NORMAL", unit_rows(values)
         elif name == "uv":
@@ -151,6 +151,12 @@ def _primitive(
         attributes[free_name(label, attributes)] = writer.table(values.astype(np.float32), VERTICES)
     indices = writer.table(fitting(part.triangles.ravel(), len(vertices)), INDICES)
     return {"attributes": attributes, "indices": indices}
+
+
+def _opacity(mesh: OutputMesh) -> NDArray[np.float64]:
+    """(V,) the alpha of vertices in [0, 1]; the numbers of a PLY are those of its property, up to 255."""
+    alpha = np.asarray(mesh.attributes["alpha"], np.float64)
+    return np.clip(alpha / 255 if alpha.max(initial=0) > 1 else alpha, 0, 1)
 
 
 def fits_attribute(values: NDArray[Any]) -> bool:
@@ -176,7 +182,7 @@ def _add_values(
         if "color" in mesh.attributes:
             colors[:, :3] = mesh.attributes["color"][vertices]
         if "alpha" in mesh.attributes:
-            colors[:, 3] = mesh.attributes["alpha"][vertices]
+            colors[:, 3] = _opacity(mesh)[vertices]
         write_colors(writer, attributes, data.color.applied(colors, data.columns["obscurance"][rows]), kind)
 
 

@@ -406,6 +406,25 @@ def test_a_material_of_other_primitives_is_copied(tmp_path: Path, Scene: Any) ->
     assert json["materials"][1]["name"] == "clay"
 
 
+def test_primitives_without_uv_keep_a_material_without_the_texture(tmp_path: Path, Scene: Any) -> None:
+    scene = whole(Scene())
+    with_uv = scene.json["meshes"][0]["primitives"][0]
+    bare = {**with_uv, "attributes": {"POSITION": with_uv["attributes"]["POSITION"]}}
+    scene.json["materials"].append({"name": "plain"})
+    scene.json["meshes"][0]["primitives"].append({**bare, "material": 1})
+    with_uv["material"] = 1
+    source = scene.write(tmp_path / "a.glb")
+    png = png_bytes(np.zeros((4, 4, 1), np.uint8), srgb=False)
+    mesh = read_mesh(source)
+    maps = OcclusionMaps({(0, mesh.material_names.index("plain")): OcclusionMap("occlusion", png)})
+    extend_glb(tmp_path / "out.glb", source, values_of(mesh), maps)
+    json = open_document(tmp_path / "out.glb").json
+    first, second = (each["material"] for each in json["meshes"][0]["primitives"])
+    assert "occlusionTexture" in json["materials"][first]
+    assert "occlusionTexture" not in json["materials"][second]
+    assert faults(tmp_path / "out.glb") == []
+
+
 def test_uv_of_textures_become_a_further_set(tmp_path: Path, Scene: Any) -> None:
     source = whole(Scene()).write(tmp_path / "a.glb")
     uv = np.array([[0, 0], [1, 0], [1, 1], [0.25, 0], [1, 1], [0, 1]])

@@ -30,12 +30,14 @@ def set_occlusion(
     Parameters
     ----------
     primitives : mapping of int to list of dict
-        Those that have each of `maps`, by the same keys; they share a material, or have none.
+        Those that have each of `maps`, by the same keys; they share a material, or have none. Primitives
+        without this uv set stay without the texture.
     """
     left_out = []
+    attribute = f"TEXCOORD_{uv_set}"
     users = Counter(each.get("material") for each in _all_primitives(document))
     for key, occlusion in maps.items():
-        own = primitives.get(key, [])
+        own = [each for each in primitives.get(key, []) if attribute in each["attributes"]]
         if not own:
             continue
         number: int | None = own[0].get("material")

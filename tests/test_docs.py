@@ -86,7 +86,7 @@ def test_ci_runs_the_readmes_two_commands():
 
 def test_ci_tries_the_lowest_versions_that_are_allowed():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *itertools.chain(*project["optional-dependencies"].values())]
+    wanted = {*project["dependencies"], *itertools.chain(*project["optional-dependencies"].values())}
     lowest = subprocess.run([ROOT / ".ci" / "lowest"], capture_output=True, text=True, check=True).stdout
     assert sorted(lowest.split()) == sorted(each.replace(">=", "==") for each in wanted)
     assert (ROOT / ".ci" / "lowest.txt").read_text() == lowest

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from illumcli.commands.options import RenderJob, RenderOptions
-from illumcli.commands.work import prepared, unused_keys
+from illumcli.commands.unused import unused_keys
+from illumcli.commands.work import prepared
 from illumcli.render_graph.schedule import schedule
 
 PARTS = {

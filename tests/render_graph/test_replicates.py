@@ -119,8 +119,9 @@ def test_nothing_random_is_exact_and_doubles_nothing(scene):
     assert not made["error"].any()
     assert not [name for name in rays if name.startswith("replicate.")]
     loaded = load(scene, ("obscurance=null",))
-    time = {"expected_time": {"seconds": 0.0, "runs": 0, "unknown": []}}
-    part = plan_data(planned(loaded, ("error",)), {}) | time
+    time = {"seconds": 0.0, "runs": 0, "unknown": []}
+    rest = {"expected_time": time, "obscurance_files": {}, "whole": None}
+    part = plan_data(planned(loaded, ("error",)), {}) | rest
     assert "nothing in the image is random: its error is 0" in plan_table([part])
 
 

@@ -217,6 +217,12 @@ def test_textures_beyond_the_memory_are_refused_at_once(text_mesh, tmp_path, mon
         bake(text_mesh(CORNER), tmp_path / "a.png", BakeSettings(texture=(2048, 2048)))
 
 
+def test_polygons_without_uv_are_told_with_the_way_out(text_mesh, tmp_path):
+    path = text_mesh(CORNER.replace("f 2/5 5/6 6/7 3/8", "f 2 5 6 3"))
+    warnings = bake(path, tmp_path / "a.png")[1].warnings
+    assert "mesh: 2 triangles have no uv: no texel belongs to them; --unwrap all makes uv for all" in warnings
+
+
 def test_meshes_without_uv_are_refused(text_mesh, tmp_path):
     path = text_mesh("v 0 0 0\nv 1 0 0\nv 0 0 -1\nf 1 2 3\n")
     with pytest.raises(InputError, match="has no uv"):

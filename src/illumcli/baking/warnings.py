@@ -83,7 +83,8 @@ def uv_warnings(texture: TexturePoints) -> list[str]:
     name, triangles, overlaps = texture.slot.name, texture.triangles, texture.overlaps
     warnings = []
     if triangles.without_uv:
-        warnings.append(f"{name}: {triangles.without_uv} triangles have no uv: no texel belongs to them")
+        fact = f"{triangles.without_uv} triangles have no uv: no texel belongs to them"
+        warnings.append(f"{name}: {fact}; --unwrap all makes uv for all")
     if triangles.without_area:
         fact = f"the uv of {triangles.without_area} triangles have no area"
         warnings.append(f"{name}: {fact}: lookups on them read texels of others")

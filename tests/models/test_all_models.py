@@ -326,7 +326,9 @@ def test_swapping_light_and_eye_keeps_the_brdf(Model, data, seed):
     swapped = given | {"l": given["v"], "v": given["l"]}
     there = response(model, given) / dot(given["n"], given["l"])[:, None]
     back = response(model, swapped) / dot(given["n"], given["v"])[:, None]
-    np.testing.assert_allclose(there, back, rtol=1e-7, atol=1e-12 * np.abs(there).max(initial=1e-300))
+    # a lobe is kept precise where it is high: 1 minus its base is summed, and differs in its last bits
+    lowest = max(1e-12 * np.abs(there).max(initial=0), 1e-15)
+    np.testing.assert_allclose(there, back, rtol=1e-7, atol=lowest)
 
 
 @claiming("conserving")

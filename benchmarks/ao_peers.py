@@ -34,6 +34,7 @@ from illumcli.arrays import F
 from illumcli.baking.at_vertices import sampled_at_vertices
 from illumcli.baking.context import BakeContext, StageClock
 from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.measures import measures
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts
 from illumcli.baking.settings import BakeSettings
@@ -41,7 +42,6 @@ from illumcli.files.journal import Journal
 from illumcli.progress import no_progress
 from illumcli.rays.sampling import GOLDEN
 from illumcli.visibility.hemisphere import PACKET, turned_frame
-from illumcli.visibility.obscurance import Method
 
 COUNTS = (16, 64) if SMALL else (16, 64, 256, 1024)
 EQUAL = 64 if SMALL else 256
@@ -124,12 +124,13 @@ def illum(path: Path, truth: np.ndarray, is_reconstructed: bool = False) -> Bake
 
     def bake(rays: int) -> np.ndarray:
         settings = BakeSettings(samples=rays, reconstruct=is_reconstructed)
-        method = Method(rays, settings.obscurance().falloff, geometry.render_space.radius)
-        occluders = occluders_of(loaded.scene, geometry, settings)
+        wanted = measures(settings, geometry.render_space.radius)
+        occluders = occluders_of(loaded.scene.object_names(), geometry, settings, {})
         journal = Journal(Path(os.devnull) / "none", "00")  # keeps nothing
-        return sampled_at_vertices(
-            BakeContext(surfaces, occluders, method, settings, THREADS, no_progress, StageClock(), journal)
-        ).w
+        values = sampled_at_vertices(
+            BakeContext(surfaces, occluders, wanted, settings, THREADS, no_progress, StageClock(), journal)
+        )
+        return values.of_points.channels["obscurance"]
 
     return Baker("illum, fitted" if is_reconstructed else "illum", bake, truth)
 

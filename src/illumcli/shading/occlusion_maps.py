@@ -18,7 +18,7 @@ from illumcli.rays.corner_weights import CornerWeights
 from illumcli.rays.interaction import uv_at
 from illumcli.records import Record
 from illumcli.shading.textures import FILTERS
-from illumcli.visibility.baked_corners import BakedValues, Files, baked_obscurance, has_textures
+from illumcli.visibility.baked_corners import BakedValues, Files, baked_obscurance, file_users
 from illumcli.visibility.baked_meshes import User, file_vertices, is_of_one_object
 
 Read: TypeAlias = Callable[[str, Space], Texels]
@@ -66,25 +66,19 @@ def occlusion_maps(
         An unreadable image, a mesh without uv, a file of another mesh; all of them in one error.
     """
     # Objects that share a mesh share its textures; those in a file of several objects go by name.
-    sharing: dict[tuple[Path, int, str], list[int]] = {}
-    users: dict[Path, list[int]] = {}
-    for number, (name, file) in enumerate(files):
-        in_mesh = None if obscurance_meshes is None else obscurance_meshes[number]
-        if file is None or not has_textures(file, in_mesh):
-            continue
-        is_single = in_mesh is None or is_of_one_object(geometry, number, in_mesh)
-        key = file.path, int(geometry.placed_mesh[number]), "" if is_single else name
-        sharing.setdefault(key, []).append(number)
-        users.setdefault(file.path, []).append(number)
+    sharing: dict[tuple[Path, int, str], tuple[Mesh | None, list[User]]] = {}
+    for user, path, in_mesh in file_users(files, obscurance_meshes, in_textures=True):
+        is_single = in_mesh is None or is_of_one_object(geometry, user.number, in_mesh)
+        key = path, int(geometry.placed_mesh[user.number]), "" if is_single else user.name
+        sharing.setdefault(key, (in_mesh, []))[1].append(user)
 
     # The textures of each.
     uvs = scene_uvs(geometry)
     maps: list[OcclusionMap] = []
     problems: list[str] = []
-    for (path, _, _), numbers in sharing.items():
-        user = User(numbers[0], files[numbers[0]][0], tuple(users[path]))
-        in_mesh = None if obscurance_meshes is None else obscurance_meshes[user.number]
-        objects = np.isin(np.arange(len(files)), numbers)
+    for (path, _, _), (in_mesh, users) in sharing.items():
+        user = users[0]
+        objects = np.isin(np.arange(len(files)), [each.number for each in users])
         try:
             if in_mesh is None:
                 maps.append(_image(user, objects, path, read, uvs, geometry))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -65,45 +66,56 @@ def baked(
     first, has_values = np.zeros(len(files), np.int64), np.zeros(len(files), np.bool_)
     repairs: dict[str, Repair] = {}
     count = 0
-    for i, (name, file) in enumerate(files):
-        in_mesh = None if obscurance_meshes is None else obscurance_meshes[i]
-        if file is None or has_textures(file, in_mesh):
-            continue
-        number = int(geometry.placed_mesh[i])
+    for user, path, in_mesh in file_users(files, obscurance_meshes, in_textures=False):
+        number = int(geometry.placed_mesh[user.number])
         placed = geometry.placed[number]
-        if in_mesh is None and file.path not in in_files:
-            in_files[file.path] = read_npz(file.path)
-            if "obscurance" not in in_files[file.path].channels:
-                raise InputError(f"{file.path}: holds no obscurance; bake it with --what ao")
+        if in_mesh is None and path not in in_files:
+            in_files[path] = read_npz(path)
+            if "obscurance" not in in_files[path].channels:
+                raise InputError(f"{path}: holds no obscurance; bake it with --what ao")
 
         # Values of a single mesh are those of every object that has it; of several, they go by name.
         if in_mesh is None:
-            is_single = len(in_files[file.path].obscurance) == len(placed.mesh.vertices)
+            is_single = len(in_files[path].obscurance) == len(placed.mesh.vertices)
         else:
-            is_single = is_of_one_object(geometry, i, in_mesh)
-        key = file.path, number, "" if is_single else name
+            is_single = is_of_one_object(geometry, user.number, in_mesh)
+        key = path, number, "" if is_single else user.name
         if key not in rows:
             if in_mesh is None:
-                at_corners, is_other = _values_of_npz(file.path, in_files[file.path], placed.mesh, name)
+                at_corners, is_other = _values_of_npz(path, in_files[path], placed.mesh, user.name)
             else:
-                users = tuple(k for k, (_, other) in enumerate(files) if other and other.path == file.path)
-                user = User(i, name, users)
-                at_corners, is_other = _values_of_mesh(file.path, in_mesh, geometry, user)
+                at_corners, is_other = _values_of_mesh(path, in_mesh, geometry, user)
             rows[key] = count, is_other
             tables.append(at_corners)
             count += len(at_corners)
         row, is_other = rows[key]
         if is_other:
-            note(repairs, "values that were baked for another mesh of as many vertices", str(file.path))
-        first[i], has_values[i] = row - placed.first_corner, True
+            note(repairs, "values that were baked for another mesh of as many vertices", str(path))
+        first[user.number], has_values[user.number] = row - placed.first_corner, True
     values = np.concatenate([np.zeros(0, F), *tables]).astype(F)
     return BakedValues(values, first, has_values, repairs)
 
 
-def has_textures(file: Located, in_mesh: Mesh | None) -> bool:
+def file_users(
+    files: Files, obscurance_meshes: tuple[Mesh | None, ...] | None, in_textures: bool
+) -> Iterator[tuple[User, Path, Mesh | None]]:
+    """The objects whose file of obscurance has it in textures, or in values; the file, and the mesh in it if
+    it is a mesh file."""
+    numbers: dict[Path, list[int]] = {}
+    for number, (_, file) in enumerate(files):
+        if file is not None:
+            numbers.setdefault(file.path, []).append(number)
+    users = {path: tuple(of_path) for path, of_path in numbers.items()}
+    for number, (name, file) in enumerate(files):
+        in_mesh = None if obscurance_meshes is None else obscurance_meshes[number]
+        if file is not None and _has_textures(file.path, in_mesh) == in_textures:
+            yield User(number, name, users[file.path]), file.path, in_mesh
+
+
+def _has_textures(path: Path, in_mesh: Mesh | None) -> bool:
     """True if a file of obscurance has it in textures: an image, or glTF whose occlusion textures count."""
     if in_mesh is None:
-        return file.path.suffix.lower() != ".npz"
+        return path.suffix.lower() != ".npz"
     return bool(in_mesh.occlusion)
 
 

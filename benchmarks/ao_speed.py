@@ -39,7 +39,7 @@ def main() -> None:
     samples = np.full(len(lanes), SAMPLES)
     geometry = bake.points.geometry
     scene = SingleRayLoop(geometry.vertices, geometry.triangles)
-    order = bake.order[np.isin(bake.order, lanes)]
+    order = bake.points.order[np.isin(bake.points.order, lanes)]
     keys = [stream(bake.seed, f"ao {what} 0") for what in ("turn", "phase", "share")]
     at_once = max(1, obscurance.RAYS_AT_ONCE // SAMPLES)
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,32 +14,42 @@ from illumcli.baking.context import BakeContext, PointChannels, SampledValues, S
 from illumcli.baking.measures import Measure
 from illumcli.baking.points import Points
 from illumcli.baking.reconstructed import reconstructed_values
+from illumcli.baking.reconstruction import rotated_cells
 from illumcli.baking.sampling import BakeSampler, ChosenSamples, RayCounts
 from illumcli.visibility.channels import chosen
 
+Estimate: TypeAlias = Callable[[BakeContext, BakeSampler, NDArray[np.int64]], SampledValues]
+"""Values of the points that are not open, by their indices."""
 FINAL_PAIRS = 1 << 20
 """Number of the first scramble that measures the error of the values handed out."""
 
 
 def channels_at(context: BakeContext, points: Points) -> PointChannels:
     """The channels that the settings ask for."""
+    context.clock.lap("points")
+
+    # all values at these points are reconstructed over the same cells
+    estimate: Estimate = raw_values
+    if context.settings.reconstruct:
+        estimate = partial(reconstructed_values, cells=rotated_cells(points, context.threads))
+        context.clock.lap("cells")
+
     arrays: dict[str, NDArray[np.float32]] = {}
     statistics: dict[str, SampleStatistics] = {}
     for measure in context.measures:
-        sampled, statistics[measure.channel] = _channels_of(context, points, measure)
+        sampled, statistics[measure.channel] = _channels_of(context, points, measure, estimate)
         arrays |= sampled
     return PointChannels(chosen(arrays, context.settings.what), statistics)
 
 
 def _channels_of(
-    context: BakeContext, points: Points, measure: Measure
+    context: BakeContext, points: Points, measure: Measure, estimate: Estimate
 ) -> tuple[dict[str, NDArray[np.float32]], SampleStatistics]:
     """The channels of one measure, and what they took."""
     settings, clock = context.settings, context.clock
     sampler = BakeSampler(
         points, context.occluders, measure, settings.seed, context.threads, context.progress
     )
-    clock.lap("points")
 
     # open points need no rays
     is_open = sampler.open_points()
@@ -43,7 +57,7 @@ def _channels_of(
     clock.lap("horizon")
 
     # values of the others
-    sampled = (reconstructed_values if settings.reconstruct else raw_values)(context, sampler, closed)
+    sampled = estimate(context, sampler, closed)
     mean, error = np.ones(len(is_open), F), np.zeros(len(is_open), F)
     mean[closed], error[closed] = sampled.w, sampled.error
     scale = F(measure.scale)

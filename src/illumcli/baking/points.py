@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, take_rows
 from illumcli.baking.cells import SIZE
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
+from illumcli.geometry.spatial_order import compact
 from illumcli.rays.interaction import interact
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.records import Record
@@ -42,6 +44,11 @@ class Points(Record):
     key: NDArray[np.uint32]  # (M,) of each point's random numbers
     objects: Ids  # (M,) object of each point
     is_flat: NDArray[np.bool_]  # (M,) True where the triangles around a point are nearly in one plane
+
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """(M,) indices of the points in an order that keeps neighbours together."""
+        return compact(self.position)
 
     def hemispheres(
         self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str, side: Side = 1

@@ -13,7 +13,7 @@ from illumcli.arrays import F, Vectors
 from illumcli.baking.audit import Audit, Audited, audit
 from illumcli.baking.cells import Cells
 from illumcli.baking.context import BakeContext, SampledValues
-from illumcli.baking.reconstruction import RawValues, reconstruct, rotated_cells
+from illumcli.baking.reconstruction import RawValues, reconstruct
 from illumcli.baking.sampling import (
     MAX_SAMPLES,
     MIN_SAMPLES,
@@ -37,14 +37,12 @@ LEAST_GROWTH, MOST_GROWTH = 1.25, 32.0
 
 
 def reconstructed_values(
-    context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64]
+    context: BakeContext, sampler: BakeSampler, closed: NDArray[np.int64], cells: Sequence[Cells]
 ) -> SampledValues:
     """Values of the points that are not open, reconstructed; with a target, by as many rays as it takes.
 
     Trials with more and more rays are audited until one has reached the target. Each is sampled anew.
     """
-    cells = rotated_cells(sampler.points, context.threads)
-    context.clock.lap("cells")
     bake = ReconstructedBake(context, sampler, closed, cells)
     target = context.settings.target_error
     if target is None:
@@ -129,8 +127,7 @@ class ReconstructedBake(Record):
         """(K,) rays of each point for the least error, over their mean: more where neighbour rays disagree,
         as without reconstruction."""
         variation = trial.raw.values.neighbor_variation
-        count = len(self.sampler.points.key)
-        weight = (1 + averaged_along(self.sampler.order, self.closed, variation, count)) ** 0.4
+        weight = (1 + averaged_along(self.sampler.points.order, self.closed, variation)) ** 0.4
         return np.divide(weight, weight.mean())
 
     def values(self, trials: Sequence[Trial]) -> SampledValues:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +81,6 @@ class BakeSampler(Record):
     seed: int
     threads: int
     progress: Progress
-
-    @cached_property
-    def order(self) -> NDArray[np.int64]:
-        """(M,) indices of the points in an order that keeps neighbours together."""
-        return compact(self.points.position)
 
     def open_points(self) -> NDArray[np.bool_]:
         """(M,) True for points with no geometry on that side of the triangles that their rays leave."""
@@ -231,7 +225,7 @@ class BakeSampler(Record):
 
         # Estimate the errors by a pilot.
         pilot = self.estimate("pilot", RayCounts(points, np.full(len(points), PILOT_SAMPLES)), 1)
-        near = averaged_along(self.order, points, pilot.values.neighbor_variation, len(self.points.key))
+        near = averaged_along(self.points.order, points, pilot.values.neighbor_variation)
         weight = (1 + near) ** 0.4
         aim = AIM * target / np.sqrt(share)
         scale = float((np.mean(weight) * 0.1 * PILOT_SAMPLES**-0.5 / aim**2) ** (2 / 3))
@@ -253,10 +247,11 @@ class BakeSampler(Record):
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
         """Units of neighbouring points of one object that cast the same number of rays in one way."""
         purpose = f"{self.points.kind} {self.measure.channel}"
-        samples = np.zeros(len(self.order), np.int64)
+        every = self.points.order
+        samples = np.zeros(len(every), np.int64)
         samples[counts.points] = counts.samples
         # Group them, along their order.
-        order = self.order[samples[self.order] > 0]
+        order = every[samples[every] > 0]
         objects, is_flat = self.points.objects[order].astype(np.int64), self.points.is_flat[order]
         kind = (objects * (MAX_SAMPLES + 1) + samples[order]) * 2 + is_flat
         by_kind = np.argsort(kind, kind="stable")
@@ -276,9 +271,10 @@ class BakeSampler(Record):
 
 
 def averaged_along(
-    order: NDArray[np.int64], points: NDArray[np.int64], values: NDArray[np.float32], count: int
+    order: NDArray[np.int64], points: NDArray[np.int64], values: NDArray[np.float32]
 ) -> NDArray[np.float64]:
     """(K,) mean of the values over each point and its four neighbours to either side along the order."""
+    count = len(order)
     scattered, known = np.zeros(count), np.zeros(count)
     scattered[points], known[points] = values, 1
     kernel = np.ones(9)

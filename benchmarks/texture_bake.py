@@ -89,10 +89,10 @@ def with_uv(path: Path, folder: Path) -> Path:
     if mesh.uvs is not None and path.suffix == ".obj":
         return path
     triangles = mesh.corners[triangulate(mesh).corners]
-    made = unwrapped(mesh.vertices, triangles, TextureSize(SIDE, SIDE), no_progress)
+    atlas = unwrapped(mesh.vertices, triangles, TextureSize(SIDE, SIDE), no_progress)
     lines = ["v {:.9g} {:.9g} {:.9g}\n".format(*each) for each in mesh.vertices]
-    lines += ["vt {:.9g} {:.9g}\n".format(*each) for each in made.uvs]
-    for corners, uvs in zip(triangles + 1, made.corner_uvs + 1, strict=True):
+    lines += ["vt {:.9g} {:.9g}\n".format(*each) for each in atlas.uvs]
+    for corners, uvs in zip(triangles + 1, atlas.corner_uvs + 1, strict=True):
         lines.append("f " + " ".join(f"{a}/{b}" for a, b in zip(corners, uvs, strict=True)) + "\n")
     out = folder / "mesh.obj"
     out.write_text("".join(lines))

@@ -82,8 +82,8 @@ def unwrapped(
         padding=max(resolution // GUTTER, MIN_GUTTER),
     )
     result = _run(data.getvalue(), SECONDS * len(triangles) ** 1.4, progress)
-    with np.load(io.BytesIO(result)) as made:
-        return Unwrapped(made["uvs"].astype(np.float32), made["corner_uvs"].astype(np.int32))
+    with np.load(io.BytesIO(result)) as arrays:
+        return Unwrapped(arrays["uvs"].astype(np.float32), arrays["corner_uvs"].astype(np.int32))
 
 
 def _run(data: bytes, expected: float, progress: Progress) -> bytes:

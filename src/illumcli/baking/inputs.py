@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -161,10 +161,9 @@ def prepare_bake(job: BakeJob) -> BakeWork:
         refuse_missing_uv(str(path), slots, meshes)
     if settings.texture is not None:
         refuse_large_textures(str(path), surfaces.geometry, slots, settings)
-    outputs = (*(each for each in outputs if not is_texture(each)), *texture_of)
     work = BakeWork(
         job,
-        outputs,
+        with_textures(outputs, texture_of),
         slots,
         texture_of,
         loaded.scene,
@@ -192,8 +191,12 @@ def bake_files(job: BakeJob) -> tuple[Path, ...]:
         return job.outputs
     loaded = input_of(job.path, job.options.overrides)
     slots = texture_slots(loaded.scene.object_names(), geometry_of(loaded))
-    textures = texture_files(job.outputs, slots, job.settings.what)
-    return (*(each for each in job.outputs if not is_texture(each)), *textures)
+    return with_textures(job.outputs, texture_files(job.outputs, slots, job.settings.what))
+
+
+def with_textures(outputs: Sequence[Path], textures: Iterable[Path]) -> tuple[Path, ...]:
+    """The files of a bake: the outputs, with files of textures in place of their patterns."""
+    return (*(each for each in outputs if not is_texture(each)), *textures)
 
 
 def bake_cost(job: BakeJob) -> int:

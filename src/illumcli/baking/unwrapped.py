@@ -47,19 +47,19 @@ def _of_triangles(context: BakeContext, number: int, triangles: Ids, size: Textu
     stored = None if store is None else store.read(key)
     if stored is not None:
         return Unwrapped(*stored.arrays)
-    made = unwrapped(vertices, corners, size, context.progress)
+    result = unwrapped(vertices, corners, size, context.progress)
     if store is not None:
-        store.save(key, {"kind": "unwrap"}, [made.uvs, made.corner_uvs])
+        store.save(key, {"kind": "unwrap"}, [result.uvs, result.corner_uvs])
         store.finish()
-    return made
+    return result
 
 
 def _joined(count: int, first: int, parts: Sequence[tuple[Ids, Unwrapped]]) -> TextureUvs:
     """The uv of all `count` triangles of an object, the first of which is number `first`."""
     corner_uvs = np.zeros((count, 3), np.int32)
     uvs, before = [np.zeros((1, 2))], 1
-    for triangles, made in parts:
-        corner_uvs[triangles - first] = made.corner_uvs + np.int32(before)
-        uvs.append(made.uvs.astype(np.float64))
-        before += len(made.uvs)
+    for triangles, part in parts:
+        corner_uvs[triangles - first] = part.corner_uvs + np.int32(before)
+        uvs.append(part.uvs.astype(np.float64))
+        before += len(part.uvs)
     return TextureUvs(np.concatenate(uvs), corner_uvs)

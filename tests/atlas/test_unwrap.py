@@ -25,11 +25,11 @@ BOX = np.array([[q[a], q[b], q[c]] for q in QUADS for a, b, c in ((0, 1, 2), (0,
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 def test_uv_neither_overlap_nor_are_mirrored_at_any_scale(scale):
-    made = unwrapped(CORNERS * scale + 3 * scale, BOX, SIZE, no_progress)
-    assert made.corner_uvs.shape == BOX.shape
-    assert made.uvs.min() >= 0
-    assert made.uvs.max() <= 1
-    triangles = atlas_triangles(SIZE, made.uvs, made.corner_uvs, np.arange(12, dtype=np.int32))
+    result = unwrapped(CORNERS * scale + 3 * scale, BOX, SIZE, no_progress)
+    assert result.corner_uvs.shape == BOX.shape
+    assert result.uvs.min() >= 0
+    assert result.uvs.max() <= 1
+    triangles = atlas_triangles(SIZE, result.uvs, result.corner_uvs, np.arange(12, dtype=np.int32))
     assert len(triangles.triangle) == 12
     assert not triangles.is_mirrored.any()
     facts = overlaps(triangles, texels_of(triangles).places)

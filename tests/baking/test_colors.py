@@ -57,10 +57,10 @@ def test_without_the_option_colours_stay(tmp_path):
 def test_multiply_dims_the_colours_that_are_there(tmp_path):
     report, w = bake(ply(tmp_path / "in.ply"), tmp_path / "out.ply", color="multiply")
     dimmed = np.rint(255 * to_srgb(from_srgb(BYTES / 255.0) * w[:, None]))
-    found = colors_of(tmp_path / "out.ply")
-    assert found.dtype == np.uint8
-    assert np.abs(found - dimmed).max() <= 1  # colours are read in single precision
-    assert (found[w < 0.9] < BYTES[w < 0.9]).any()
+    written = colors_of(tmp_path / "out.ply")
+    assert written.dtype == np.uint8
+    assert np.abs(written - dimmed).max() <= 1  # colours are read in single precision
+    assert (written[w < 0.9] < BYTES[w < 0.9]).any()
     assert report.warnings == []
 
 
@@ -88,12 +88,12 @@ def test_a_channel_takes_the_plain_numbers_and_says_so(tmp_path, name, channel, 
 )
 def test_colours_keep_the_precision_of_their_type(tmp_path, kind, colors, expected):
     _, w = bake(ply(tmp_path / "in.ply", kind, colors), tmp_path / "out.ply", color="multiply")
-    found = colors_of(tmp_path / "out.ply")
+    written = colors_of(tmp_path / "out.ply")
     largest = 1 if expected == np.float32 else np.iinfo(expected).max
     linear = BYTES / 255 if kind == "float" else from_srgb(BYTES / 255.0)
     dimmed = linear * w[:, None] if kind == "float" else to_srgb(linear * w[:, None])
-    assert found.dtype == expected
-    np.testing.assert_allclose(found / largest, dimmed, atol=1e-6 + 1 / largest if largest > 1 else 1e-6)
+    assert written.dtype == expected
+    np.testing.assert_allclose(written / largest, dimmed, atol=1e-6 + 1 / largest if largest > 1 else 1e-6)
 
 
 # ------------------------------------------------------------------ GLB
@@ -101,12 +101,12 @@ def test_colours_keep_the_precision_of_their_type(tmp_path, kind, colors, expect
 
 def test_a_glb_of_another_format_has_its_colours_with_the_change(tmp_path):
     _, w = bake(ply(tmp_path / "in.ply", more="float"), tmp_path / "out.glb", color="multiply")
-    found = read_mesh(tmp_path / "out.glb")
+    written = read_mesh(tmp_path / "out.glb")
     before = read_mesh(tmp_path / "in.ply")
-    number = [int(np.argmin(np.linalg.norm(before.vertices - each, axis=1))) for each in found.vertices]
+    number = [int(np.argmin(np.linalg.norm(before.vertices - each, axis=1))) for each in written.vertices]
     expected = before.attributes["color"][number] * w[:, None]
-    np.testing.assert_allclose(found.attributes["color"], expected, atol=1e-6)
-    assert (found.attributes["alpha"] == 0.5).all()
+    np.testing.assert_allclose(written.attributes["color"], expected, atol=1e-6)
+    assert (written.attributes["alpha"] == 0.5).all()
     document = open_document(tmp_path / "out.glb").json
     (primitive,) = document["meshes"][0]["primitives"]
     assert (
@@ -120,8 +120,8 @@ def test_a_glb_keeps_the_type_of_its_colours(tmp_path):
         report, w = bake(tmp_path / "float.glb", tmp_path / f"{color}.glb", color=color)
         before = read_mesh(tmp_path / "float.glb").attributes["color"]
         expected = before * w[:, None] if color == "multiply" else np.tile(w[:, None], 3)
-        found = read_mesh(tmp_path / f"{color}.glb").attributes["color"]
-        np.testing.assert_allclose(found, expected, rtol=1e-6)
+        written = read_mesh(tmp_path / f"{color}.glb").attributes["color"]
+        np.testing.assert_allclose(written, expected, rtol=1e-6)
         assert len(report.warnings) == (color == "replace")
 
 

@@ -18,8 +18,8 @@ def material(tmp_path: Path, *statements: str) -> PbrMaterial:
 
 
 def test_colours_and_numbers(tmp_path: Path) -> None:
-    made = material(tmp_path, "Kd 0.5 0.25 0", "d 0.5", "Ke 2 0 0", "Pm 1", "Pr 0.3", "Ns 8", "Ks 1 1 1")
-    assert made == PbrMaterial("clay", (0.5, 0.25, 0.0), 0.5, 1.0, 0.3, (2.0, 0.0, 0.0))
+    result = material(tmp_path, "Kd 0.5 0.25 0", "d 0.5", "Ke 2 0 0", "Pm 1", "Pr 0.3", "Ns 8", "Ks 1 1 1")
+    assert result == PbrMaterial("clay", (0.5, 0.25, 0.0), 0.5, 1.0, 0.3, (2.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_transparency_by_either_statement(tmp_path: Path) -> None:
 def test_images(tmp_path: Path) -> None:
     for name in ("a b.png", "n.png", "e.png", "s.png"):
         (tmp_path / name).write_bytes(b"")
-    made = material(
+    result = material(
         tmp_path,
         "map_Kd -clamp on a b.png",
         "map_d a b.png",
@@ -54,15 +54,15 @@ def test_images(tmp_path: Path) -> None:
         "map_Ks s.png",
         "map_Bump lost.png",
     )
-    assert made.textures == {
+    assert result.textures == {
         "base_color": str(tmp_path / "a b.png"),
         "emission": str(tmp_path / "e.png"),
         "normal": str(tmp_path / "n.png"),
     }
-    assert made.clamped == ("base_color",)
-    assert made.has_texture_alpha
-    assert made.emission == (1.0, 1.0, 1.0)
-    assert made.left_out == (
+    assert result.clamped == ("base_color",)
+    assert result.has_texture_alpha
+    assert result.emission == (1.0, 1.0, 1.0)
+    assert result.left_out == (
         "map_ks of material clay",
         "map_bump of material clay",
         "options of norm of material clay",
@@ -72,12 +72,12 @@ def test_images(tmp_path: Path) -> None:
 def test_alpha_of_another_image_is_left_out(tmp_path: Path) -> None:
     for name in ("a.png", "d.png"):
         (tmp_path / name).write_bytes(b"")
-    made = material(tmp_path, "map_Kd a.png", "map_d d.png")
-    assert not made.has_texture_alpha
-    assert made.left_out == ("map_d of material clay",)
+    result = material(tmp_path, "map_Kd a.png", "map_d d.png")
+    assert not result.has_texture_alpha
+    assert result.left_out == ("map_d of material clay",)
 
 
 def test_what_is_malformed_has_its_default(tmp_path: Path) -> None:
-    made = material(tmp_path, "Kd red", "d -1", "Pr nan", "Ke 1 x 0", "map_Kd", "Kd")
-    assert made == PbrMaterial("clay", left_out=made.left_out)
+    result = material(tmp_path, "Kd red", "d -1", "Pr nan", "Ke 1 x 0", "map_Kd", "Kd")
+    assert result == PbrMaterial("clay", left_out=result.left_out)
     assert read_pbr(tmp_path / "none.mtl", tmp_path) == {}

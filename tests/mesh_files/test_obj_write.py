@@ -83,13 +83,13 @@ def test_meshes_are_read_back_as_they_were(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(TEXT)
     mesh = read_mesh(tmp_path / "a.obj")
     write_obj(tmp_path / "b.obj", [NamedMesh("one", mesh), NamedMesh("two", mesh)], values(8), "b.mtl")
-    made = read_mesh(tmp_path / "b.obj")
-    assert made.group_names == ("one", "side", "two")
-    assert made.material_names == ("red wood",)
+    written = read_mesh(tmp_path / "b.obj")
+    assert written.group_names == ("one", "side", "two")
+    assert written.material_names == ("red wood",)
     for name in ("vertices", "normals", "uvs"):
-        np.testing.assert_array_equal(getattr(made, name), np.tile(getattr(mesh, name), (2, 1)))
+        np.testing.assert_array_equal(getattr(written, name), np.tile(getattr(mesh, name), (2, 1)))
     for name in ("corners", "corner_uvs", "corner_normals", "polygon_smoothing"):
-        first, second = np.split(getattr(made, name), 2)
+        first, second = np.split(getattr(written, name), 2)
         np.testing.assert_array_equal(first, getattr(mesh, name))
         assert name == "polygon_smoothing" or (second[first >= 0] > first[first >= 0]).all()
     assert (tmp_path / "b.obj").read_text().startswith("mtllib b.mtl\no one\n")

@@ -27,7 +27,7 @@ class Tasks(Generic[R]):
             (number, part) for number in due for part in range(len(self._parts.get(number, (number,))))
         ]
         self._results: dict[int, dict[int, Callable[[], R]]] = defaultdict(dict)
-        # What the pieces of one scene share is made by the first, before the others start.
+        # What the pieces of one scene share is computed by the first, before the others start.
         ends = [scene_of(self.unit(task)) for task in (0, len(self) - 1)]
         self.is_first_alone = len(self) > 1 and ends[0] == ends[1] and not self._parts
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.loading import mesh_alone, surfaces_of
 from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts

@@ -19,7 +19,7 @@ import numpy as np
 
 from _bench import SMALL, header
 from illumcli.arrays import F, column_major, dot, length, take_rows, unit
-from illumcli.baking.inputs import mesh_alone
+from illumcli.baking.loading import mesh_alone
 from illumcli.rays.corner_weights import corner_weights
 from illumcli.rays.interaction import Hits, ShadingContext, SurfaceInteraction, interact
 from illumcli.render_graph.build import build

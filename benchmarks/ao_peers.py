@@ -33,7 +33,7 @@ from ao_error import caster
 from illumcli.arrays import F
 from illumcli.baking.at_vertices import sampled_at_vertices
 from illumcli.baking.context import BakeContext, StageClock
-from illumcli.baking.inputs import mesh_alone, surfaces_of
+from illumcli.baking.loading import mesh_alone, surfaces_of
 from illumcli.baking.measures import measures
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.sampling import BakeSampler, RayCounts

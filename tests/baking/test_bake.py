@@ -13,7 +13,8 @@ from plyfile import PlyData, PlyElement
 from gltf_validator import faults
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.baked_texture import BakedTextures
-from illumcli.baking.inputs import mesh_alone, prepare_bake, surfaces_of
+from illumcli.baking.inputs import prepare_bake
+from illumcli.baking.loading import mesh_alone, surfaces_of
 from illumcli.baking.measures import Measure
 from illumcli.baking.occluders import occluders_of
 from illumcli.baking.outputs import write_outputs

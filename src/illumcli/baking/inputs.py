@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli import __version__
-from illumcli.atlas.unwrap import refuse_missing_library
 from illumcli.baking.context import StageClock
-from illumcli.baking.files import ASSETS, SUFFIXES, baked_contents
+from illumcli.baking.files import ASSETS, baked_contents
+from illumcli.baking.loading import geometry_of, input_of, surfaces_of
 from illumcli.baking.occluder_choice import occluding_files
 from illumcli.baking.occluders import OccludingMesh
 from illumcli.baking.points import Surfaces
+from illumcli.baking.refusals import (
+    refuse_color,
+    refuse_inputs,
+    refuse_lost_colors,
+    refuse_missing_uv,
+    refuse_outputs,
+    refuse_textures,
+)
 from illumcli.baking.settings import BakeJob, BakeSettings
 from illumcli.baking.texture_limits import refuse_large_textures
 from illumcli.baking.texture_slots import (
@@ -31,24 +36,18 @@ from illumcli.baking.texture_slots import (
     texture_files,
     texture_slots,
 )
-from illumcli.baking.texture_slots import SUFFIXES as TEXTURE_SUFFIXES
 from illumcli.cache.fingerprint import FileFingerprint, digest
 from illumcli.errors import InputError
 from illumcli.files.claims import claim_path
 from illumcli.files.names import fields
 from illumcli.files.outputs import is_kept
-from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repairs
-from illumcli.geometry.scene_geometry import SceneGeometry, corner_normals
 from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.mesh_files.gltf.extend import copyable
 from illumcli.records import Record
-from illumcli.render_graph.build import build
 from illumcli.render_graph.costs import BYTES
-from illumcli.render_graph.limits import expected_memory, refuse_memory
+from illumcli.render_graph.limits import expected_memory
 from illumcli.render_graph.repairs import refuse_repairs
-from illumcli.scene.load import load
-from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 from illumcli.visibility.baked import mesh_hash
 
@@ -213,115 +212,6 @@ def bake_cost(job: BakeJob) -> int:
     expected = expected_memory(loaded, loaded.scene)
     size = expected.get("meshes", 0) + expected.get("shapes", 0)
     return size // BYTES + size * job.settings.samples // VERTEX_BYTES
-
-
-def refuse_outputs(outputs: Sequence[Path]) -> None:
-    """Raise InputError for unknown suffixes and files named twice."""
-    known = (*SUFFIXES, *TEXTURE_SUFFIXES)
-    problems = [
-        f"{each}: no writer for '{each.suffix}' files; use one of {', '.join(known)}"
-        for each in outputs
-        if each.suffix.lower() not in known
-    ]
-    if len({os.path.abspath(each) for each in outputs}) < len(outputs):
-        problems.append("an output is named twice; give each file once")
-    if problems:
-        raise InputError(problems)
-
-
-def refuse_textures(outputs: Sequence[Path], settings: BakeSettings) -> None:
-    """Raise InputError for textures without a size, and for a size without textures."""
-    files = [each for each in outputs if is_texture(each)]
-    if files and settings.texture is None:
-        raise InputError(f"{files[0]}: is a texture; give its size, as in --texture 1024")
-    if settings.texture is None:
-        if settings.unwrap is not None:
-            raise InputError("--unwrap makes uv for textures; give their size, as in --texture 1024")
-        return
-    if settings.unwrap is not None:
-        refuse_missing_library()
-    assets = [each for each in outputs if each.suffix.lower() == ".glb"]
-    if not files and not assets:
-        raise InputError("--texture belongs to .png, .exr and .glb outputs; name one with -o")
-    if assets and "ao" not in settings.what:
-        raise InputError(f"{assets[0]}: the textures of a GLB hold ao; add it to --what")
-
-
-def refuse_lost_colors(outputs: Sequence[Path], meshes: Sequence[Mesh], settings: BakeSettings) -> None:
-    """Raise InputError for an OBJ that has no place for values, because its vertices have colours."""
-    files = [each for each in outputs if each.suffix.lower() == ".obj"]
-    if files and settings.color is None and any("color" in mesh.attributes for mesh in meshes):
-        raise InputError(
-            f"{files[0]}: the vertices have colours, which an OBJ would hold in place of values; "
-            "choose a channel with --color, or bake to .npz"
-        )
-    if files and "ao" not in settings.what:
-        raise InputError(f"{files[0]}: an OBJ holds ao; add it to --what")
-
-
-def refuse_color(outputs: Sequence[Path], settings: BakeSettings) -> None:
-    """Raise InputError for a change of colours without values, or without files that have colours."""
-    if settings.color is None:
-        return
-    if "ao" not in settings.what:
-        raise InputError(f"--color {settings.color}: writes ao; add it to --what")
-    if not any(each.suffix.lower() in ASSETS for each in outputs):
-        raise InputError(f"--color {settings.color}: belongs to outputs with colours, {', '.join(ASSETS)}")
-
-
-def refuse_missing_uv(place: str, slots: Sequence[Slot], meshes: Sequence[Mesh]) -> None:
-    """Raise InputError for objects that textures are baked of and that have no uv."""
-    problems = [
-        f"{place}: {slot.object_name} has no uv, which textures need; --unwrap missing makes them"
-        for slot in slots
-        if meshes[slot.object].uvs is None
-    ]
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
-
-
-def refuse_inputs(inputs: Sequence[SceneFile], place: str) -> None:
-    """Raise LimitError if meshes do not fit into memory together."""
-    total: Counter[str] = Counter()
-    for loaded in inputs:
-        total.update(expected_memory(loaded, loaded.scene, shares_meshes=False))
-    total.pop("textures", None)  # no bake reads them
-    refuse_memory(0, 0, 0, total, place)
-
-
-def input_of(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
-    """A scene, or the scene of a mesh file alone."""
-    return mesh_alone(path, overrides) if is_mesh_file(path) else load(path, overrides)
-
-
-def mesh_alone(path: Path, overrides: Sequence[str] = ()) -> SceneFile:
-    """A scene of one mesh file alone, without a transform or a floor."""
-    scene_file = load(path, overrides)
-    description = {"version": 1, "objects": [{"mesh": {"file": path.name}, "name": "mesh"}]}
-    return replace(scene_file, scene=Scene.model_validate(description))
-
-
-def surfaces_of(scene: Scene, loaded: SceneFile) -> tuple[Surfaces, Repairs]:
-    """The placed meshes of a scene, as in a render, with the normals that are the axes of hemispheres; and
-    their repairs."""
-    buffers = _buffers_of(scene, loaded, "geometry", "corner_normals", "repairs")
-    geometry, normals = buffers["geometry"], buffers["corner_normals"]
-    if scene.obscurance is not None and scene.obscurance.about == "geometric":
-        normals = corner_normals(("flat",) * len(geometry.placed), geometry)
-    return Surfaces(geometry, normals), buffers["repairs"].repairs
-
-
-def geometry_of(loaded: SceneFile) -> SceneGeometry:
-    """The placed meshes of a scene."""
-    geometry: SceneGeometry = _buffers_of(loaded.scene, loaded, "geometry")["geometry"]
-    return geometry
-
-
-def _buffers_of(scene: Scene, loaded: SceneFile, *names: str) -> dict[str, Any]:
-    buffers: dict[str, Any] = {}
-    for node in build(scene, loaded, shares_meshes=False).topological_order(list(names)):
-        buffers[node.output] = node.run(buffers)
-    return buffers
 
 
 def content_hash(

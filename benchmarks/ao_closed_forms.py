@@ -34,6 +34,7 @@ from illumcli.visibility.hemisphere import Hemispheres
 from illumcli.visibility.obscurance import Method, estimates
 from illumcli.visibility.obscurance_error import Errors, Estimates
 
+TEXTBOOK = PACKAGED / "textbook.json.xz"
 SCRAMBLES = 400
 PAIRS, OWN = 16, 256
 BUILT = 2e-5
@@ -41,12 +42,12 @@ BUILT = 2e-5
 
 
 def main() -> None:
-    with lzma.open(PACKAGED) as file:
+    with lzma.open(TEXTBOOK) as file:
         known = {case["model"] for case in json.load(file)}
     for samples in (64, 256, 1024):
         every: list[np.ndarray] = []
         for kind in CAST:
-            found = [estimated(case, samples) for case in read_cases(PACKAGED, known, (kind,))]
+            found = [estimated(case, samples) for case in read_cases(TEXTBOOK, known, (kind,))]
             every.append(np.array([covered(each, law_of(found, samples), samples) for each in found]))
             tell(samples, kind, every[-1])
         tell(samples, "all", np.concatenate(every))
@@ -98,7 +99,7 @@ def covered(each: Found, law: Errors, samples: int) -> tuple[float, ...]:
 
 def estimated(case: Any, samples: int) -> Found:
     """`SCRAMBLES` estimates at the receiver and `OWN` pairs of others."""
-    inputs = Inputs(str(PACKAGED), case.id, case.inputs)
+    inputs = Inputs(str(TEXTBOOK), case.id, case.inputs)
     falloff = {
         "ao_visible": lambda: Step(),
         "ao_dmax": lambda: Step(max_distance=inputs.number("d_max")),

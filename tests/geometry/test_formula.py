@@ -27,7 +27,7 @@ PARAMETRIC = {
 
 
 def cases(model):
-    text = lzma.decompress((files("illumcli") / "data/vectors.json.xz").read_bytes())
+    text = lzma.decompress((files("illumcli") / "data/vectors/textbook.json.xz").read_bytes())
     return [pytest.param(c, id=c["id"]) for c in json.loads(text) if c["model"] == model]
 
 

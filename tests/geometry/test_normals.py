@@ -36,7 +36,7 @@ CORNER = np.ones(3) / np.sqrt(3)
 
 
 def cases():
-    text = lzma.decompress((files("illumcli") / "data/vectors.json.xz").read_bytes())
+    text = lzma.decompress((files("illumcli") / "data/vectors/textbook.json.xz").read_bytes())
     return [pytest.param(c, id=c["id"]) for c in json.loads(text) if c["model"] in FORMULAS]
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import lzma
 from collections import defaultdict
 from collections.abc import Callable
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ import pytest
 
 from illumcli.arrays import column_major, dot, unit
 from illumcli.shading.terms import TERMS, evaluate, ordered_terms
+from illumcli.verification.vectors import OPENERS, PACKAGED
 
 Case = dict[str, Any]
 
@@ -39,11 +38,12 @@ def frame() -> Callable[[dict[str, Any]], dict[str, np.ndarray]]:
 
 @pytest.fixture(scope="session")
 def cases() -> Callable[[str], list[Case]]:
-    """Model name -> its cases in the vectors file."""
-    text = lzma.decompress((files("illumcli") / "data" / "vectors.json.xz").read_bytes())
+    """Model name -> its cases in the vectors of the package."""
     by_model: dict[str, list[Case]] = defaultdict(list)
-    for case in json.loads(text):
-        by_model[case["model"]].append(case)
+    for file in PACKAGED.iterdir():
+        with OPENERS.get(file.suffix, open)(file) as text:
+            for case in json.load(text):
+                by_model[case["model"]].append(case)
     return lambda name: by_model[name]
 
 

@@ -14,7 +14,7 @@ from illumcli.verification.obscurance import exponential
 from illumcli.verification.surroundings import GEOMETRIES, surroundings
 from illumcli.visibility.falloffs.step import Step
 
-ENTRIES = json.loads(lzma.decompress(PACKAGED.read_bytes()))
+ENTRIES = json.loads(lzma.decompress((PACKAGED / "textbook.json.xz").read_bytes()))
 RAYS = 600
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from illumcli.errors import InputError, ThresholdError
+from illumcli.schema.families import tags
 from illumcli.verification import (
     albedo,
     lobes,
@@ -54,6 +55,11 @@ EVALUATORS: dict[str, Callable[[Inputs], Result]] = {
 """Case type -> function from inputs to values, or to a Monte Carlo estimate."""
 
 
+def known_types() -> set[str]:
+    """Types that a case may have: those with an evaluator; models, for cases with `parameters`."""
+    return {*EVALUATORS, *tags("illumcli.models")}
+
+
 def verify(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[TypeResult]:
     """Compare the cases of a vectors file, in float64, with their expected values; by type, in file order.
 
@@ -69,7 +75,7 @@ def verify(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[TypeResult]:
     InputError
         The file is malformed, or has an unknown case type or inputs that a formula does not accept.
     """
-    groups = _by_type(read_cases(file, EVALUATORS, only))
+    groups = _by_type(read_cases(file, known_types(), only))
     return [
         TypeResult(name, [judge(case, evaluate(file, case)) for case in cases])
         for name, cases in groups.items()
@@ -88,7 +94,7 @@ def verify_single(file: Path = PACKAGED, only: Sequence[str] = ()) -> list[Singl
 
     Types that cast rays are left out, because rays are always float32.
     """
-    groups = _by_type(read_cases(file, EVALUATORS, only))
+    groups = _by_type(read_cases(file, known_types(), only))
     evaluate_case = partial(evaluate, file)
     return [
         single_result(name, cases, evaluate_case)
@@ -105,6 +111,8 @@ def evaluate(
     inputs = Inputs(place, case.id, case.inputs, dtype, rounded)
     try:
         with np.errstate(all="ignore"):  # values that are not finite give an error of inf
+            if "parameters" in case.inputs:
+                return lobes.response_of_case(case.type, inputs)
             return EVALUATORS[case.type](inputs)
     except ValueError as error:  # a parameter out of its range
         raise InputError([f"{place}: {fact}" for fact in _facts(error)]) from error

@@ -16,6 +16,7 @@ from illumcli.models.oren_nayar import OrenNayar, oren_nayar_terms
 from illumcli.models.poulin_fournier import PoulinFournier
 from illumcli.models.strauss import Strauss, Surface, strauss_fresnel, strauss_geometry, strauss_specular
 from illumcli.models.ward import Ward
+from illumcli.schema.families import member
 from illumcli.shading import terms
 from illumcli.shading.terms import evaluate
 from illumcli.verification.inputs import Inputs
@@ -36,6 +37,18 @@ def response(model: IlluminationModel, n: Vectors, l: Vectors, **more: Vectors) 
         given = {name: value if value.ndim == 1 else take_rows(value, lit) for name, value in given.items()}
         out[lit] = sum(evaluate(model.lobes(), given).values())
     return out
+
+
+def response_of_case(tag: str, inputs: Inputs) -> Floats:
+    """(3,) the response of the model `tag` with the case's `parameters`, as a scene has them; `t` if it has a
+    grain, and a white light."""
+    model = member("illumcli.models", tag).model_validate({"model": tag, **inputs.value("parameters")})
+    given = {key: inputs.unit(key) for key in ("n", "l", "v")}
+    if not facing(inputs):
+        return np.zeros(3, inputs.dtype)
+    if "t" in inputs.values:
+        given["t"] = inputs.tangent()
+    return response(model, **given, light=np.ones(3, inputs.dtype))[0]
 
 
 def brdf(model: IlluminationModel, inputs: Inputs, **more: Vectors) -> Floats:

@@ -2,7 +2,8 @@
 
 A file is a list of objects with the keys ``id, model, inputs, expected, rtol, atol``; the keys ``source``,
 ``note`` and ``quantity`` are documentation. `model` is the case type. Directions in `inputs` need not have
-unit length. A result x passes if max_i |x_i - e_i| <= atol + rtol * max_i |e_i|.
+unit length. Where `inputs` has `parameters`, `model` is the tag of an illumination model, and `expected` its
+response in R, G, B under white light. A result x passes if max_i |x_i - e_i| <= atol + rtol * max_i |e_i|.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from illumcli.errors import InputError, LimitError
 from illumcli.records import Record
 from illumcli.schema.messages import suggestion
 
-PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors.json.xz"
-"""The vectors of the package, computed with 50 digits."""
+PACKAGED = Path(str(files("illumcli"))) / "data" / "vectors"
+"""The vectors of the package, with 50 digits: a file of the textbooks' models, and one per later model."""
 
 KEYS = ("id", "model", "inputs", "expected", "rtol", "atol")
 MAX_SHOWN = 10
@@ -55,7 +56,7 @@ class Case(Record):
 
 
 def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -> list[Case]:
-    """The cases of a vectors file (`.json`, also as `.xz` or `.gz`), in its order.
+    """The cases of a vectors file (`.json`, also `.xz` or `.gz`), in its order, or of a folder of them.
 
     Parameters
     ----------
@@ -77,18 +78,18 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
     ]
     if unknown:
         raise InputError(unknown)
-    entries = _entries(path)
     problems: list[str] = []
-    cases = [
-        case for number, entry in enumerate(entries, 1) if (case := _case(path, number, entry, problems))
-    ]
-    if only:
-        cases = [case for case in cases if case.type in only]
-    problems += _unknown(path, cases, table)
+    cases: list[Case] = []
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        entries = _entries(file)
+        found = [_case(file, number, entry, problems) for number, entry in enumerate(entries, 1)]
+        wanted = [case for case in found if case is not None and (not only or case.type in only)]
+        problems += _unknown(file, wanted, table)
+        cases += wanted
+        if not entries:
+            problems.append(f"{file}: holds no case")
     missing = set(only) - {case.type for case in cases}
     problems += [f"{path}: holds no case of type '{name}'" for name in sorted(missing) if not problems]
-    if not entries:
-        problems.append(f"{path}: holds no case")
     if problems:
         raise InputError(_shortened(path, problems))
     return cases

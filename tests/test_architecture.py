@@ -26,7 +26,7 @@ FOLDERS = (
     "film",
     "rays files",
     "lights models geometry atlas",
-    "schema",
+    "measured_files schema",
 )
 """From the top down: a folder imports from those below its line, and from single files beside them."""
 LEVEL = {folder: level for level, line in enumerate(FOLDERS) for folder in line.split()}

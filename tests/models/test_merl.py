@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.models.merl import CELLS, SCALE, SHAPE, Merl, merl_index, rusinkiewicz
+from illumcli.measured_files.merl import CELLS, SCALE, SHAPE, coordinates
+from illumcli.models.merl import Merl, merl_index, rusinkiewicz
 
 SLANTED = {"n": [0, 0, 1], "l": [1, 0.3, 1], "v": [-0.2, -0.6, 1]}
 
@@ -58,9 +59,7 @@ def test_nearest_takes_the_cell_itself(smooth, respond, brdf, frame, term):
 
 
 def test_linear_lies_between_the_cells(smooth, brdf, frame, term):
-    from illumcli.models.merl import merl_coordinates
-
-    i, j, k = (each[0] for each in merl_coordinates(*angles(frame(SLANTED), term)))
+    i, j, k = (each[0] for each in coordinates(*angles(frame(SLANTED), term)))
     expected = 100 + i + 2 * j + 10 * np.cos(2 * np.pi * k / 180)
     np.testing.assert_allclose(brdf(Merl(file=smooth), SLANTED), expected, rtol=1e-4)
 

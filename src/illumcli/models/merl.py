@@ -18,21 +18,16 @@ Rusinkiewicz, S. (1998). A new change of variables for efficient BRDF representa
 
 from __future__ import annotations
 
-import os
-from functools import lru_cache
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors, dot
-from illumcli.errors import InputError
+from illumcli.measured_files.merl import SCALE, SHAPE, coordinates, mapped, values
 from illumcli.models._base import IlluminationModel, Lobe
 
-SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
-CELLS = 90 * 90 * 180
 Cells: TypeAlias = NDArray[np.int64]
-SCALE = (1 / 1500, 1.15 / 1500, 1.66 / 1500)
 
 
 def rusinkiewicz(
@@ -49,20 +44,11 @@ def rusinkiewicz(
     return theta_h, theta_d, np.arctan2(dot(nxs, d), -dot(n, d) * size)
 
 
-def merl_coordinates(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Floats]:
-    """Table coordinates in cells: 0..90 by the root of theta_h, 0..90 by theta_d, 0..180 by phi_d."""
-    return (
-        np.sqrt(theta_h * (2 / np.pi)) * 90,
-        theta_d * (2 / np.pi) * 90,
-        phi_d * (180 / np.pi) % 180,
-    )
-
-
 def merl_index(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Cells, Cells, Cells, Cells]:
     """Cell numbers along theta_h, theta_d, phi_d, and in the flat table."""
     i, j, k = (
         np.clip(np.asarray(x, np.int64), 0, count - 1)
-        for x, count in zip(merl_coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
+        for x, count in zip(coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
     )
     return i, j, k, (i * SHAPE[1] + j) * SHAPE[2] + k
 
@@ -84,66 +70,26 @@ class Merl(IlluminationModel):
     ) -> Vectors:
         """(N, 3) n_l times the measurement."""
         angles = rusinkiewicz(nxs, n_s, n, d, s_s)
-        table = measurement(self.file)
+        table = mapped(self.file)
         look = _linear if self.lookup == "linear" else _nearest
-        values = look(table, *angles)
-        return (values * n_l).T
+        return (look(table, *angles) * n_l).T
 
     def lobes(self) -> dict[str, Lobe]:
         """The whole measurement is one lobe, `specular`."""
         return {"specular": self.specular_lobe}
 
 
-def measurement(path: str) -> NDArray[np.uint32]:
-    """(3, 1458000, 2) the planes of a MERL file, mapped read-only, each number as two 32-bit halves.
-
-    The numbers begin 12 bytes into the file, where 64-bit numbers are not aligned: numpy would copy all of
-    them at every look-up.
-
-    Raises
-    ------
-    InputError
-        The file cannot be opened, or is not a MERL measurement.
-    """
-    try:
-        facts = os.stat(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the measurement: {error.strerror}") from None
-    return _mapped(path, facts.st_mtime_ns, facts.st_size)
-
-
-@lru_cache(maxsize=64)
-def _mapped(path: str, modified: int, size: int) -> NDArray[np.uint32]:
-    expected = 12 + 3 * CELLS * 8
-    with open(path, "rb") as file:
-        shape = tuple(np.frombuffer(file.read(12).ljust(12, b"\0"), "<i4").tolist())
-    if shape != SHAPE:
-        raise InputError(
-            f"{path}: must begin with the sizes 90, 90, 180, has {', '.join(map(str, shape))}; "
-            "name a .binary file of the MERL database"
-        )
-    if size != expected:
-        raise InputError(f"{path}: must have {expected} bytes, has {size}; fetch it again, it is not whole")
-    return np.memmap(path, "<u4", "r", offset=12, shape=(3, CELLS, 2))
-
-
-def _cells(table: NDArray[np.uint32], flat: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(3, N) the values of these cells."""
-    halves = np.asarray(table).take(flat, axis=1)
-    return halves.view("<f8")[..., 0].astype(np.float64, copy=False)
-
-
 def _nearest(table: NDArray[np.uint32], *angles: Floats) -> Floats:
     """(3, N) values of the cells that contain the angles; 0 without measurement."""
     flat = merl_index(*angles)[3]
-    return _scaled(np.maximum(_cells(table, flat), 0), angles[0].dtype)
+    return _scaled(np.fmax(values(table, flat), 0), angles[0].dtype)
 
 
 def _linear(table: NDArray[np.uint32], *angles: Floats) -> Floats:
     """(3, N) trilinear interpolation between cell centres, periodic in phi_d; 0 without any measurement."""
     # The lower of the two nearest cells along each axis, and the position between both.
     low, fractions = [], []
-    for x in merl_coordinates(*angles):
+    for x in coordinates(*angles):
         below = np.floor(x - 0.5)
         low.append(below.astype(np.int64))
         fractions.append(x - 0.5 - below)
@@ -157,12 +103,12 @@ def _linear(table: NDArray[np.uint32], *angles: Floats) -> Floats:
         weight = np.ones(len(flat))
         for fraction, step in zip(fractions, corner, strict=True):
             weight = weight * (fraction if step else 1 - fraction)
-        values = _cells(table, flat)
-        measured = weight * (values >= 0)
-        total += measured * values
+        found = values(table, flat)
+        measured = weight * (found >= 0)
+        total += measured * np.fmax(found, 0)
         weights += measured
     return _scaled(total / np.maximum(weights, np.finfo(np.float64).tiny), angles[0].dtype)
 
 
-def _scaled(values: NDArray[np.float64], dtype: np.dtype[np.floating[Any]]) -> Floats:
-    return (values * np.array(SCALE)[:, None]).astype(dtype)
+def _scaled(found: NDArray[np.float64], dtype: np.dtype[np.floating[Any]]) -> Floats:
+    return (found * np.array(SCALE)[:, None]).astype(dtype)

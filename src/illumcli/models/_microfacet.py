@@ -26,7 +26,7 @@ from pydantic import Discriminator
 from illumcli.arrays import Floats, as_dtype_of
 from illumcli.models._lobes import gauss_legendre, log_cos
 from illumcli.models._parameters import HalfHeight, Roughness, Varying
-from illumcli.models._terms import Angle
+from illumcli.models._terms import Angle, Components
 from illumcli.schema.description import Description
 from illumcli.schema.fields import NonNegative, Positive
 
@@ -77,6 +77,32 @@ def ggx(n_h: Floats, sin2_h: Floats, alpha: Floats) -> Floats:
     """alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), normalised."""
     wide = np.square(alpha * n_h) + sin2_h
     return np.square(alpha / wide) / np.pi
+
+
+def anisotropic_beckmann(h: Components, m_x: Floats, m_y: Floats) -> Floats:
+    """Beckmann with RMS slope m_x along the grain and m_y across it, normalised; h as by `squared_unit`."""
+    slope2 = (h.t / np.square(m_x) + h.b / np.square(m_y)) / h.n
+    return np.exp(-slope2) * np.square(1 + (h.t + h.b) / h.n) / (np.pi * m_x * m_y)
+
+
+def anisotropic_ggx(h: Components, alpha_x: Floats, alpha_y: Floats) -> Floats:
+    """GGX with slope scale alpha_x along the grain and alpha_y across it, normalised; h as by `squared_unit`.
+
+    1 / (pi alpha_x alpha_y ((h.t / alpha_x)^2 + (h.b / alpha_y)^2 + (h.n)^2)^2)
+    """
+    stretched = h.t / np.square(alpha_x) + h.b / np.square(alpha_y) + h.n
+    return 1 / (np.pi * alpha_x * alpha_y * np.square(stretched))
+
+
+def squared_unit(s: Components) -> Components:
+    """The squared components of h = s / |s|; that along the normal is at least 1e-18.
+
+    A half vector below the horizon is moved up to it, and one of length 0 points along the grain.
+    """
+    t, b, n = np.square(s.t), np.square(s.b), np.square(np.maximum(s.n, 0))
+    size2 = t + b + n
+    scale = 1 / np.maximum(size2, np.finfo(size2.dtype).tiny)
+    return Components(np.maximum(t * scale, size2 == 0), b * scale, np.maximum(n * scale, 1e-18))
 
 
 def power_of_half_height(beta: Floats) -> Floats:

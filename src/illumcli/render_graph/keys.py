@@ -29,6 +29,7 @@ SOURCES = (
     "cache/codec.py",
     "color.py",
     "film",
+    "formula.py",
     "geometry",
     "lights",
     "mesh_files",

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.geometry import formula, single_normals
+from illumcli.formula import Formula, parse
+from illumcli.geometry import formula_normals, single_normals
 from illumcli.geometry.corner_normals import Weights
 from illumcli.verification.inputs import Inputs
 
@@ -53,20 +54,20 @@ def vertex_normal(inputs: Inputs) -> NDArray[Any]:
 def implicit_normal(inputs: Inputs) -> NDArray[Any]:
     """The gradient of f, by the derivatives of a scene's formulas."""
     f = parsed(inputs.choose("surface", IMPLICIT), inputs, ("x", "y", "z"))
-    return formula.implicit_normal(f, inputs.vectors("point").astype(np.float64))[0]
+    return formula_normals.implicit_normal(f, inputs.vectors("point").astype(np.float64))[0]
 
 
 def parametric_normal(inputs: Inputs) -> NDArray[Any]:
     """df/du x df/dv."""
     x, y, z = (parsed(text, inputs, ("u", "v")) for text in inputs.choose("surface", PARAMETRIC))
     u, v = (inputs.scalars(key).astype(np.float64) for key in ("u", "v"))
-    return formula.parametric_normal(x, y, z, u, v)[0]
+    return formula_normals.parametric_normal(x, y, z, u, v)[0]
 
 
-def parsed(text: str, inputs: Inputs, variables: tuple[str, ...]) -> formula.Formula:
+def parsed(text: str, inputs: Inputs, variables: tuple[str, ...]) -> Formula:
     """The formula with the case's constants inserted."""
     names = {name for _, name, _, _ in Formatter().parse(text) if name}
-    return formula.parse(text.format(**{name: f"({inputs.number(name)!r})" for name in names}), variables)
+    return parse(text.format(**{name: f"({inputs.number(name)!r})" for name in names}), variables)
 
 
 CASES = {

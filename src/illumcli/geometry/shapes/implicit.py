@@ -22,7 +22,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from illumcli.arrays import Vectors, dot, length, unit
 from illumcli.errors import InputError, LimitError
-from illumcli.geometry.formula import MAX_LENGTH, Formula, checked, parse
+from illumcli.formula import MAX_LENGTH, Formula, checked, parse
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import MAX_TRIANGLES, TRIANGLE_BYTES, Shape
 from illumcli.memory import refuse_beyond

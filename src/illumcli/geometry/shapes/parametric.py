@@ -14,7 +14,8 @@ from pydantic import AfterValidator, Field, field_validator
 
 from illumcli.arrays import Vectors, length, unit
 from illumcli.errors import InputError
-from illumcli.geometry.formula import MAX_LENGTH, checked, parametric_normal, parse
+from illumcli.formula import MAX_LENGTH, checked, parse
+from illumcli.geometry.formula_normals import parametric_normal
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.shapes._base import CellsByCells, Shape
 from illumcli.geometry.shapes._lattice import Lattice, around, turned, vertex_numbers, woven

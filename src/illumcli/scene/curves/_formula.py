@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator
 
-from illumcli.geometry.formula import checked, parse
+from illumcli.formula import checked, parse
 from illumcli.scene.curves._base import rounded
 from illumcli.scene.frames import Moment
 

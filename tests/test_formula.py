@@ -7,7 +7,8 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from illumcli.geometry.formula import FUNCTIONS, MAX_LENGTH, implicit_normal, parametric_normal, parse
+from illumcli.formula import FUNCTIONS, MAX_LENGTH, parse
+from illumcli.geometry.formula_normals import implicit_normal, parametric_normal
 
 XYZ = ("x", "y", "z")
 

@@ -111,7 +111,7 @@ SKIPS = (
         ((light_at, "incident", everywhere), (light_at, "unshadowed", asked)),
     ),
     Skip("points in shadow", (), ((light_at, "unshadowed", dimmed),)),
-    Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_zero", no),)),
+    Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_always", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),
     Skip("k_a of 0", ("materials.clay.ambient=0", "materials.grey.ambient=0"), AMBIENT),
     Skip("emission of 0", (), ((needs, "is_emissive", yes),)),

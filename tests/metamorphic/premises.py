@@ -125,7 +125,9 @@ def without_images(case: Case, random: Random) -> Case:
     """No texture: uv are linear over triangles, not over polygons."""
     case = case.copy()
     for thing in case.scene["objects"]:
-        if "texture" in thing.get("override", {}).get("diffuse", {}):
+        if any(
+            isinstance(value, dict) and "texture" in value for value in thing.get("override", {}).values()
+        ):
             plain_material(random, thing)
     return case
 

@@ -20,6 +20,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from illumcli.schema.families import member
 from illumcli.shading import rates as shading_rates
 from metamorphic import surfaces
 from metamorphic.surfaces import Surface
@@ -170,12 +171,20 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
     "lambert": lambda r: {"diffuse": color(r)},
     "lommel_seeliger": lambda r: {"diffuse": color(r)},
     "merl": lambda r: {"file": MEASUREMENT, "lookup": r.choice(["nearest", "linear"])},
+    "metallic_roughness": lambda r: {
+        "base_color": color(r), "metallic": number(r, 0, 1), "roughness": number(r, 0.3, 1)
+    },
     "minnaert": lambda r: {"diffuse": color(r), "k": number(r, 0.5, 2)},
     "oren_nayar": lambda r: {
         "diffuse": color(r), "sigma": number(r, 0, 1), "form": r.choice(["full", "qualitative"])
     },
     "phong": lambda r: _lobe(r) | {"normalised": r.random() < 0.3},
     "poulin_fournier": lambda r: _lobe(r) | {"slope": number(r, 0.1, 1)},
+    "principled": lambda r: {
+        "base_color": color(r), "metallic": number(r, 0, 1), "roughness": number(r, 0.3, 1),
+        "subsurface": number(r, 0, 1), "anisotropic": number(r, 0, 1), "sheen": number(r, 0, 1),
+        "clearcoat": number(r, 0, 1), "clearcoat_gloss": number(r, 0, 0.5)
+    },
     "strauss": lambda r: {
         "color": color(r), "smoothness": number(r, 0, 0.95), "metalness": number(r, 0, 1),
         "transparency": number(r, 0, 0.8)
@@ -188,7 +197,7 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
 """Parameters by model."""
 SMALL = tuple(name for name in MODELS if name != "merl")
 """Models that need no large file."""
-GRAINED = ("ashikhmin_shirley", "kajiya_kay", "lafortune", "poulin_fournier", "ward")
+GRAINED = ("ashikhmin_shirley", "kajiya_kay", "lafortune", "poulin_fournier", "principled", "ward")
 """Models that follow the grain."""
 
 
@@ -332,9 +341,9 @@ def vary(random: Random, case: Case, thing: dict[str, Any]) -> None:
     if (surface.uvs is not None and not source["file"].endswith("stl")) if surface else has_uvs(source):
         by.append(texture(random, case))
     if by:
-        model = random.choice([name for name in SMALL if name != "strauss"])
+        model = random.choice(SMALL)
         thing["material"] = {"model": model, **MODELS[model](random)}
-        thing["override"] = {"diffuse": random.choice(by)}
+        thing["override"] = {member("illumcli.models", model).surface_color: random.choice(by)}
 
 
 def has_uvs(source: dict[str, Any]) -> bool:

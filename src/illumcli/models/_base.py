@@ -34,6 +34,8 @@ class IlluminationModel(Description):
     ambient: Varying[Color] | None = None
     """k_a, the share of ambient light that is reflected towards the eye; by default the diffuse albedo."""
 
+    surface_color: ClassVar[str] = "diffuse"
+    """The parameter that is the surface's colour, which a mesh's vertex colours take the place of."""
     scales: ClassVar[dict[str, tuple[str, ...]]] = {
         "diffuse_lobe": ("diffuse",),
         "specular_lobe": ("specular",),
@@ -54,7 +56,8 @@ class IlluminationModel(Description):
         return {
             method.removesuffix("_lobe"): getattr(self, method)
             for method in ("diffuse_lobe", "specular_lobe")
-            if hasattr(self, method) and not any(self._is_zero(name) for name in self.scales.get(method, ()))
+            if hasattr(self, method)
+            and not any(self._is_always(name, 0) for name in self.scales.get(method, ()))
         }
 
     def ambient_color(self) -> Any:
@@ -66,8 +69,8 @@ class IlluminationModel(Description):
         return not self.isotropic
 
     def diffuse_color(self) -> Any:
-        """The diffuse albedo: the parameter `diffuse`, unless a model defines it otherwise."""
-        return getattr(self, "diffuse", (0.0, 0.0, 0.0))
+        """What reflects ambient light: the surface colour, unless a model defines it otherwise."""
+        return getattr(self, self.surface_color, (0.0, 0.0, 0.0))
 
     def varying(self) -> dict[str, Texture | VertexValues]:
         """The parameters that vary over the surface, by path: `specular`, or `distribution.m`."""
@@ -83,9 +86,14 @@ class IlluminationModel(Description):
         """
         return _replace_parameters(self, values)
 
-    def _is_zero(self, name: str) -> bool:
+    def _is_always(self, name: str, number: float) -> bool:
+        """True if a parameter has this value everywhere, in all channels."""
         value = getattr(self, name)
-        return value is not None and not isinstance(value, Texture | VertexValues) and not np.any(value)
+        return (
+            value is not None
+            and not isinstance(value, Texture | VertexValues)
+            and bool(np.all(np.equal(value, number)))
+        )
 
 
 def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture | VertexValues]]:

@@ -80,6 +80,7 @@ class Strauss(IlluminationModel):
     kg: Offset = 1.01
     """k_g, pole of G; the nearer to 1, the later G falls."""
 
+    surface_color: ClassVar[str] = "color"
     scales: ClassVar[dict[str, tuple[str, ...]]] = {"diffuse_lobe": ("color",)}
 
     def diffuse_color(self) -> Any:

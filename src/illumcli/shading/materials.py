@@ -208,13 +208,12 @@ def as_intended(model: IlluminationModel) -> IlluminationModel:
 
 
 def with_vertex_colors(model: IlluminationModel, is_factor: bool) -> IlluminationModel:
-    """The model with vertex colours instead of its constant diffuse colour, or times it if `is_factor`."""
-    if "diffuse" not in type(model).model_fields or "diffuse" in model.varying():
+    """The model with vertex colours instead of its constant surface colour, or times it if `is_factor`."""
+    name = model.surface_color
+    if name not in type(model).model_fields or name in model.varying():
         return model
-    own = dict(model)["diffuse"] if is_factor else (1.0, 1.0, 1.0)
-    return (
-        model.model_copy(update={"diffuse": VertexValues(vertex="color", factor=own)}) if any(own) else model
-    )
+    own = dict(model)[name] if is_factor else (1.0, 1.0, 1.0)
+    return model.model_copy(update={name: VertexValues(vertex="color", factor=own)}) if any(own) else model
 
 
 def imported_model(description: Mapping[str, Any], folder: Path) -> IlluminationModel:

@@ -173,6 +173,16 @@ def s_local(t_s: Floats, b_s: Floats, n_s: Floats) -> Components:
     return Components(t_s, b_s, n_s)
 
 
+def l_local(t_l: Floats, b_l: Floats, n_l: Floats) -> Components:
+    """l along the grain, across it, and along the normal."""
+    return Components(t_l, b_l, n_l)
+
+
+def v_local(t_v: Floats, b_v: Floats, n_v: Floats) -> Components:
+    """v along the grain, across it, and along the normal, kept above the surface."""
+    return Components(t_v, b_v, n_v)
+
+
 def sin_tl(t: Vectors, l: Vectors) -> Floats:
     """Sine of the angle between tangent and light, |t x l|."""
     return length(cross(t, l))
@@ -187,7 +197,7 @@ def sin_tv(t: Vectors, v: Vectors) -> Floats:
 FUNCTIONS = (
     n_l, n_v, l_v, s, s_s, h, v_h, n_s, n_h, gap_nh, r, gap_rv,
     nxs, sin2_h, theta_h, nxl, nxv, sin_l, sin_v, cos_phi, d, sin_theta_d,
-    b, t_l, t_v, b_l, b_v, t_s, b_s, s_local, sin_tl, sin_tv,
+    b, t_l, t_v, b_l, b_v, t_s, b_s, s_local, l_local, v_local, sin_tl, sin_tv,
 )
 # fmt: on
 TERMS: dict[str, Node] = {function.__name__: Node.of(function) for function in FUNCTIONS}

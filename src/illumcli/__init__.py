@@ -1,3 +1,45 @@
-"""Batch renderer for local illumination models and ambient obscurance, driven by YAML scenes."""
+"""Batch renderer for local illumination models and ambient obscurance, driven by YAML scenes.
 
+The commands as functions, for programs and notebooks: nothing is imported before it is used.
+
+>>> import illumcli as illum
+>>> illum.render("scenes/teapot.yaml", {"film.width": 320})["beauty"]
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from illumcli.api.baking import bake
+    from illumcli.api.comparing import compare
+    from illumcli.api.render import load, render
+    from illumcli.api.sweeping import sweep
+    from illumcli.errors import IllumError
+    from illumcli.scene.spec import Scene
+
+__all__ = ["IllumError", "Scene", "__version__", "bake", "compare", "load", "render", "sweep"]
 __version__ = "0.2.0"
+
+_PLACES = {
+    "IllumError": "errors.IllumError",
+    "Scene": "scene.spec.Scene",
+    "bake": "api.baking.bake",
+    "compare": "api.comparing.compare",
+    "load": "api.render.load",
+    "render": "api.render.render",
+    "sweep": "api.sweeping.sweep",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A function or class of the interface, imported when it is first used."""
+    if name not in _PLACES:
+        raise AttributeError(f"module 'illumcli' has no attribute '{name}'")
+    module, _, inside = _PLACES[name].rpartition(".")
+    return getattr(import_module(f"illumcli.{module}"), inside)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

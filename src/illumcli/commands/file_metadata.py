@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from illumcli import __version__
-from illumcli.commands.work import Work
 from illumcli.film.develop import Target, how_to_read
 from illumcli.render_graph.needs import reconstructs
 from illumcli.render_space import RenderSpace
+
+if TYPE_CHECKING:
+    from illumcli.commands.work import Work
 
 
 def metadata(work: Work, target: Target, space: RenderSpace) -> dict[str, Any]:

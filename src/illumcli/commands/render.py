@@ -28,7 +28,7 @@ from illumcli.render_graph.framing import place_cameras
 from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.render_graph.proportions import disproportion_lines
 from illumcli.render_graph.repairs import refuse_repairs, repairs, repairs_of
-from illumcli.render_graph.schedule import shared_keys
+from illumcli.render_graph.schedule import lasting_keys, shared_keys
 from illumcli.render_graph.tile_nodes import RenderStats
 
 
@@ -62,7 +62,7 @@ def rendered(
         # With `strict`, repairs of objects that no view sees are refused too.
         graph = place_cameras(graph, run) if options.strict else place_and_cull(graph, outputs, run)
         if cache.memory is not None:
-            cache.memory.wanted = wanted_by(following, graph, run)
+            cache.memory.wanted = wanted_by(following, work, graph, run)
     skipped = why_not(graph, outputs)
     repaired: Repairs = {}
     if options.strict and not due:
@@ -126,8 +126,11 @@ def rendered(
     return replace(report.with_counts(run.stats), total_seconds=seconds)
 
 
-def wanted_by(following: Work | None, graph: Graph, run: Run) -> frozenset[str]:
-    """Keys of the buffers of a graph that the next variant reads."""
+def wanted_by(following: Work | None, work: Work, graph: Graph, run: Run) -> frozenset[str]:
+    """Keys of the buffers of a graph that the next variant reads; or that any variant might, if whoever holds
+    the images may ask for more."""
+    if work.images.held:
+        return lasting_keys(graph, work.outputs)
     if following is None:
         return frozenset()
     other = without_objects(place_cameras(following.graph, run), graph.culled)

@@ -25,12 +25,12 @@ def rendered_to_target(work: Work, store: Store | None, progress: Progress) -> t
     start = time.perf_counter()
     options = work.job.options
     options = replace(options, overrides=(*options.overrides, *overrides_of_frame(work.loaded)))
-    job = replace(work.job, options=options)
+    job, images = replace(work.job, options=options), work.images
     assert options.target_error is not None
     choice, memory = _choice(job, options.target_error, store)
     overrides = (*options.overrides, *choice.overrides)
     work = prepared(replace(job, options=replace(options, overrides=overrides, audit=False)))
-    work = replace(work, audited=choice.audited)
+    work = replace(work, audited=choice.audited, images=images)
     report = replace(
         rendered(work, Cache(store, memory), progress),
         chosen=choice.overrides,

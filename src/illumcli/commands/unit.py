@@ -21,7 +21,7 @@ machine suffices. A worker reads each scene and file once: make a new one for ea
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, overload
@@ -32,6 +32,7 @@ from illumcli.cache.memory import MemoryCache
 from illumcli.cache.recorder import Cache
 from illumcli.cache.speeds import SpeedRecorder
 from illumcli.cache.store import Store
+from illumcli.commands.image_store import ImageFiles, ImageStore
 from illumcli.commands.options import RenderJob
 from illumcli.commands.work import Work, work_of
 from illumcli.progress import Progress, no_progress
@@ -58,7 +59,8 @@ class SharedParts(Record):
 class Worker:
     """Does units of work in one process; what those of one scene have in common is read and computed once."""
 
-    def __init__(self) -> None:
+    def __init__(self, images: ImageStore = ImageFiles()) -> None:  # noqa: B008
+        self._images = images
         self._scenes: dict[Path, SharedParts] = {}
         self._speeds = SpeedRecorder()
 
@@ -87,7 +89,7 @@ class Worker:
         if isinstance(unit, RenderJob):
             shared = self.shared(unit.scene)
             loaded = load(unit.scene, unit.options.overrides, shared.text, unit.frame)
-            return work_of(unit, loaded, shared.files)
+            return replace(work_of(unit, loaded, shared.files), images=self._images)
         from illumcli.baking.inputs import prepare_bake
 
         work = prepare_bake(unit)

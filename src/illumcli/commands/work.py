@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from illumcli.cache.fingerprint import FileFingerprints, digest
+from illumcli.commands.image_store import ImageFiles, ImageStore
 from illumcli.commands.options import RenderJob
 from illumcli.commands.targets import image_set
 from illumcli.errors import LimitError
 from illumcli.files.claims import claim_path
-from illumcli.files.outputs import is_kept
 from illumcli.film.develop import Development, Target
 from illumcli.film.tiles import MAX_TILE_SAMPLES
-from illumcli.images.contents import image_contents
 from illumcli.layers import Layer
 from illumcli.records import Value
 from illumcli.render_graph.build import Graph, build
@@ -45,6 +44,8 @@ class Work(Value):
     targets: tuple[Target, ...]
     audited: Mapping[str, AuditedError] = field(default_factory=dict)
     """Errors of cameras that are known before they are rendered."""
+    images: ImageStore = ImageFiles()
+    """Where its images go."""
 
     @property
     def scene(self) -> Scene:
@@ -90,8 +91,7 @@ class Work(Value):
         LimitError
             Memory or disk cannot hold what is due.
         """
-        force = self.job.options.force
-        due = [each for each in self.targets if not is_kept(each.path, [each.content], image_contents, force)]
+        due = self.images.due(self.targets, self.job.options.force)
         refuse_too_large(self, due)
         return due
 
@@ -137,10 +137,12 @@ def refuse_too_large(work: Work, due: Sequence[Target]) -> None:
     """Raise LimitError if memory or disk cannot hold the files that are due; reads and writes nothing."""
     values = sum(len(layer.channels) for layer in work.outputs) + 1
     expected = expected_memory(work.loaded, work.scene) if due else {}
-    is_held = error_is_audited(work.scene, work.outputs)  # until the audit
+    is_held = work.images.held or error_is_audited(work.scene, work.outputs)  # until the audit
     for target in due:
         view = target.view
         rows = target.height if is_held else BAND_ROWS
         refuse_memory(rows, view.width, values, expected, str(work.loaded.path))
+        if work.images.held:
+            continue
         types = work.development.channels(target).values()
         refuse_disk(target.path, view.width * target.height * sum(BYTES[kind] for kind in types))

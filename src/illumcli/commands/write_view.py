@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from illumcli.commands.file_metadata import metadata
 from illumcli.commands.view_audit import audit_of, bands_with_errors, measured
 from illumcli.commands.work import Work
 from illumcli.film.develop import ErrorSums, Target
@@ -46,8 +45,6 @@ def write_view(
     progress: Progress,
 ) -> ViewOutcome:
     """Write one view's files band by band; all at once where an audit of the picture makes a layer."""
-    from illumcli.images.writer import ImageWriter
-
     view, space, development = plan.view, shared["render_space"], work.development
 
     # Called after each tile: report the progress.
@@ -77,16 +74,7 @@ def write_view(
     sums, error = ErrorSums(), known
     with ExitStack() as files:
         writers = [
-            files.enter_context(
-                ImageWriter(
-                    target.path,
-                    view.width,
-                    target.height,
-                    development.channels(target),
-                    metadata(work, target, space) | _room(target, stated),
-                    srgb=target.layers[0].kind == "light",
-                )
-            )
+            files.enter_context(work.images.open(work, target, space, _room(target, stated)))
             for target in targets
         ]
 

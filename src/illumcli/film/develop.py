@@ -62,7 +62,7 @@ class Development(Value):
             layer = target.layers[0]
             names = ("Y",) if len(layer.channels) == 1 and layer.kind != "id" else tuple("RGB")
             return dict.fromkeys((*names, "A") if self._has_alpha(layer) else names, "uint8")
-        shown = [name for layer in _beauty_first(target.layers) for name in self._channels(layer)]
+        shown = [name for layer in _beauty_first(target.layers) for name in self.names(layer)]
         types = dict(channel_types(tuple(dict.fromkeys(shown)), self.colour))
         ids = (name for layer in target.layers if layer.kind == "id" for name in layer.channels)
         return types | dict.fromkeys(ids, "uint")
@@ -78,22 +78,32 @@ class Development(Value):
             Layer -> (rows, columns, channels).
         """
         composed = {layer.name: self.composed(layer, layers) for layer in target.layers}
+        return self.encoded(target, composed, (tile.y, tile.x), space)
 
+    def encoded(
+        self,
+        target: Target,
+        composed: Mapping[str, NDArray[Any]],
+        corner: tuple[int, int],
+        space: RenderSpace,
+    ) -> NDArray[Any]:
+        """(rows, columns, channels) of composed layers, as the file holds them; `corner` is the first row and
+        column."""
         # One layer in 8 bits: light with its exposure, data as a preview.
         if target.is_png:
             layer = target.layers[0]
             values = composed[layer.name]
             if layer.kind == "light":
-                return picture(values, self.exposure, 8, str(target.path), tile.y, tile.x)
+                return picture(values, self.exposure, 8, str(target.path), *corner)
             shown = viewable(layer, values, preview_scale(target, space), space.centre)
-            return plain(shown, str(target.path), tile.y, tile.x)
+            return plain(shown, str(target.path), *corner)
 
         # The values of all layers, each channel once.
         channels: dict[str, NDArray[np.float32]] = {}
         for layer in _beauty_first(target.layers):
             values = composed[layer.name]
             values = bits_of(values) if layer.kind == "id" else values
-            for k, name in enumerate(self._channels(layer)):
+            for k, name in enumerate(self.names(layer)):
                 channels.setdefault(name, values[..., k])
         return np.stack(list(channels.values()), axis=-1)
 
@@ -112,7 +122,8 @@ class Development(Value):
     def _has_alpha(self, layer: Layer) -> bool:
         return layer.buffer == "beauty" and self.background is None
 
-    def _channels(self, layer: Layer) -> tuple[str, ...]:
+    def names(self, layer: Layer) -> tuple[str, ...]:
+        """The channels of a layer in an EXR."""
         return (*layer.channels, "A") if self._has_alpha(layer) else layer.channels
 
 

@@ -77,6 +77,12 @@ def read_pair(reference: Path, test: Path) -> tuple[Image, Image]:
     if problems:
         raise InputError(problems)
     a, b = images
+    refuse_unlike(a, b, str(reference), str(test))
+    return a, b
+
+
+def refuse_unlike(a: Image, b: Image, reference: str, test: str) -> None:
+    """Raise InputError if images differ in size or kind; the texts name them."""
     if (a.width, a.height) != (b.width, b.height):
         sizes = f"{b.width} x {b.height}, but {reference} is {a.width} x {a.height}"
         raise InputError(f"{test}: is {sizes}; compare images of one size")
@@ -84,7 +90,6 @@ def read_pair(reference: Path, test: Path) -> tuple[Image, Image]:
         kinds = "linear light", "display values"
         fact = f"holds {kinds[b.encoded]}, but {reference} {kinds[a.encoded]}"
         raise InputError(f"{test}: {fact}; compare two files of a kind")
-    return a, b
 
 
 def shared_layers(a: Image, b: Image, names: Iterable[str], place: str) -> dict[str, tuple[str, ...]]:

@@ -285,6 +285,22 @@ def once_and_tile(nodes: Sequence[Node]) -> tuple[list[Node], list[Node]]:
     return parts
 
 
+def lasting_keys(graph: Graph, outputs: Sequence[Layer]) -> frozenset[str]:
+    """Keys of the buffers that any change of the scene may leave as they are and that take longer to compute
+    than to keep: those of the whole scene, and those that the store would hold."""
+    lasting: set[str] = set()
+    for view in graph.views:
+        plan = schedule(graph, outputs, view)
+        for part in (plan, plan.all_samples):
+            if part is not None:
+                key = Keys(graph.nodes, part.view, code())
+                names = [node.output for node in part.tile if codec_of(node.output) is not None]
+                lasting |= {
+                    key(name) for name in ("implied_widths", *(node.output for node in part.once), *names)
+                }
+    return frozenset(lasting)
+
+
 def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> frozenset[str]:
     """Keys of buffers that let `following` skip everything upstream if they are kept in memory.
 

@@ -1,0 +1,131 @@
+"""Rendered pictures as arrays, with what is known of them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from illumcli.commands.file_metadata import metadata
+from illumcli.commands.held_images import HeldImage
+from illumcli.commands.image_store import ImageFiles
+from illumcli.commands.report import Report
+from illumcli.commands.targets import image_set
+from illumcli.film.develop import Target
+from illumcli.records import Record
+
+
+class Picture(Mapping[str, NDArray[Any]]):
+    """The layers of one camera by name: (H, W, C) float32, linear, premultiplied; ids are uint32.
+
+    A notebook shows its first layer.
+    """
+
+    def __init__(self, image: HeldImage) -> None:
+        self._image = image
+        self._layers = image.layers()
+
+    def __getitem__(self, layer: str) -> NDArray[Any]:
+        return self._layers[layer]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layers)
+
+    def __len__(self) -> int:
+        return len(self._layers)
+
+    def __repr__(self) -> str:
+        view = self._image.target.view
+        return f"<picture {view.name}, {view.width} x {view.height}: {', '.join(self)}>"
+
+    @property
+    def camera(self) -> str:
+        """The name of its camera."""
+        return self._image.target.view.name
+
+    @property
+    def channels(self) -> dict[str, tuple[str, ...]]:
+        """Layer -> the names of its channels in an EXR."""
+        image = self._image
+        return {layer.name: image.work.development.names(layer) for layer in image.target.layers}
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What a file of it says: seed, samples, the measured error and others."""
+        image = self._image
+        return {**metadata(image.work, image.target, image.space), **image.texts}
+
+    def write(self, target: Target) -> None:
+        """Write the file of an image set with its pixels."""
+        image = self._image
+        with ImageFiles().open(image.work, target, image.space, image.texts) as file:
+            file.write_band(0, image.work.development.encoded(target, self._layers, (0, 0), image.space))
+
+    def _repr_png_(self) -> bytes:
+        layer = self._image.target.layers[0]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "picture.png"
+            self.write(replace(self._image.target, path=path, layers=(layer,)))
+            return path.read_bytes()
+
+
+class Rendering(Record):
+    """The pictures of a scene, one per camera, and the report.
+
+    ``rendering["beauty"]`` is a layer of the first picture, which a notebook shows.
+    """
+
+    pictures: dict[str, Picture]
+    """By the name of their camera."""
+    report: dict[str, Any]
+    """What `--report` of ``illum render`` writes."""
+    frame: int | None
+    _images: tuple[HeldImage, ...]
+
+    @classmethod
+    def of(cls, images: tuple[HeldImage, ...], report: Report) -> Rendering:
+        """The rendering of some images."""
+        pictures = {image.target.view.name: Picture(image) for image in images}
+        facts = replace(report, written=(), kept=()).as_data()
+        return cls(pictures, facts, images[0].work.job.frame, images)
+
+    @property
+    def picture(self) -> Picture:
+        """The picture of the first camera."""
+        return next(iter(self.pictures.values()))
+
+    def __getitem__(self, layer: str) -> NDArray[Any]:
+        return self.picture[layer]
+
+    def save(self, pattern: str | os.PathLike[str], force: bool = False) -> list[Path]:
+        """Write the files of ``illum render -o PATTERN``, with the same bytes. Returns their paths.
+
+        Parameters
+        ----------
+        pattern : str
+            Ends in `.exr`, with all layers, or `.png`, one for each layer; {camera}, {layer} and others are
+            replaced.
+        force : bool
+            Replace files that differ.
+
+        Raises
+        ------
+        InputError
+            Another suffix; two files would have one name.
+        OutputError
+            A different file exists, or a file cannot be written.
+        """
+        work = self._images[0].work
+        job = replace(work.job, options=replace(work.job.options, pattern=os.fspath(pattern)))
+        targets = image_set(job, work.loaded, work.graph, work.outputs)
+        for target in ImageFiles().due(targets, force):
+            self.pictures[target.view.name].write(target)
+        return [target.path for target in targets]
+
+    def _repr_png_(self) -> bytes:
+        return self.picture._repr_png_()

@@ -1,0 +1,94 @@
+"""Scenes that Python hands over: paths, mappings, descriptions, with meshes as arrays among their values."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from illumcli.api.meshes import is_mesh, write_mesh
+from illumcli.errors import InputError
+from illumcli.scene.access import is_path
+from illumcli.scene.spec import Scene
+from illumcli.schema.description import Description
+
+AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene"
+"""Path of a scene or mesh file, or a scene as a mapping with the keys of the YAML, or as a description."""
+Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str]"
+"""Values by path, ``{"materials.clay.sigma": 0.3}``, or `PATH=VALUE` as ``illum render -D`` takes them."""
+
+NAME = "scene.yaml"
+
+
+def written(scene: Mapping[str, Any] | Scene, folder: Path) -> Path:
+    """Write a scene to `folder`, beside its meshes; its paths are relative to the current folder.
+
+    Raises
+    ------
+    InputError
+        A value that no scene can have, such as an object of an unknown class.
+    """
+    plain = scene.model_dump(mode="json", exclude_unset=True) if isinstance(scene, Scene) else scene
+    path = folder / NAME
+    path.write_text(_yaml(_plain(plain, (), folder)), encoding="utf-8")
+    return path
+
+
+def file_of(scene: AnyScene, folder: Path) -> Path:
+    """The file of a scene; a mapping or description is written to `folder`."""
+    if isinstance(scene, Mapping | Scene):
+        return written(scene, folder)
+    return Path(os.fspath(scene))
+
+
+def override_texts(overrides: Overrides, folder: Path) -> tuple[str, ...]:
+    """Overrides as `PATH=VALUE`."""
+    if not isinstance(overrides, Mapping):
+        return tuple(overrides)
+    return tuple(
+        f"{path}={_yaml(_plain(value, tuple(path.split('.')), folder))}" for path, value in overrides.items()
+    )
+
+
+def _yaml(value: Any) -> str:
+    """A value as JSON, which YAML reads."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
+    """A value as the YAML of a scene has it: meshes as files, arrays as lists, paths from the root folder."""
+    if is_mesh(value):
+        return {"file": str(write_mesh(value, folder))}
+    match value:
+        case Description():
+            return _plain(value.model_dump(mode="json", exclude_unset=True), path, folder)
+        case Mapping():
+            return {str(key): _plain(part, (*path, str(key)), folder) for key, part in value.items()}
+        case np.ndarray() | np.generic():
+            return value.tolist()
+        case list() | tuple():
+            return [_plain(part, (*path, number), folder) for number, part in enumerate(value)]
+        case os.PathLike():
+            return os.path.abspath(value)
+        case str() if is_path(path, value):
+            return os.path.abspath(value)
+        case str() | bool() | int() | float() | None:
+            return value
+    place = ".".join(map(str, path))
+    raise InputError(f"scene: {place}: a scene holds no {type(value).__name__}; give numbers, text or lists")
+
+
+@contextmanager
+def named_scene(folder: Path) -> Iterator[None]:
+    """Call the scene file of a temporary folder `scene` in errors."""
+    try:
+        yield
+    except InputError as error:
+        own = re.compile(rf"{re.escape(str(folder / NAME))}(:\d+:\d+)?")
+        raise InputError([own.sub("scene", problem) for problem in error.problems]) from None

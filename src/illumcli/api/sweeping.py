@@ -1,0 +1,103 @@
+"""Render the variants of a scene into a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.api.pictures import Rendering
+from illumcli.api.render import LoadedScene, Options
+from illumcli.api.scenes import AnyScene
+from illumcli.errors import InputError
+from illumcli.film.metrics import difference
+
+MEASURES = ("rmse", "relative_mse", "mae", "psnr", "largest")
+
+
+class Sweep(Sequence[dict[str, Any]]):
+    """A table of variants: a record for each, with its values by path and what was measured.
+
+    Its records are what `pandas.DataFrame` takes.
+    """
+
+    def __init__(self, records: list[dict[str, Any]], renderings: list[Rendering]) -> None:
+        self._records = records
+        self.renderings = renderings
+        """The pictures of each variant."""
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._records[index]
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return iter(self._records)
+
+
+def sweep(
+    scene: AnyScene,
+    values: Mapping[str, Sequence[Any]],
+    *,
+    together: bool = False,
+    reference: int | NDArray[Any] | None = None,
+    **options: Unpack[Options],
+) -> Sweep:
+    """Render a scene with every value of some paths with every other; the last path varies fastest.
+
+    Parameters
+    ----------
+    scene
+        As `load` takes it.
+    values : mapping of str to sequence
+        Path in the scene -> its values: ``{"materials.clay.sigma": [0.1, 0.3, 0.5]}``.
+    together : bool
+        The first values of all paths, then the second ones, and so on.
+    reference : int or (H, W, C) array, optional
+        The variant, from 0, or the picture whose first layer the variants are compared with.
+    options
+        See `Options`.
+
+    Returns
+    -------
+    Sweep
+        Records with the values, `seconds`, `rays`, the `mean` of the first layer, and with a reference its
+        measures as ``illum compare`` has them.
+
+    Raises
+    ------
+    InputError
+        Sequences of different lengths are to go `together`; a fault of the scene with some value.
+    """
+    lengths = {path: len(each) for path, each in values.items()}
+    if together and len(set(lengths.values())) > 1:
+        raise InputError(f"values of different lengths cannot go together: {lengths}")
+    rows = zip(*values.values(), strict=True) if together else product(*values.values())
+    variants = [dict(zip(values, row, strict=True)) for row in rows]
+
+    # Render; buffers that no value touches are computed once.
+    loaded = LoadedScene(scene)
+    renderings = [loaded.render(variant, **options) for variant in variants]
+
+    # Measure.
+    against = _first_layer(renderings[reference]) if isinstance(reference, int) else reference
+    records = []
+    for variant, rendering in zip(variants, renderings, strict=True):
+        layer, report = _first_layer(rendering), rendering.report
+        measured: dict[str, Any] = {"seconds": report["total_seconds"], "rays": sum(report["rays"].values())}
+        measured["mean"] = float(layer.mean(dtype=np.float64))
+        if against is not None:
+            differs = difference(np.asarray(against), layer, peak=None)
+            measured |= {name: getattr(differs, name) for name in MEASURES}
+        records.append(variant | measured)
+    return Sweep(records, renderings)
+
+
+def _first_layer(rendering: Rendering) -> NDArray[Any]:
+    """The first layer of the first picture; its colours alone, if it has any."""
+    layer = next(iter(rendering.picture.values()))
+    return layer[..., :3] if layer.shape[-1] == 4 else layer

@@ -17,7 +17,7 @@ from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema_generator import schema_of
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
-from illumcli.schema.description import Description
+from illumcli.schema.description import nested
 from illumcli.schema.families import member, members, tags
 from illumcli.shading.batches import batches
 from illumcli.shading.terms import evaluate, given_terms
@@ -92,6 +92,9 @@ def _field(name, field, defs, choices, gentle):
         return st.sampled_from(field["enum"]) if choices else st.just(field["default"])
     if field["type"] == "boolean":
         return st.booleans() if choices else st.just(field["default"])
+    if field["type"] == "array" and "minItems" not in field:  # a list of parts
+        part = value(field["items"])
+        return st.lists(part, max_size=2).map(tuple) if choices else st.just(field["default"])
     if field["type"] == "array":
         return st.tuples(*[value(field["items"])] * field["minItems"])
     return _number(name, field, gentle)
@@ -302,8 +305,8 @@ def varied(part, count, prefix=""):
                 if isinstance(value, tuple)
                 else np.full(count, value)
             )
-        elif isinstance(value, Description):
-            found |= varied(value, count, f"{prefix}{name}.")
+        for step, inner in nested(value).items():
+            found |= varied(inner, count, f"{prefix}{name}{step}.")
     return found
 
 
@@ -426,7 +429,7 @@ def test_the_page_has_formula_and_source(Model):
     assert "References\n----------" in text
 
 
-@pytest.mark.parametrize("name", ["_base", "_fresnel", "_microfacet", *tags("illumcli.models")])
+@pytest.mark.parametrize("name", ["_base", "_fresnel", "_lafortune", "_microfacet", *tags("illumcli.models")])
 def test_every_parameter_says_what_it_means(name):
     source = Path(inspect.getfile(IlluminationModel)).with_name(f"{name}.py").read_text()
     for cls in (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)):

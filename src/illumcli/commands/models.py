@@ -89,12 +89,19 @@ def _parameters(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Iterator[
         yield f"{name}: {allowed(field)}; {_default(field)}"
         if "description" in field:
             yield textwrap.fill(field["description"], 100, initial_indent="    ", subsequent_indent="    ")
+        if "$ref" in field.get("items", {}):
+            yield textwrap.indent("\n".join(_parameters(_part(field["items"], defs), defs)), "        ")
         if "discriminator" in field:
             key, choices = field["discriminator"]["propertyName"], field["discriminator"]["mapping"]
             for tag, reference in choices.items():
-                part = defs[reference.rpartition("/")[2]]
+                part = _part({"$ref": reference}, defs)
                 yield f"    {{{key}: {tag}}}: {part['description']}"
                 yield textwrap.indent("\n".join(_parameters(part, defs)), "        ")
+
+
+def _part(reference: Mapping[str, Any], defs: Mapping[str, Any]) -> Any:
+    """The schema that a reference names."""
+    return defs[reference["$ref"].rpartition("/")[2]]
 
 
 def allowed(field: Mapping[str, Any]) -> str:
@@ -108,6 +115,8 @@ def allowed(field: Mapping[str, Any]) -> str:
         return f"{allowed(field['oneOf'][0])}, a texture or a vertex attribute"
     if "enum" in field:
         return " | ".join(map(str, field["enum"]))
+    if field["type"] == "array" and "$ref" in field["items"]:
+        return "a list of mappings"
     if field["type"] == "array":
         return f"colour, {_range(field['items'])}"
     if field["type"] == "number":
@@ -127,6 +136,8 @@ def _default(field: Mapping[str, Any]) -> str:
     default = field["default"]
     if default is None:
         return "by default left out"
+    if default == []:
+        return "by default none"
     if isinstance(default, list) and len(set(default)) == 1:
         default = default[0]
     if isinstance(default, bool):

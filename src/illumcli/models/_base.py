@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from illumcli.models._parameters import Texture, Varying, VertexValues
-from illumcli.schema.description import Description
+from illumcli.schema.description import Description, nested
 from illumcli.schema.fields import Color
 
 Lobe = Callable[..., Any]
@@ -88,27 +88,39 @@ class IlluminationModel(Description):
 
     def _is_always(self, name: str, number: float) -> bool:
         """True if a parameter has this value everywhere, in all channels."""
-        value = getattr(self, name)
-        return (
-            value is not None
-            and not isinstance(value, Texture | VertexValues)
-            and bool(np.all(np.equal(value, number)))
-        )
+        return is_always(getattr(self, name), number)
+
+
+def is_always(value: Any, number: float) -> bool:
+    """True for this number, or a colour of it in all channels; False for what varies and what is left out."""
+    return (
+        value is not None
+        and not isinstance(value, Texture | VertexValues)
+        and bool(np.all(np.equal(value, number)))
+    )
 
 
 def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture | VertexValues]]:
     for name, value in part:
         if isinstance(value, Texture | VertexValues):
             yield prefix + name, value
-        elif isinstance(value, Description):
-            yield from _varying(value, f"{prefix}{name}.")
+            continue
+        for step, inner in nested(value).items():
+            yield from _varying(inner, f"{prefix}{name}{step}.")
 
 
 def _replace_parameters(part: D, values: Mapping[str, Any]) -> D:
     changes = {path: value for path, value in values.items() if "." not in path}
     for name in {path.partition(".")[0] for path in values if "." in path}:
+        whole = getattr(part, name)
         inner = {
-            path.removeprefix(f"{name}."): v for path, v in values.items() if path.startswith(f"{name}.")
+            step: _replace_parameters(each, _below(f"{name}{step}.", values))
+            for step, each in nested(whole).items()
         }
-        changes[name] = _replace_parameters(getattr(part, name), inner)
+        changes[name] = inner[""] if "" in inner else tuple(inner.values())
     return part.model_copy(update=changes)
+
+
+def _below(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values whose path begins with `prefix`, by the rest of it."""
+    return {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}

@@ -27,6 +27,15 @@ def log_cos(cosine: Floats, sin2: Floats) -> Floats:
     return np.log1p(-np.minimum(sin2, 0.5)) / 2 * near + np.log(cosine) * ~near
 
 
+def flattening(n_l: Floats, n_v: Floats, l_v: Floats) -> Floats:
+    """(N,) s / t of Fujii (2013): -1 to 1, but large where light and eye meet at grazing.
+
+    s = l.v - n_l n_v is the cosine of the azimuth times both sines; t = max(n_l, n_v) where s > 0, else 1.
+    """
+    s = np.maximum(l_v - n_l * n_v, -1)
+    return np.where(s > 0, s / np.maximum(n_l, n_v), s)
+
+
 def channels(like: Floats, color: object) -> Floats:
     """A colour in the precision of `like`, (N,), with the channels first: (3, 1), or (3, N) if it varies.
 

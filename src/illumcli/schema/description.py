@@ -31,3 +31,21 @@ class Description(BaseModel):
         validate_default=True,
         defer_build=True,
     )
+
+
+def nested(value: Any) -> dict[str, Description]:
+    """The descriptions in the value of a field, by the rest of their path: itself, or those of a list."""
+    if isinstance(value, Description):
+        return {"": value}
+    if isinstance(value, tuple):
+        return {f".{i}": part for i, part in enumerate(value) if isinstance(part, Description)}
+    return {}
+
+
+def owner_of(description: Description, path: str) -> tuple[Description, str]:
+    """The part of a description that has the field at a path (`further.0.cx`), and the field's name."""
+    *steps, name = path.split(".")
+    owner: Any = description
+    for step in steps:
+        owner = owner[int(step)] if isinstance(owner, tuple) else getattr(owner, step)
+    return owner, name

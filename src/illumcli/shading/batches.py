@@ -12,7 +12,7 @@ from illumcli.arrays import Ids, take_rows
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
 from illumcli.records import Record
-from illumcli.schema.description import Description
+from illumcli.schema.description import Description, nested
 
 Constant: TypeAlias = float | tuple[float, ...]
 NOT_OF_LOBES = ("emission", "ambient")
@@ -81,8 +81,9 @@ def _parts(part: Description, constants: dict[str, Constant], prefix: str = "") 
         path = prefix + name
         if path in NOT_OF_LOBES:
             continue
-        if isinstance(value, Description):
-            yield from _parts(value, constants, f"{path}.")
+        if inner := nested(value):
+            for step, each in inner.items():
+                yield from _parts(each, constants, f"{path}{step}.")
         elif value is not None and may_vary(type(part), name):
             constants[path] = value
             yield path

@@ -10,7 +10,7 @@ import pytest
 from illumcli.color import from_srgb, to_srgb
 from illumcli.mesh_files import read_mesh
 from illumcli.mesh_files.color_change import COLOR_CHANGES
-from illumcli.mesh_files.mtl_write import mtl_lines
+from illumcli.mesh_files.mtl_write import left_out, mtl_lines
 from illumcli.mesh_files.obj_write import NamedMesh, extend_obj, read_about, write_obj
 from illumcli.mesh_files.output_mesh import VertexData
 
@@ -93,6 +93,38 @@ def test_meshes_are_read_back_as_they_were(tmp_path: Path) -> None:
         np.testing.assert_array_equal(first, getattr(mesh, name))
         assert name == "polygon_smoothing" or (second[first >= 0] > first[first >= 0]).all()
     assert (tmp_path / "b.obj").read_text().startswith("mtllib b.mtl\no one\n")
+
+
+def test_metallic_roughness_as_mtl() -> None:
+    plain = {"model": "metallic_roughness", "base_color": (1.0, 0.5, 0.0), "metallic": 0.5, "roughness": 0.5}
+    texture = {"texture": "a.png", "space": "linear"}
+    textured = {
+        "model": "metallic_roughness",
+        "base_color": {"texture": "b.png"},
+        "metallic": {**texture, "channel": "b"},
+        "roughness": {**texture, "channel": "g", "factor": (0.25, 0.25, 0.25)},
+        "ior": 2.0,
+    }
+    lines = list(mtl_lines({"plain": plain, "textured": textured}, lambda texture: texture))
+    assert lines == [
+        "newmtl plain",
+        "Kd 1 0.5 0",
+        "Ks 0.52 0.27 0.02",
+        "Ns 30",
+        "Pr 0.5",
+        "Pm 0.5",
+        "illum 2",
+        "newmtl textured",
+        "Kd 1 1 1",
+        "map_Kd b.png",
+        "Ks 0.111111 0.111111 0.111111",
+        "Ns 510",
+        "Pr 0.25",
+        "Pm 0",
+        "illum 2",
+    ]
+    assert left_out({"plain": plain}) == []
+    assert left_out({"plain": plain, "textured": textured}) == ["textures of metal and roughness"]
 
 
 def test_materials_as_mtl() -> None:

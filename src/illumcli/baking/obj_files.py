@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def copy_materials(path: Path, source: Path, force: bool) -> None:
 def write_materials(path: Path, meshes: Sequence[Mesh], force: bool) -> str | None:
     """Write the materials of meshes as a library beside `path`, with their images. Returns its name, or None
     if there are no materials; errors as of `copy_materials`."""
-    materials = {name: mesh.materials.get(name, {}) for mesh in meshes for name in mesh.material_names}
+    materials = selected_materials(meshes)
     if not materials:
         return None
     names: dict[str, str] = {}
@@ -58,6 +59,11 @@ def write_materials(path: Path, meshes: Sequence[Mesh], force: bool) -> str | No
     library = path.with_suffix(".mtl")
     _put(library, text.encode(), force)
     return library.name
+
+
+def selected_materials(meshes: Sequence[Mesh]) -> dict[str, Mapping[str, Any]]:
+    """The keys of the materials that meshes select, by name; none for a name that no library has."""
+    return {name: mesh.materials.get(name, {}) for mesh in meshes for name in mesh.material_names}
 
 
 def _put(target: Path, data: bytes, force: bool) -> None:

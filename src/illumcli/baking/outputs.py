@@ -18,7 +18,13 @@ from illumcli.baking.files import (
     write_baked_ply,
 )
 from illumcli.baking.inputs import BakeWork
-from illumcli.baking.obj_files import copy_materials, placed_mesh, with_textures_in, write_materials
+from illumcli.baking.obj_files import (
+    copy_materials,
+    placed_mesh,
+    selected_materials,
+    with_textures_in,
+    write_materials,
+)
 from illumcli.baking.points import Surfaces
 from illumcli.baking.split import (
     corners_of_triangles,
@@ -29,7 +35,7 @@ from illumcli.baking.split import (
 )
 from illumcli.geometry.mesh import Mesh
 from illumcli.images.encoded import png_bytes
-from illumcli.mesh_files import is_mesh_file
+from illumcli.mesh_files import is_mesh_file, mtl_write
 from illumcli.mesh_files.gltf.contents import DEFORMERS, beside_mesh
 from illumcli.mesh_files.gltf.document import open_document
 from illumcli.mesh_files.gltf.write import fits_attribute
@@ -179,6 +185,7 @@ class _Writer:
         # What an OBJ has no place for.
         names = {name for each in meshes for name in each.mesh.attributes} - {"color", "alpha"}
         left_out = [f"the vertex property {name}" for name in sorted(names)]
+        left_out += mtl_write.left_out(selected_materials([each.mesh for each in meshes]))
         if self._work.scene.materials:
             left_out.append("materials of the scene")
         differences = {what for each in meshes for what in each.mesh.material_repairs}

@@ -24,7 +24,6 @@ NOT_ASKED = "materials of mesh files that are not used: write materials: true, o
 NO_OCCLUSION = "occlusion textures that are not used: name the file as its mesh's obscurance"
 APPROXIMATED = frozenset(
     {
-        "metallic-roughness materials, drawn as cook_torrance",
         NORMALS_OF_FILE,
         NO_GRAIN,
         NO_MATERIAL,

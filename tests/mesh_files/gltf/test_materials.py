@@ -13,8 +13,11 @@ import pytest
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh, Substitute
 from illumcli.mesh_files import embedded_image, holds_obscurance, image_within, read_mesh
-from illumcli.models.cook_torrance import CookTorrance
+from illumcli.models.metallic_roughness import MetallicRoughness
+from illumcli.scene.load import load
 from illumcli.shading.materials import imported_model
+from metamorphic.scenes import png
+from planned import layers_of, planned
 
 UV = [[0, 0], [1, 0], [1, 1], [0, 1]]
 PNG = b"\x89PNG not looked at here"
@@ -55,41 +58,28 @@ def told(mesh: Mesh) -> dict[str, int]:
     return {what: each.count for what, each in mesh.material_repairs.items()}
 
 
-MAPPED = "metallic-roughness materials, drawn as cook_torrance"
-
-
-def test_a_metal_reflects_its_base_colour(library: Any) -> None:
+def test_a_material_is_metal_and_rough_unless_it_says_otherwise(library: Any) -> None:
     mesh = library({"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}})
-    keys = mesh.materials["paint"]
-    assert keys["model"] == "cook_torrance"
-    assert keys["diffuse"] == BLACK
-    assert keys["fresnel"] == {"F": "schlick", "f0": (1, 0, 0)}
-    assert keys["distribution"] == {"D": "ggx", "alpha": 1}
-    assert keys["ambient"] == (1, 0, 0)
-    assert keys["emission"] == BLACK
-    assert told(mesh) == {MAPPED: 1}
-    assert mesh.material_repairs[MAPPED].first == ": materials[0]"
+    assert mesh.materials["paint"] == {
+        "model": "metallic_roughness",
+        "base_color": (1, 0, 0),
+        "metallic": 1,
+        "roughness": 1,
+        "emission": BLACK,
+    }
+    assert told(mesh) == {}
 
 
-def test_what_is_no_metal_is_diffuse_under_a_clear_boundary(library: Any) -> None:
+def test_factors(library: Any) -> None:
     said = {"baseColorFactor": [0.5, 0.25, 1, 1], "metallicFactor": 0, "roughnessFactor": 0.5}
     keys = library({"pbrMetallicRoughness": said}).materials["paint"]
-    assert keys["diffuse"] == pytest.approx((0.48, 0.24, 0.96))
-    assert keys["fresnel"]["f0"] == pytest.approx((0.04,) * 3)
-    assert keys["distribution"]["alpha"] == 0.25
-    assert keys["ambient"] == (0.5, 0.25, 1)
+    assert (keys["base_color"], keys["metallic"], keys["roughness"]) == ((0.5, 0.25, 1), 0, 0.5)
 
 
-def test_half_a_metal_and_an_index(library: Any) -> None:
-    keys = library(
-        {
-            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0, 1, 1], "metallicFactor": 0.5},
-            "extensions": {"KHR_materials_ior": {"ior": 2}},
-        }
-    ).materials["paint"]
-    f0 = 1 / 9
-    assert keys["fresnel"]["f0"] == pytest.approx((0.25 + f0 / 2, f0 / 2, 0.5 + f0 / 2))
-    assert keys["diffuse"] == pytest.approx((0.25 * (1 - f0), 0, 0.5 * (1 - f0)))
+@pytest.mark.parametrize(("said", "index"), [(2, 2), (0.5, 1), (0, 1e3), (1e9, 1e3), ("much", None)])
+def test_an_index(library: Any, said: Any, index: float | None) -> None:
+    keys = library({"extensions": {"KHR_materials_ior": {"ior": said}}}).materials["paint"]
+    assert keys.get("ior") == index
 
 
 def test_factors_out_of_range_or_none_are_mended(library: Any) -> None:
@@ -101,10 +91,37 @@ def test_factors_out_of_range_or_none_are_mended(library: Any) -> None:
     strength = {"KHR_materials_emissive_strength": {"emissiveStrength": None}}
     material = {"pbrMetallicRoughness": said, "emissiveFactor": [1, 2], "extensions": strength}
     keys = library(material).materials["paint"]
-    assert keys["fresnel"]["f0"] == (1, 0, 0.5)
-    assert keys["distribution"]["alpha"] == 1e-4
+    assert (keys["base_color"], keys["metallic"], keys["roughness"]) == ((1, 0, 0.5), 1, 0)
     assert keys["emission"] == BLACK
-    assert library({"pbrMetallicRoughness": 7, "extensions": 3}).materials["paint"]["ambient"] == WHITE
+    assert library({"pbrMetallicRoughness": 7, "extensions": 3}).materials["paint"]["base_color"] == WHITE
+
+
+def test_metal_and_roughness_are_channels_of_one_texture(library: Any, tmp_path: Path) -> None:
+    said = {"metallicRoughnessTexture": {"index": 1, "texCoord": 1}, "roughnessFactor": 0.5}
+    mesh = library({"pbrMetallicRoughness": said}, uv=True)
+    keys = mesh.materials["paint"]
+    texture = {"texture": str(tmp_path / "my wood.png"), "space": "linear", "uv": "uv1"}
+    assert keys["metallic"] == {**texture, "channel": "b"}
+    assert keys["roughness"] == {**texture, "channel": "g", "factor": (0.5, 0.5, 0.5)}
+    assert told(mesh) == {}
+    # where the image turns out to be unusable
+    assert mesh.substitutes["paint"]["metallic"].value == BLACK
+    assert mesh.substitutes["paint"]["roughness"].value == (0.5, 0.5, 0.5)
+
+
+def test_without_its_texture_nothing_is_metal(library: Any) -> None:
+    said = {"metallicRoughnessTexture": {"index": 9}, "roughnessFactor": 0.5}
+    mesh = library({"pbrMetallicRoughness": said}, uv=True)
+    keys = mesh.materials["paint"]
+    assert (keys["metallic"], keys["roughness"]) == (0, 0.5)
+    assert told(mesh) == {"textures left out (refers to textures[9], which is not there)": 1}
+
+
+def test_a_factor_of_zero_needs_no_texture(library: Any) -> None:
+    said = {"metallicRoughnessTexture": {"index": 1}, "metallicFactor": 0}
+    keys = library({"pbrMetallicRoughness": said}, uv=True).materials["paint"]
+    assert keys["metallic"] == 0
+    assert keys["roughness"]["channel"] == "g"
 
 
 def test_base_colour_is_factor_times_texture_times_vertex_colour(library: Any, tmp_path: Path) -> None:
@@ -115,29 +132,18 @@ def test_base_colour_is_factor_times_texture_times_vertex_colour(library: Any, t
     }
     mesh = library({"pbrMetallicRoughness": said}, uv=True, color=True)
     base = {"texture": str(tmp_path / "my wood.png"), "factor": (0.5, 1, 1), "vertex": "color"}
-    keys = mesh.materials["paint"]
-    assert keys["ambient"] == base
-    assert keys["diffuse"] == {**base, "factor": pytest.approx((0.48, 0.96, 0.96))}
-    assert mesh.substitutes["paint"]["ambient"] == Substitute((0.5, 1, 1), ": materials[0]")
-    plain = library({"pbrMetallicRoughness": {"metallicFactor": 0.5}}, color=True).materials["paint"]
-    assert plain["ambient"] == {"vertex": "color"}
-    assert plain["fresnel"]["f0"] == {"vertex": "color", "factor": (0.5, 0.5, 0.5)}
-
-
-def test_a_textured_metal(library: Any) -> None:
-    said = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 0.5, 1]}
-    mesh = library({"pbrMetallicRoughness": said}, uv=True)
-    f0 = mesh.materials["paint"]["fresnel"]["f0"]
-    assert f0["factor"] == (1, 1, 0.5)
-    assert mesh.substitutes["paint"]["fresnel.f0"].value == (1, 1, 0.5)
+    assert mesh.materials["paint"]["base_color"] == base
+    assert mesh.substitutes["paint"]["base_color"] == Substitute((0.5, 1, 1), ": materials[0]")
+    plain = library({"pbrMetallicRoughness": {}}, color=True).materials["paint"]
+    assert plain["base_color"] == {"vertex": "color"}
     model = imported_model(mesh.materials["paint"], Path("/somewhere"))
-    assert isinstance(model, CookTorrance)
-    assert model.varying()["fresnel.f0"].texture.startswith("/")
+    assert isinstance(model, MetallicRoughness)
+    assert model.varying()["base_color"].texture.startswith("/")
 
 
 def test_images_within_the_file(library: Any, tmp_path: Path) -> None:
     mesh = library({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}, uv=True)
-    name = mesh.materials["paint"]["ambient"]["texture"]
+    name = mesh.materials["paint"]["base_color"]["texture"]
     assert image_within(name) == (str(tmp_path / "a.glb"), 0)
     assert embedded_image(tmp_path / "a.glb", 0) == PNG
     assert image_within("a.glb") is None
@@ -149,7 +155,7 @@ def test_images_in_data_uris(library: Any, tmp_path: Path) -> None:
     uri = "data:image/png;base64," + base64.b64encode(PNG).decode()
     said = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
     mesh = library(said, uv=True, images=[{"uri": uri}])
-    assert mesh.materials["paint"]["ambient"]["texture"] == f"{tmp_path / 'a.glb'}#images[0]"
+    assert mesh.materials["paint"]["base_color"]["texture"] == f"{tmp_path / 'a.glb'}#images[0]"
     assert embedded_image(tmp_path / "a.glb", 0) == PNG
 
 
@@ -164,7 +170,7 @@ def test_other_texture_coordinates_become_attributes(library: Any) -> None:
         uv=True,
     )
     keys = mesh.materials["paint"]
-    assert keys["ambient"]["uv"] == "uv1"
+    assert keys["base_color"]["uv"] == "uv1"
     np.testing.assert_allclose(mesh.attributes["uv1"], np.array(UV) / 2 * [1, -1] + [0, 1])
     # the extension's own example: the lower left quarter of the image, turned clockwise
     found = mesh.attributes[keys["emission"]["uv"]] * [1, -1] + [0, 1]
@@ -174,7 +180,7 @@ def test_other_texture_coordinates_become_attributes(library: Any) -> None:
 def test_the_set_of_a_transform_comes_first(library: Any) -> None:
     said = {"index": 0, "texCoord": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}}
     mesh = library({"pbrMetallicRoughness": {"baseColorTexture": said}}, uv=True)
-    assert mesh.materials["paint"]["ambient"]["uv"] == "uv1"
+    assert mesh.materials["paint"]["base_color"]["uv"] == "uv1"
 
 
 @pytest.mark.parametrize(
@@ -189,7 +195,7 @@ def test_the_set_of_a_transform_comes_first(library: Any) -> None:
 def test_samplers(library: Any, sampler: dict, keys: dict, counted: int) -> None:
     said = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}
     mesh = library(said, uv=True, samplers=[sampler])
-    found = dict(mesh.materials["paint"]["ambient"])
+    found = dict(mesh.materials["paint"]["base_color"])
     del found["texture"]
     assert found == keys
     assert told(mesh).get("textures that wrap in two ways, wrapped in the first", 0) == counted
@@ -248,15 +254,14 @@ def test_what_is_not_drawn_is_named(library: Any) -> None:
     }
     mesh = library(said)
     assert told(mesh) == {
-        MAPPED: 1,
-        "textures of metal and roughness left out": 1,
+        "textures left out (no TEXCOORD_0 to look them up by)": 1,
         "normal textures left out": 1,
         "occlusion textures left out (no TEXCOORD_0 to look them up by)": 1,
         "transparent materials made opaque": 1,
         "extension KHR_materials_clearcoat of materials left out": 1,
         "extension ACME_glitter of materials left out": 1,
     }
-    assert mesh.materials["paint"]["diffuse"] == pytest.approx((0.96,) * 3)  # nothing is taken for metal
+    assert mesh.materials["paint"]["metallic"] == 0  # nothing is taken for metal
 
 
 @pytest.mark.parametrize(
@@ -281,14 +286,14 @@ def test_what_is_not_drawn_is_named(library: Any) -> None:
 def test_trouble_with_a_texture_leaves_the_factor(library: Any, texture: Any, more: dict, what: str) -> None:
     said = {"baseColorTexture": texture, "baseColorFactor": [1, 0, 0, 1]}
     mesh = library({"pbrMetallicRoughness": said}, uv=True, **more)
-    assert mesh.materials["paint"]["ambient"] == (1, 0, 0)
+    assert mesh.materials["paint"]["base_color"] == (1, 0, 0)
     assert any(each.startswith(what) for each in mesh.material_repairs), mesh.material_repairs
 
 
 def test_a_texture_elsewhere_is_taken_from_beside(library: Any, tmp_path: Path) -> None:
     said = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}
     mesh = library(said, uv=True, images=[{}, {"uri": "C:\\art\\my wood.png"}])
-    assert mesh.materials["paint"]["ambient"]["texture"] == str(tmp_path / "my wood.png")
+    assert mesh.materials["paint"]["base_color"]["texture"] == str(tmp_path / "my wood.png")
     assert "textures outside the folder of the mesh replaced by those of the same name in it" in told(mesh)
 
 
@@ -296,9 +301,9 @@ def test_images_of_extensions_stand_in_for_a_missing_source(library: Any) -> Non
     said = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
     texture = {"extensions": {"EXT_texture_webp": {"source": 1}}}
     mesh = library(said, uv=True, textures=[texture])
-    assert mesh.materials["paint"]["ambient"]["texture"].endswith("my wood.png")
+    assert mesh.materials["paint"]["base_color"]["texture"].endswith("my wood.png")
     mesh = library(said, uv=True, textures=[{"source": 0, **texture}])
-    assert mesh.materials["paint"]["ambient"]["texture"].endswith("#images[0]")
+    assert mesh.materials["paint"]["base_color"]["texture"].endswith("#images[0]")
 
 
 def test_materials_of_one_name_stay_apart(tmp_path: Path, square: Any) -> None:
@@ -333,7 +338,7 @@ def test_a_material_that_is_not_there(tmp_path: Path, square: Any) -> None:
 def test_notes_on_materials_are_not_of_the_mesh(library: Any) -> None:
     mesh = library({"normalTexture": {"index": 0}})
     assert mesh.repairs == {}
-    assert json.loads(json.dumps(told(mesh))) == {MAPPED: 1, "normal textures left out": 1}
+    assert json.loads(json.dumps(told(mesh))) == {"normal textures left out": 1}
 
 
 def test_occlusion_textures_have_their_coordinates_and_strength(library: Any) -> None:
@@ -371,3 +376,37 @@ def test_values_at_vertices_count_unless_the_same_bake_wrote_textures(
     assert holds_obscurance(tmp_path / "a.glb")
     (tmp_path / "a.glb").write_bytes((tmp_path / "a.glb").read_bytes()[:30])
     assert not holds_obscurance(tmp_path / "a.glb")
+
+
+def test_a_texture_of_metal_and_roughness_looks_like_its_numbers(tmp_path: Path, square: Any) -> None:
+    def picture(name: str, factors: dict, images: Any = None) -> Any:
+        scene = square()
+        attributes = scene.json["meshes"][0]["primitives"][0]["attributes"]
+        attributes |= {"TEXCOORD_0": scene.table(UV), "COLOR_0": scene.table([[1, 0.5, 0.25]] * 4)}
+        scene.json["meshes"][0]["primitives"][0]["material"] = 0
+        scene.json["materials"] = [{"name": "paint", "pbrMetallicRoughness": factors}]
+        if images:
+            scene.json |= {"textures": [{"source": 0}], "images": images}
+        scene.write(tmp_path / name)
+        (tmp_path / "scene.yaml").write_text(f"""\
+version: 1
+camera: {{position: [0.5, 0.5, 2], target: [0.5, 0.5, 0]}}
+film: {{width: 8, height: 8}}
+meshes: {{square: {{file: {name}, materials: true}}}}
+objects: [{{mesh: square}}]
+lights: [{{light: point, position: [1, 1, 1]}}]
+""")
+        return layers_of(planned(load(tmp_path / "scene.yaml"), ["specular", "diffuse"]))
+
+    # one texel: occlusion, which is not looked at, roughness, metal
+    texel = np.array([[[255, 102, 204]]], np.uint8)
+    (tmp_path / "orm.png").write_bytes(png(texel))
+    textured = picture(
+        "a.glb",
+        {"metallicRoughnessTexture": {"index": 0}, "roughnessFactor": 0.5},
+        [{"uri": "orm.png"}],
+    )
+    plain = picture("b.glb", {"metallicFactor": 0.8, "roughnessFactor": 0.2})
+    for layer in ("diffuse", "specular"):
+        assert plain[layer].max() > 0
+        np.testing.assert_allclose(textured[layer], plain[layer], rtol=1e-5)

@@ -1,17 +1,14 @@
-"""glTF materials, approximated by the models of a scene.
+"""glTF materials in the terms of a scene.
 
-metallic-roughness (3.9, appendix B): Cook-Torrance with GGX of alpha = roughness^2 and Schlick's F,
+metallic-roughness (3.9, appendix B) is the model `metallic_roughness`; KHR_materials_ior its index. Base
+colour = factor * texture (sRGB) * COLOR_0; roughness = factor * G, metallic = factor * B of one texture
+(linear). KHR_materials_unlit becomes emission.
 
-    diffuse = base * (1 - metallic)
-    F0      = f0 * (1 - metallic) + base * metallic,   f0 = ((ior - 1) / (ior + 1))^2
+KHR_materials_pbrSpecularGlossiness is approximated by Cook-Torrance with GGX of alpha = (1 - glossiness)^2
+and Schlick's F. It gives diffuse and F0 directly.
 
-with the V-groove term instead of Smith's, and (1 - f0) as the share that F leaves for the diffuse part.
-Ambient light is reflected by the base colour, of metals, too. KHR_materials_unlit becomes emission.
-KHR_materials_pbrSpecularGlossiness gives diffuse and F0 directly, and alpha = (1 - glossiness)^2.
-
-The base colour is factor * texture (sRGB) * COLOR_0. Unsupported features (textures of roughness, metal,
-normals; transparency; coats, sheen and so on) are counted, not approximated. With a texture of
-metalness the material is not metallic.
+Unsupported features (textures of normals; transparency; coats, sheen and so on) are counted, not
+approximated. Where the texture of metal and roughness cannot be used, the material is not metallic.
 
 References
 ----------
@@ -46,6 +43,8 @@ BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
 SMOOTHEST = 1e-4
 """Least alpha whose lobe can be resolved in single precision."""
+LARGEST_INDEX = 1e3
+"""Of refraction; it reflects all but 0.4 %."""
 SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 _USED = {
     "KHR_materials_unlit",
@@ -143,15 +142,13 @@ class Library:
             return {"model": "lambert", "diffuse": BLACK, "ambient": BLACK, "emission": base}
         if gloss:
             return self._specular_glossiness(gloss, base, emission)
-        self._count("metallic-roughness materials, drawn as cook_torrance", where)
-        ior = max(_number(extension(material, "KHR_materials_ior"), "ior", 1.5), 1.0)
-        return _metallic_roughness(metal, base, emission, ((ior - 1) / (ior + 1)) ** 2)
+        keys = {"model": "metallic_roughness", "base_color": base, "emission": emission}
+        keys |= self._metal_and_roughness(number, metal)
+        ior = _number(extension(material, "KHR_materials_ior"), "ior", 1.5)
+        return keys if ior == 1.5 else keys | {"ior": _index(ior)}
 
     def _count_what_is_left_out(self, material: dict[str, Any], where: str) -> None:
         count = self._count
-        metal = material.get("pbrMetallicRoughness")
-        if isinstance(metal, dict) and "metallicRoughnessTexture" in metal:
-            count("textures of metal and roughness left out", where)
         if "specularGlossinessTexture" in extension(material, SPECULAR_GLOSSINESS):
             count("textures of specular and glossiness left out", where)
         if "normalTexture" in material:
@@ -175,19 +172,31 @@ class Library:
             "emission": emission,
         }
 
+    def _metal_and_roughness(self, number: int, metal: dict[str, Any]) -> dict[str, Any]:
+        """`metallic` and `roughness`: factors times channels of one texture."""
+        metallic, roughness = (
+            min(max(_number(metal, key, 1.0), 0.0), 1.0) for key in ("metallicFactor", "roughnessFactor")
+        )
+        info = metal.get("metallicRoughnessTexture")
+        if info is None or not (metallic or roughness):
+            return {"metallic": metallic, "roughness": roughness}
+        texture = self._usable_texture(number, info, "metallicRoughnessTexture")
+        if texture is None:  # the factor is the largest value that the texture leads to
+            return {"metallic": 0.0, "roughness": roughness}
+        texture["space"] = "linear"
+        return {
+            "metallic": _times({**texture, "channel": "b"}, metallic),
+            "roughness": _times({**texture, "channel": "g"}, roughness),
+        }
+
     def _color(self, number: int, entry: dict[str, Any], names: tuple[str, str], default: Color) -> Varying:
         """factor * texture of a material; the factor alone if there is no usable texture."""
         factor = _factor(entry, names[0], default, 1.0)
         info = entry.get(names[1])
         if info is None or not any(factor):
             return factor
-        try:
-            texture = self._texture(number, info)
-        except _Missing:
-            return factor
-        except InputError as error:
-            reason = self._document.reason(error)
-            self._count(f"textures left out ({reason})", f"materials[{number}].{names[1]}")
+        texture = self._usable_texture(number, info, names[1])
+        if texture is None:
             return factor
         return texture if factor == WHITE else {**texture, "factor": factor}
 
@@ -196,15 +205,23 @@ class Library:
         info = self._document.item("materials", number).get("occlusionTexture")
         if info is None:
             return {}
-        try:
-            texture = self._texture(number, info)
-        except _Missing:
-            return {}
-        except InputError as error:
-            where = f"materials[{number}].occlusionTexture"
-            self._count(f"occlusion textures left out ({self._document.reason(error)})", where)
+        texture = self._usable_texture(number, info, "occlusionTexture", "occlusion textures")
+        if texture is None:
             return {}
         return {**texture, "strength": min(max(_number(info, "strength", 1.0), 0.0), 1.0)}
+
+    def _usable_texture(
+        self, number: int, info: Any, key: str, kind: str = "textures"
+    ) -> dict[str, Any] | None:
+        """The keys of a texture of a material; None, and counted, if it cannot be used."""
+        try:
+            return self._texture(number, info)
+        except _Missing:
+            return None
+        except InputError as error:
+            reason = self._document.reason(error)
+            self._count(f"{kind} left out ({reason})", f"materials[{number}].{key}")
+            return None
 
     def _texture(self, number: int, info: Any) -> dict[str, Any]:
         """The keys of a texture; refused if it cannot be used."""
@@ -274,33 +291,22 @@ def image_bytes(document: Document, number: int) -> bytes:
 
 
 def _substitutes(keys: dict[str, Any], first: str, prefix: str = "") -> Iterator[tuple[str, Substitute]]:
-    """The path of each parameter that has a texture, and the texture's factor as its substitute."""
+    """The path of each parameter that has a texture, and its substitute: its factor, and no metal."""
     for key, value in keys.items():
         if isinstance(value, dict) and "texture" in value:
-            yield prefix + key, Substitute(value.get("factor", WHITE), first)
+            yield prefix + key, Substitute(BLACK if key == "metallic" else value.get("factor", WHITE), first)
         elif isinstance(value, dict):
             yield from _substitutes(value, first, f"{prefix}{key}.")
 
 
-def _metallic_roughness(
-    metal: dict[str, Any], base: Varying, emission: Varying, dielectric: float
-) -> dict[str, Any]:
-    """The keys of a metallic-roughness material; `dielectric` is F0 of its part that is not metal."""
-    textured = "metallicRoughnessTexture" in metal
-    metallic = 0.0 if textured else min(max(_number(metal, "metallicFactor", 1.0), 0.0), 1.0)
-    roughness = min(max(_number(metal, "roughnessFactor", 1.0), 0.0), 1.0)
-    rest = (1 - metallic) * dielectric
-    if metallic == 0:
-        f0: Varying = (dielectric,) * 3
-    elif isinstance(base, dict):  # only the metallic part; the rest is about 0.04 at most
-        f0 = _scaled(base, metallic)
-    else:
-        r, g, b = (metallic * each + rest for each in base)
-        f0 = (r, g, b)
-    return _cook_torrance(_scaled(base, (1 - metallic) * (1 - dielectric)), f0, roughness**2) | {
-        "ambient": base,
-        "emission": emission,
-    }
+def _index(ior: float) -> float:
+    """The index of KHR_materials_ior, where 0 stands for one without a limit."""
+    return min(max(ior, 1.0), LARGEST_INDEX) if ior != 0 else LARGEST_INDEX
+
+
+def _times(texture: dict[str, Any], factor: float) -> float | dict[str, Any]:
+    """A texture of a number times a factor."""
+    return 0.0 if factor == 0 else texture if factor == 1 else {**texture, "factor": (factor,) * 3}
 
 
 def _cook_torrance(diffuse: Varying, f0: Varying, alpha: float) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 Reference: one Embree occlusion ray on an icosphere of 81,920 triangles, single precision, same run.
 Seed 0, best of 7 repeats, 8192 points, default parameters unless a choice is named. Prints ns per point.
 
-    PYTHONPATH=src python benchmarks/model_cost.py [MODEL ...]
+    PYTHONPATH=src:tests python benchmarks/model_cost.py [MODEL ...]
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+import rgl_files
 from illumcli.arrays import F, column_major, cross, unit
+from illumcli.measured_files import merl
 from illumcli.schema.families import member, tags
 from illumcli.shading import terms
 
@@ -83,22 +85,26 @@ def occlusion_ray() -> Callable[[], object]:
     return lambda: scene.run(origins, directions, query="OCCLUDED")
 
 
-def measurement(folder: str) -> str:
-    """Path of a MERL file of noise, as large as a real one."""
-    path = f"{folder}/noise.binary"
-    with open(path, "wb") as file:
-        file.write(np.array((90, 90, 180), "<i4").tobytes())
-        file.write(np.random.default_rng(0).random(3 * 90 * 90 * 180).tobytes())
-    return path
+def measurements(folder: str) -> dict[str, str]:
+    """Paths of files of noise, as large as real ones, by the model that reads them."""
+    random = np.random.default_rng(0)
+    with open(f"{folder}/noise.binary", "wb") as file:
+        file.write(merl.encode(random.random((3, *merl.SHAPE))))
+    fields = rgl_files.measurement(
+        *random.random((2, 128)) + 0.1, random.random((8, 128, 128)), random.random((8, 3, 32, 32))
+    )
+    with open(f"{folder}/noise.bsdf", "wb") as file:
+        file.write(rgl_files.tensor_file(fields))
+    return {"merl": f"{folder}/noise.binary", "rgl": f"{folder}/noise.bsdf"}
 
 
-def main(measured: str) -> None:
+def main(measured: dict[str, str]) -> None:
     given = lanes()
     print(f"# numpy {np.__version__}, {platform.machine()}, {LANES} lanes, best of {REPEATS}")
     print(f"{'one occlusion ray':28s} {best(occlusion_ray()):8.1f} ns")
     for tag in sys.argv[1:] or tags("illumcli.models"):
         Model = member("illumcli.models", tag)
-        lobes = Model(**({"file": measured} if tag == "merl" else {})).lobes()
+        lobes = Model(**({"file": measured[tag]} if tag in measured else {})).lobes()
         whole = best(lambda lobes=lobes: terms.evaluate(lobes, given))
         apart = {
             name: best(lambda one={name: lobe}: terms.evaluate(one, given)) for name, lobe in lobes.items()
@@ -108,4 +114,4 @@ def main(measured: str) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        main(measurement(folder))
+        main(measurements(folder))

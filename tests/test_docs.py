@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import rgl_files
 from illumcli.cli import COMMANDS
 
 ROOT = Path(__file__).parents[1]
@@ -31,10 +32,11 @@ def commands(page: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder as a reader of the pages has it: the scenes, and a mesh of their own."""
+    """A folder as a reader of the pages has it: the scenes, a mesh and a measurement of their own."""
     path = tmp_path_factory.mktemp("reader")
     shutil.copytree(ROOT / "scenes", path / "scenes")
     (path / "bunny.obj").write_text(TRIANGLE)
+    (path / "paint_rgb.bsdf").write_bytes(rgl_files.tensor_file(rgl_files.noise()))
     return path
 
 

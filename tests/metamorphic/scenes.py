@@ -20,6 +20,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+import rgl_files
 from illumcli.schema.families import member
 from illumcli.shading import rates as shading_rates
 from metamorphic import surfaces
@@ -54,6 +55,8 @@ class Case:
         path.write_text(text)
         if MEASUREMENT in text and not (folder / MEASUREMENT).exists():
             os.link(measured(folder.parent / MEASUREMENT), folder / MEASUREMENT)
+        if SMALL_MEASUREMENT in text:
+            (folder / SMALL_MEASUREMENT).write_bytes(rgl_files.tensor_file(rgl_files.noise()))
         return path
 
     def text(self) -> str:
@@ -79,6 +82,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 MEASUREMENT = "lobe.binary"
+SMALL_MEASUREMENT = "noise.bsdf"
 
 
 def measured(path: Path) -> Path:
@@ -185,6 +189,7 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
         "subsurface": number(r, 0, 1), "anisotropic": number(r, 0, 1), "sheen": number(r, 0, 1),
         "clearcoat": number(r, 0, 1), "clearcoat_gloss": number(r, 0, 0.5)
     },
+    "rgl": lambda r: {"file": SMALL_MEASUREMENT},
     "strauss": lambda r: {
         "color": color(r), "smoothness": number(r, 0, 0.95), "metalness": number(r, 0, 1),
         "transparency": number(r, 0, 0.8)

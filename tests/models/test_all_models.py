@@ -13,8 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
+import rgl_files
 from illumcli.arrays import column_major, cross, dot, unit
 from illumcli.commands.schema_generator import schema_of
+from illumcli.measured_files import merl
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
 from illumcli.schema.description import nested
@@ -36,15 +38,16 @@ def claiming(claim, value=True):
 
 @pytest.fixture(scope="module", autouse=True)
 def measured(tmp_path_factory):
-    """A measurement to look up, of noise with gaps."""
-    path = tmp_path_factory.mktemp("merl") / "noise.binary"
-    with open(path, "wb") as file:
-        file.write(np.array((90, 90, 180), "<i4").tobytes())
-        file.write((np.random.default_rng(1).random(3 * 90 * 90 * 180) * 100 - 10).tobytes())
-    MEASURED.append(str(path))
+    """Measurements to look up, of noise with gaps."""
+    folder = tmp_path_factory.mktemp("measured")
+    noise = np.random.default_rng(1).random((3, 90, 90, 180))
+    (folder / "noise.binary").write_bytes(merl.encode(np.where(noise < 0.1, np.nan, noise)))
+    (folder / "noise.bsdf").write_bytes(rgl_files.tensor_file(rgl_files.noise()))
+    MEASURED.update(merl=str(folder / "noise.binary"), rgl=str(folder / "noise.bsdf"))
 
 
-MEASURED: list[str] = []
+MEASURED: dict[str, str] = {}
+"""A file for each model that reads one."""
 
 
 # -- random parameters, from the schema of a model
@@ -61,8 +64,9 @@ def parameters(Model, choices=True, gentle=False):
 
 
 def _object(schema, defs, choices, gentle):
+    tag = schema["properties"].get("model", {}).get("const")
     fields = {
-        name: st.builds(lambda: MEASURED[-1])
+        name: st.builds(lambda: MEASURED[tag])
         if name == "file"
         else _field(name, field, defs, choices, gentle)
         for name, field in schema["properties"].items()

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors, column_major
 from illumcli.errors import InputError
+from illumcli.measured_files._files import identity
 
 SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
 CELLS = 90 * 90 * 180
@@ -103,11 +104,7 @@ def mapped(path: str) -> NDArray[np.uint32]:
     InputError
         The file cannot be opened, or is not a MERL measurement.
     """
-    try:
-        facts = os.stat(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the measurement: {error.strerror}") from None
-    return _mapped(path, facts.st_mtime_ns, facts.st_size)
+    return _mapped(*identity(path))
 
 
 @lru_cache(maxsize=64)

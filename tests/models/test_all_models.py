@@ -201,6 +201,10 @@ def test_without_grain_turning_about_the_normal_changes_nothing(Model, data, see
         ({"model": "ashikhmin_shirley"}, True),
         ({"model": "ashikhmin_shirley", "exponent_v": 100}, False),
         ({"model": "kajiya_kay"}, True),
+        ({"model": "cook_torrance"}, False),
+        ({"model": "cook_torrance", "distribution": {"D": "ggx", "alpha": 0.2, "alpha_y": 0.2}}, False),
+        ({"model": "cook_torrance", "distribution": {"D": "ggx", "alpha": 0.2, "alpha_y": 0.3}}, True),
+        ({"model": "cook_torrance", "distribution": {"D": "beckmann", "m_y": 0.1}}, True),
         ({"model": "phong"}, False),
     ],
 )
@@ -433,7 +437,9 @@ def test_the_page_has_formula_and_source(Model):
     assert "References\n----------" in text
 
 
-@pytest.mark.parametrize("name", ["_base", "_fresnel", "_lafortune", "_microfacet", *tags("illumcli.models")])
+@pytest.mark.parametrize(
+    "name", ["_base", "_fresnel", "_lafortune", "_distributions", *tags("illumcli.models")]
+)
 def test_every_parameter_says_what_it_means(name):
     source = Path(inspect.getfile(IlluminationModel)).with_name(f"{name}.py").read_text()
     for cls in (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
+from illumcli.models import _distributions as distributions
 from illumcli.models import _masking as masking
 from illumcli.models import _microfacet as facets
-from illumcli.models._terms import Components
+from illumcli.models._terms import Angle, Components
 
 AREAS = {"beckmann": masking.beckmann_area, "ggx": masking.ggx_area}
 DENSITIES = {"beckmann": facets.anisotropic_beckmann, "ggx": facets.anisotropic_ggx}
@@ -122,3 +123,65 @@ def test_densities_are_finite_for_any_half_vector(name, dtype, s, alpha):
     density = DENSITIES[name](h, dtype(alpha), dtype(0.3))
     assert density.dtype == dtype
     assert np.isfinite(density[0])
+
+
+INTEGRATED = {
+    "gaussian": lambda w: distributions.Gaussian(m=w),
+    "torrance_sparrow": lambda w: distributions.TorranceSparrow(beta=w),
+    "blinn": lambda w: distributions.Blinn(beta=w),
+    "power": lambda w: distributions.PowerCosine(exponent=2 / w**2),
+    "gtr 1": lambda w: distributions.GTR(alpha=w, gamma=1.0),
+    "gtr 1.5": lambda w: distributions.GTR(alpha=w, gamma=1.5),
+    "gtr 2": lambda w: distributions.GTR(alpha=w, gamma=2.0),
+    "gtr 4": lambda w: distributions.GTR(alpha=w, gamma=4.0),
+}
+widths = pytest.mark.parametrize("width", [1e-4, 0.01, 0.3, 1.0])
+every_integrated = pytest.mark.parametrize("D", INTEGRATED.values(), ids=INTEGRATED)
+
+
+def hidden_by_definition(D, cosine):
+    """The projected area of facets that face away, integrated over their angle to the normal.
+
+    Panels shrink towards both ends: facets in profile, and the horizon.
+    """
+    first, span, panels, total = np.arcsin(cosine), 36.0, 12, 0.0
+    half = (np.pi / 2 - first) / 2
+    node, weight = leggauss(60)
+    for panel in range(panels):
+        gap = half * np.exp(-span * (panel + (1 + node) / 2) / panels)
+        for beyond, height in ((gap, np.cos(first + gap)), (2 * half - gap, np.sin(gap))):
+            sine = np.sin(first + beyond)
+            rise = np.sqrt(np.sin(beyond) * np.sin(2 * first + beyond))
+            away = 2 * (rise - cosine * height * np.arctan2(rise, cosine * height))
+            density = D.density(Angle(height, sine**2))
+            total += np.sum(density * sine * away * gap * weight) * span / panels / 2
+    return total
+
+
+@every_integrated
+@widths
+@pytest.mark.parametrize("cosine", [1e-6, 0.002, 0.1, 0.5, 0.95])
+def test_integrated_areas_agree_with_their_definition(D, width, cosine):
+    area = D(width).area(np.array([cosine]))
+    exact = hidden_by_definition(D(width), cosine)
+    assert area.hidden[0] == pytest.approx(exact, abs=2e-12 * (cosine + exact))
+    single = D(width).area(np.array([cosine], np.float32))
+    assert single.hidden.dtype == np.float32
+    assert single.hidden[0] == pytest.approx(exact, abs=1e-5 * (cosine + exact))
+
+
+def test_integrated_areas_agree_with_ggx_in_closed_form():
+    cosine = np.concatenate([np.logspace(-8, 0, 60), np.linspace(0.01, 1, 60)])
+    for alpha in (1e-4, 1e-2, 0.3, 1.0):
+        closed = distributions.GGX(alpha=alpha).area(cosine)
+        integrated = distributions.GTR(alpha=alpha, gamma=2.0).area(cosine)
+        np.testing.assert_array_less(np.abs(integrated.hidden - closed.hidden), 1e-12 * closed.seen)
+
+
+@every_integrated
+def test_areas_of_roughness_that_varies_are_those_of_each(D):
+    cosine = np.array([0.2, 0.2, 0.9], np.float32)
+    drawn = D(0.3)
+    values = {name: value for name, value in drawn if isinstance(value, float)}
+    varied = drawn.model_copy(update={name: np.full(3, value) for name, value in values.items()})
+    np.testing.assert_array_equal(varied.area(cosine).hidden, drawn.area(cosine).hidden)

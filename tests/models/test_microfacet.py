@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
+from illumcli.models import _distributions as distributions
 from illumcli.models import _microfacet as facets
 from illumcli.models._terms import Angle
 
@@ -14,25 +15,25 @@ def value(kind, n_h, sin2, p):
     """D of a published case, which may have a constant of its own."""
     match kind:
         case "gaussian":
-            return facets.Gaussian(m=p["m"], c=p["c"]).density(Angle(n_h, sin2))
+            return distributions.Gaussian(m=p["m"], c=p["c"]).density(Angle(n_h, sin2))
         case "beckmann":
-            return facets.Beckmann(m=p["m"]).density(Angle(n_h, sin2))
+            return distributions.Beckmann(m=p["m"]).density(Angle(n_h, sin2))
         case "beckmann_ct1982":
-            return facets.Beckmann(m=p["m"]).density(Angle(n_h, sin2), printed=True)
+            return distributions.Beckmann(m=p["m"]).density(Angle(n_h, sin2), printed=True)
         case "beckmann_quarter":
-            return facets.Beckmann(m=p["m"]).density(Angle(n_h, sin2), printed=True) / 4
+            return distributions.Beckmann(m=p["m"]).density(Angle(n_h, sin2), printed=True) / 4
         case "beckmann_slope1d":
             return facets.beckmann_slope1d(n_h, sin2, p["m"])
         case "blinn":
-            return facets.Blinn(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
+            return distributions.Blinn(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
         case "blinn_normalised":
-            return facets.PowerCosine(exponent=float(p["exponent"])).density(Angle(n_h, sin2))
+            return distributions.PowerCosine(exponent=float(p["exponent"])).density(Angle(n_h, sin2))
         case "torrance_sparrow":
-            return facets.TorranceSparrow(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
+            return distributions.TorranceSparrow(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
         case "trowbridge_reitz":
-            return facets.TrowbridgeReitz(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
+            return distributions.TrowbridgeReitz(beta=p["beta"]).density(Angle(n_h, sin2), printed=True)
         case "ggx":
-            return facets.GGX(alpha=p["alpha"]).density(Angle(n_h, sin2))
+            return distributions.GGX(alpha=p["alpha"]).density(Angle(n_h, sin2))
 
 
 def test_distributions_have_the_published_values(cases, frame, term, agree):
@@ -49,15 +50,27 @@ def test_distributions_have_the_published_values(cases, frame, term, agree):
 @pytest.mark.parametrize(
     "D",
     [
-        lambda w: facets.Gaussian(m=w),
-        lambda w: facets.Beckmann(m=w),
-        lambda w: facets.Blinn(beta=w),
-        lambda w: facets.PowerCosine(exponent=2 / w**2),
-        lambda w: facets.TorranceSparrow(beta=w),
-        lambda w: facets.TrowbridgeReitz(beta=w),
-        lambda w: facets.GGX(alpha=w),
+        lambda w: distributions.Gaussian(m=w),
+        lambda w: distributions.Beckmann(m=w),
+        lambda w: distributions.Blinn(beta=w),
+        lambda w: distributions.PowerCosine(exponent=2 / w**2),
+        lambda w: distributions.TorranceSparrow(beta=w),
+        lambda w: distributions.TrowbridgeReitz(beta=w),
+        lambda w: distributions.GGX(alpha=w),
+        lambda w: distributions.GTR(alpha=min(w, 1), gamma=1.0),
+        lambda w: distributions.GTR(alpha=min(w, 1), gamma=2.0),
     ],
-    ids=["gaussian", "beckmann", "blinn", "power", "torrance_sparrow", "trowbridge_reitz", "ggx"],
+    ids=[
+        "gaussian",
+        "beckmann",
+        "blinn",
+        "power",
+        "torrance_sparrow",
+        "trowbridge_reitz",
+        "ggx",
+        "gtr_1",
+        "gtr_2.5",
+    ],
 )
 def test_a_normalised_distribution_projects_to_one(D, width):
     node, weight = leggauss(200)
@@ -69,7 +82,9 @@ def test_a_normalised_distribution_projects_to_one(D, width):
     assert 2 * np.pi * np.sum(density * cos * tan * cos * jacobian) == pytest.approx(1, rel=1e-4)
 
 
-@pytest.mark.parametrize("D", [facets.Blinn, facets.TorranceSparrow, facets.TrowbridgeReitz])
+@pytest.mark.parametrize(
+    "D", [distributions.Blinn, distributions.TorranceSparrow, distributions.TrowbridgeReitz]
+)
 def test_half_height_is_where_the_distribution_is_half(D):
     angle = np.array([0, 0.4])
     printed = D(beta=0.4).density(Angle(np.cos(angle), np.sin(angle) ** 2), printed=True)
@@ -100,3 +115,20 @@ def test_v_grooves_divided_by_the_cosines_stay_finite_at_the_horizon():
     np.testing.assert_allclose(
         over[1:] * 4 * n_l[1:] * n_v[1:], facets.vgroove(n_l, n_v, s_s)[1:], rtol=1e-14
     )
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.4, 1.0])
+def test_gtr_of_exponent_2_is_ggx(alpha):
+    theta = Angle(np.array([1, 0.99, 0.3]), np.array([0, 1 - 0.99**2, 1 - 0.09]))
+    ggx = distributions.GGX(alpha=alpha).density(theta)
+    np.testing.assert_allclose(distributions.GTR(alpha=alpha, gamma=2.0).density(theta), ggx, rtol=1e-12)
+
+
+def test_gtr_of_exponent_1_is_berrys():
+    """(alpha^2 - 1) / (pi ln(alpha^2)) / (1 + (alpha^2 - 1) cos^2), as Burley prints it."""
+    alpha, cosine = 0.2, np.array([1, 0.9, 0.1])
+    printed = (alpha**2 - 1) / (np.pi * np.log(alpha**2)) / (1 + (alpha**2 - 1) * cosine**2)
+    density = distributions.GTR(alpha=alpha, gamma=1.0).density(Angle(cosine, 1 - cosine**2))
+    np.testing.assert_allclose(density, printed, rtol=1e-12)
+    near = distributions.GTR(alpha=alpha, gamma=1 + 1e-9).density(Angle(cosine, 1 - cosine**2))
+    np.testing.assert_allclose(near, printed, rtol=1e-8)

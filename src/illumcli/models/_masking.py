@@ -25,11 +25,14 @@ Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-bas
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from illumcli.arrays import Floats
+from illumcli.models._lobes import gauss_legendre
+from illumcli.models._terms import Angle
 
 
 class FacetArea(NamedTuple):
@@ -71,6 +74,48 @@ def beckmann_area(cosine: Floats, spread2: Floats) -> FacetArea:
     return FacetArea(cosine, spread / 2 * ierfc(a))
 
 
+class Extent(NamedTuple):
+    """Where a distribution is not negligible, for the quadrature of its areas."""
+
+    width: Floats
+    """(N,) angle over which it falls near the normal [rad]."""
+    end2: Floats
+    """(N,) squared sine of the angle beyond which it is negligible."""
+
+
+def integrated_area(
+    cosine: Floats, shape: Callable[[Angle], Floats], extent: Extent, height: Floats
+) -> FacetArea:
+    """Areas of any isotropic distribution, D = height * shape(theta), by quadrature.
+
+    At an angle theta_h to the normal, facets whose azimuth is within psi of that opposite to x face away from
+    x. In w, with cos(theta_h) = sin(theta) cos(w), the integrand is smooth: tan(psi) = tan(w) / x.n and
+
+        hidden = 2 sin^2(theta) * integral over 0..pi/2 of D(theta_h) (sin^2 w - x.n psi sin w cos w) dw
+
+    Relative to `seen`, the error is below 1e-5 in single and 2e-12 in double precision (2e-8 for cos^n of a
+    broken n below 1/2).
+    """
+    sin2 = np.maximum((1 - cosine) * (1 + cosine), 0)
+    sine = np.sqrt(sin2)
+    last = np.arctan2(
+        np.sqrt(np.maximum(extent.end2 - np.square(cosine), 0)), np.sqrt(np.maximum(1 - extent.end2, 0))
+    )
+    reach = np.arcsinh(last / extent.width)
+    total, tiny = np.zeros_like(cosine), np.finfo(cosine.dtype).tiny
+    for node, weight in gauss_legendre(NODES[cosine.dtype]):
+        # w = width sinh(reach u^2 (3 - 2 u)): nodes are dense where D is high, and at both ends
+        u = (1 + node) / 2
+        grown = np.exp(reach * (u * u * (3 - 2 * u)))
+        w = extent.width / 2 * (grown - 1 / grown)
+        across, along = np.sin(w), np.cos(w)
+        psi = np.arctan2(across, cosine * along)
+        theta_h = Angle(np.maximum(sine * along, tiny), np.square(cosine) + sin2 * np.square(across))
+        turned = shape(theta_h) * (across * (across - cosine * along * psi))
+        total += turned * (grown + 1 / grown) * (weight * u * (1 - u))
+    return FacetArea(cosine, np.maximum(total * sin2 * (3 * height * extent.width * reach), 0))
+
+
 def smith_lambda(x: FacetArea) -> Floats:
     """(N,) Lambda, the hidden area over that of the surface; grows without bound at grazing."""
     return x.hidden / x.cosine
@@ -100,6 +145,12 @@ def correlated_over_4ab(l: FacetArea, v: FacetArea) -> Floats:
     """(N,) 1 / (1 + Lambda(l) + Lambda(v)) / (4 n_l n_v), finite unless both directions are at grazing."""
     return 1 / (4 * (v.cosine * l.seen + l.cosine * v.hidden))
 
+
+NODES = {np.dtype(np.float32): 24, np.dtype(np.float64): 64}
+"""Nodes of the quadrature of areas, by precision."""
+
+NEGLIGIBLE = {np.dtype(np.float32): 16.0, np.dtype(np.float64): 40.0}
+"""f, by precision: a distribution that has fallen to exp(-f) is negligible."""
 
 LARGEST = 6
 """Largest argument of `ierfc`: beyond it, hidden areas are below 1e-18 of the surface's."""

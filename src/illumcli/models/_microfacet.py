@@ -1,4 +1,4 @@
-"""Facet distributions D and the V-groove term G: formulas, and their descriptions in scenes.
+"""Facet distributions D and the V-groove term G: formulas.
 
 theta is the angle between the normal and the half vector. Distributions take its cosine `n_h` (above 0) and
 `sin2_h` = sin^2, so that narrow lobes are accurate near the normal and wide ones at grazing. The angle itself
@@ -13,22 +13,17 @@ Torrance, K. E., Sparrow, E. M. (1967). Theory for off-specular reflection from 
 Trowbridge, T. S., Reitz, K. P. (1975). Average irregularity representation of a rough surface. JOSA 65(5).
 Blinn, J. F. (1977). Models of light reflection for computer synthesized pictures. SIGGRAPH '77.
 Walter, B., et al. (2007). Microfacet models for refraction through rough surfaces. EGSR '07, eq. 25, 33.
+Burley, B. (2012). Physically-based shading at Disney. SIGGRAPH 2012 course, appendix B: the generalised form.
 Heitz, E. (2014). Understanding the masking-shadowing function in microfacet-based BRDFs. JCGT 3(2).
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
-
 import numpy as np
-from pydantic import Discriminator
 
-from illumcli.arrays import Floats, as_dtype_of
+from illumcli.arrays import Floats
 from illumcli.models._lobes import gauss_legendre, log_cos
-from illumcli.models._parameters import HalfHeight, Roughness, Varying
-from illumcli.models._terms import Angle, Components
-from illumcli.schema.description import Description
-from illumcli.schema.fields import NonNegative, Positive
+from illumcli.models._terms import Components
 
 
 def gaussian(n_h: Floats, sin2_h: Floats, m: Floats) -> Floats:
@@ -77,6 +72,27 @@ def ggx(n_h: Floats, sin2_h: Floats, alpha: Floats) -> Floats:
     """alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), normalised."""
     wide = np.square(alpha * n_h) + sin2_h
     return np.square(alpha / wide) / np.pi
+
+
+def gtr(sin2_h: Floats, alpha: Floats, gamma: Floats) -> Floats:
+    """(alpha^2 / (alpha^2 cos^2 + sin^2))^gamma, 1 at the normal; `gtr_height` times this is normalised."""
+    return np.exp(-gamma * np.log1p(sin2_h * ((1 - alpha) * (1 + alpha) / np.square(alpha))))
+
+
+def gtr_height(alpha: Floats, gamma: Floats) -> Floats:
+    """The height at the normal that normalises `gtr`, in float64: 1 / (pi alpha^2) for a gamma of 2.
+
+    With x = -2 ln alpha and f(x) = (e^x - 1) / x, it is f(x) / (pi f((1 - gamma) x)): Burley's constants for
+    gamma = 1 and for others in one form, which has no poles.
+    """
+    x = -2 * np.log(np.asarray(alpha, np.float64))
+    return _exprel(x) / (np.pi * _exprel((1 - np.asarray(gamma, np.float64)) * x))
+
+
+def _exprel(x: Floats) -> Floats:
+    """(e^x - 1) / x, 1 at 0."""
+    safe = np.where(x == 0, 1, x)
+    return np.where(x == 0, 1, np.expm1(safe) / safe)
 
 
 def anisotropic_beckmann(h: Components, m_x: Floats, m_y: Floats) -> Floats:
@@ -135,107 +151,3 @@ def vgroove_over_4ab(n_l: Floats, n_v: Floats, s_s: Floats) -> Floats:
     larger = np.maximum(n_l, n_v)
     blocked = larger * s_s / (n_l + n_v)
     return 1 / np.maximum(4 * n_l * n_v, np.maximum(blocked, np.finfo(blocked.dtype).tiny))
-
-
-class Gaussian(Description):
-    """Torrance and Sparrow's Gaussian of the angle, by its width."""
-
-    D: Literal["gaussian"] = "gaussian"
-    m: Varying[Roughness] = 0.3
-    """m, angle in radians at which D has fallen to 1/e."""
-    c: Varying[Positive] | None = None
-    """c, height at the normal [1/sr]; by default the c that normalises D."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) c exp(-(theta / m)^2)."""
-        height = gaussian_constant(np.asarray(self.m)) if self.c is None else self.c
-        m, c = as_dtype_of(theta.cosine, self.m, height)
-        return c * gaussian(*theta, m)
-
-
-class Beckmann(Description):
-    """Beckmann's distribution of a surface with Gaussian slopes."""
-
-    D: Literal["beckmann"] = "beckmann"
-    m: Varying[Roughness] = 0.3
-    """m, RMS slope: 0.05 polished, 1 very rough."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) normalised; printed with 1 / (m^2 cos^4), pi times that."""
-        (m,) = as_dtype_of(theta.cosine, self.m)
-        density = beckmann(*theta, m)
-        return density * np.pi if printed else density
-
-
-class Blinn(Description):
-    """Blinn's power of the cosine, by its half-height angle."""
-
-    D: Literal["blinn"] = "blinn"
-    beta: Varying[HalfHeight] = 0.3
-    """beta, angle in radians at which D is half its height."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) normalised; printed with height 1."""
-        (exponent,) = as_dtype_of(theta.cosine, power_of_half_height(np.asarray(self.beta)))
-        height = 1 if printed else (exponent + 2) / (2 * np.pi)
-        return power_cosine(*theta, exponent) * height
-
-
-class PowerCosine(Description):
-    """Blinn's power of the cosine, by its exponent; about 2 / m^2 - 2 matches Beckmann."""
-
-    D: Literal["power"] = "power"
-    exponent: Varying[NonNegative] = 20.0
-    """n, the exponent; 0 to 10^6 and beyond."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) (n + 2) / (2 pi) cos^n, normalised."""
-        (exponent,) = as_dtype_of(theta.cosine, self.exponent)
-        return power_cosine(*theta, exponent) * ((exponent + 2) / (2 * np.pi))
-
-
-class TorranceSparrow(Description):
-    """Torrance and Sparrow's Gaussian of the angle, by its half-height angle."""
-
-    D: Literal["torrance_sparrow"] = "torrance_sparrow"
-    beta: Varying[HalfHeight] = 0.3
-    """beta, angle in radians at which D is half its height."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) normalised; printed with height 1."""
-        width = m_of_half_height(np.asarray(self.beta))
-        m, c = as_dtype_of(theta.cosine, width, 1 if printed else gaussian_constant(width))
-        return c * gaussian(*theta, m)
-
-
-class TrowbridgeReitz(Description):
-    """Trowbridge and Reitz's ellipsoids, by their half-height angle."""
-
-    D: Literal["trowbridge_reitz"] = "trowbridge_reitz"
-    beta: Varying[HalfHeight] = 0.3
-    """beta, angle in radians at which D is half its height."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) normalised; printed with height 1."""
-        (alpha,) = as_dtype_of(theta.cosine, alpha_of_half_height(np.asarray(self.beta)))
-        density = ggx(*theta, alpha)
-        return density * (np.pi * np.square(alpha)) if printed else density
-
-
-class GGX(Description):
-    """Walter's GGX: Trowbridge and Reitz by roughness."""
-
-    D: Literal["ggx"] = "ggx"
-    alpha: Varying[Roughness] = 0.3
-    """alpha, slope scale: 0.05 polished, 1 very rough; longer tails than Beckmann."""
-
-    def density(self, theta: Angle, printed: bool = False) -> Floats:
-        """(N,) normalised."""
-        (alpha,) = as_dtype_of(theta.cosine, self.alpha)
-        return ggx(*theta, alpha)
-
-
-Distribution: TypeAlias = Annotated[
-    Gaussian | Beckmann | Blinn | PowerCosine | TorranceSparrow | TrowbridgeReitz | GGX,
-    Discriminator("D"),
-]

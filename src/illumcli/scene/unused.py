@@ -137,7 +137,7 @@ def _object(scene: Scene, number: int, thing: Object, source: Any) -> Iterator[F
     # Grain, fallback, override and transform.
     path: Path = ("objects", number)
     model = scene.material_of(thing)
-    if model is not None and model.isotropic:
+    if model is not None and model.isotropic and not model.has_grain():
         yield (*path, "grain"), f"is not used, the model {dict(model)['model']} has none; leave it out"
     if thing.material is not None:
         yield (*path, "fallback"), "is not used, the object has a material of its own; leave one of them out"

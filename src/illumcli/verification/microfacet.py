@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, dot
-from illumcli.models import _fresnel, _microfacet
+from illumcli.models import _distributions, _fresnel, _microfacet
 from illumcli.models._terms import Angle
 from illumcli.models.cook_torrance import CookTorrance
 from illumcli.shading import terms
@@ -18,19 +18,19 @@ from illumcli.verification.lobes import brdf
 
 PI = float(np.pi)
 
-Facets = tuple[_microfacet.Distribution, bool, float]
+Facets = tuple[_distributions.Distribution, bool, float]
 """A distribution, True for its printed constants, and the factor between it and the case's D."""
 
 DISTRIBUTIONS: dict[str, Callable[[Inputs], Facets]] = {
-    "gaussian": lambda d: (_microfacet.Gaussian(m=d.number("m"), c=d.number("c")), False, 1),
-    "beckmann": lambda d: (_microfacet.Beckmann(m=d.number("m")), False, 1),
-    "beckmann_ct1982": lambda d: (_microfacet.Beckmann(m=d.number("m")), True, 1),
-    "beckmann_quarter": lambda d: (_microfacet.Beckmann(m=d.number("m")), True, 1 / 4),
-    "blinn": lambda d: (_microfacet.Blinn(beta=d.number("beta")), True, 1),
-    "blinn_normalised": lambda d: (_microfacet.PowerCosine(exponent=d.number("exponent")), False, 1),
-    "torrance_sparrow": lambda d: (_microfacet.TorranceSparrow(beta=d.number("beta")), True, 1),
-    "trowbridge_reitz": lambda d: (_microfacet.TrowbridgeReitz(beta=d.number("beta")), True, 1),
-    "ggx": lambda d: (_microfacet.GGX(alpha=d.number("alpha")), False, 1),
+    "gaussian": lambda d: (_distributions.Gaussian(m=d.number("m"), c=d.number("c")), False, 1),
+    "beckmann": lambda d: (_distributions.Beckmann(m=d.number("m")), False, 1),
+    "beckmann_ct1982": lambda d: (_distributions.Beckmann(m=d.number("m")), True, 1),
+    "beckmann_quarter": lambda d: (_distributions.Beckmann(m=d.number("m")), True, 1 / 4),
+    "blinn": lambda d: (_distributions.Blinn(beta=d.number("beta")), True, 1),
+    "blinn_normalised": lambda d: (_distributions.PowerCosine(exponent=d.number("exponent")), False, 1),
+    "torrance_sparrow": lambda d: (_distributions.TorranceSparrow(beta=d.number("beta")), True, 1),
+    "trowbridge_reitz": lambda d: (_distributions.TrowbridgeReitz(beta=d.number("beta")), True, 1),
+    "ggx": lambda d: (_distributions.GGX(alpha=d.number("alpha")), False, 1),
 }
 REFLECTANCES: dict[str, Callable[[Inputs], _fresnel.Fresnel]] = {
     "dielectric": lambda f: _fresnel.Dielectric(ior=f.number("eta")),

@@ -18,7 +18,7 @@ FOLDERS = (
     "cluster",
     "api",
     "commands",
-    "accuracy baking brdf html_report verification",
+    "accuracy baking brdf gonioreflectometer html_report verification",
     "render_graph",
     "cache",
     "scene",

@@ -35,6 +35,7 @@ COMMANDS = {
     "stress": "Run the numerical stability suite.",
     "models": "List models, their parameters, ranges, formulas, sources.",
     "brdf": "Draw models: polar slices, a lit sphere and floor, lobes.",
+    "measure": "Measure the BRDF of a surface with real bumps.",
     "cache": "List, verify and prune the cache.",
     "schema": "Print the JSON schema of scenes.",
 }

@@ -13,6 +13,7 @@ from illumcli.cache.fingerprint import file_digest
 from illumcli.commands.unit import Unit
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes
+from illumcli.gonioreflectometer.work import MeasureRow
 from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.scene.access import file_inside
 from illumcli.scene.load import SceneText, load, read_text
@@ -40,6 +41,9 @@ class Inputs:
 
     def _paths(self, unit: Unit) -> Iterator[Path]:
         """The files of all scenes and meshes that a unit reads."""
+        if isinstance(unit, MeasureRow):
+            yield from _absolute(unit.files())
+            return
         yield from self._paths_of(scene_of(unit), unit)
         if isinstance(unit, BakeJob):
             for path in occluding_files(unit.settings.occluders):
@@ -71,7 +75,7 @@ class Inputs:
 
 
 def scene_of(unit: Unit) -> Path:
-    """The scene or mesh of a unit."""
+    """The scene, mesh or surface of a unit."""
     path: Path = getattr(unit, "scene", None) or unit.path  # type: ignore[union-attr]
     return path
 

@@ -24,12 +24,15 @@ from illumcli.commands.unit import Unit, Worker
 from illumcli.commands.work import Work
 from illumcli.errors import IllumError, LimitError, OutputError, known
 from illumcli.files.atomic import is_full
+from illumcli.gonioreflectometer.work import MeasureRow
 from illumcli.records import Value
 
 if TYPE_CHECKING:
     from illumcli.baking.inputs import BakeWork
     from illumcli.baking.report import BakeReport
     from illumcli.commands.report import Report
+    from illumcli.gonioreflectometer.estimate import Estimate
+    from illumcli.gonioreflectometer.work import MeasureWork
 
 ONE_BLOCK = Lock()
 """Held while a block is done: the current folder belongs to the whole process."""
@@ -188,7 +191,7 @@ def _all_done(
     return tuple(done)
 
 
-def _prepared(worker: Worker, unit: Unit) -> Work | BakeWork | UnitResult:
+def _prepared(worker: Worker, unit: Unit) -> Work | BakeWork | MeasureWork | UnitResult:
     """The work of a unit, or the result of one with a fault."""
     try:
         return worker.prepare(unit)
@@ -198,12 +201,12 @@ def _prepared(worker: Worker, unit: Unit) -> Work | BakeWork | UnitResult:
 
 def _done(
     worker: Worker,
-    work: Work | BakeWork,
-    following: Work | BakeWork | UnitResult | None,
+    work: Work | BakeWork | MeasureWork,
+    following: Work | BakeWork | MeasureWork | UnitResult | None,
     mirror: Mirror | None,
 ) -> UnitResult:
     """The result of a unit."""
-    report: Report | BakeReport
+    report: Report | BakeReport | Estimate
     try:
         if isinstance(work, Work):
             paths, report = worker.run(work, following=following if isinstance(following, Work) else None)
@@ -211,7 +214,9 @@ def _done(
             paths, report = worker.run(work)
     except Exception as error:
         return _failed(error, mirror is not None)
-    return UnitResult((paths, report)) if mirror is None else _shipped(paths, report, str(mirror.root))
+    if mirror is None or not paths:
+        return UnitResult((paths, report))
+    return _shipped(paths, report, str(mirror.root))
 
 
 def _failed(error: Exception, has_own_disk: bool = False) -> UnitResult:
@@ -243,6 +248,9 @@ def _mirrored(unit: Unit, mirror: Mirror) -> Unit:
     def at(path: Path) -> Path:
         return mirror.at(path) if path.is_absolute() else path
 
+    if isinstance(unit, MeasureRow):
+        path = at(unit.path)
+        return replace(unit, path=path, source=replace(unit.source, text=str(path)))
     if isinstance(unit, RenderJob):
         pattern = unit.options.pattern
         options = replace(unit.options, pattern=str(at(Path(pattern))) if pattern else None)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from illumcli.baking.report import BakeReport
+from illumcli.baking.settings import BakeJob
 from illumcli.cache.fingerprint import digest
 from illumcli.commands.batch import Batch, BatchReport
 from illumcli.commands.merged_shards import MergedShards
@@ -30,7 +31,7 @@ Done: TypeAlias = Callable[[Unit, list[Path], Any], Report | BakeReport]
 class BatchUnits(Value):
     """What a shard of a batch does."""
 
-    units: Sequence[Unit]
+    units: Sequence[RenderJob | BakeJob]
     """Of the whole batch."""
     sharding: Sharding
     force: bool

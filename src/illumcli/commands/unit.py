@@ -1,10 +1,10 @@
 """Units of work: one description, and one class that does it, for threads, shards and workers of a cluster.
 
 A unit is a scene, a variant or a frame of it, some or all of its cameras, a band of their rows (`RenderJob`),
-or an input of a bake (`BakeJob`). It holds names and numbers, no arrays and no open files, and can be
-pickled. Its files depend on the unit and on the files that it names: not on the process, the number of
-threads, or earlier units. Its key is the `content` of its work: files that exist with this content are kept,
-whoever wrote them, so a unit that is done twice is computed once.
+an input of a bake (`BakeJob`), a row of a measurement (`MeasureRow`). It holds names and numbers, no arrays
+and no open files, and can be pickled. Its files depend on the unit and on the files that it names: not on
+the process, the number of threads, or earlier units. Its key is the `content` of its work: files that exist
+with this content are kept, whoever wrote them, so a unit that is done twice is computed once.
 
 An executor makes one `Worker` per process and gives it units, one after the other:
 
@@ -44,8 +44,11 @@ if TYPE_CHECKING:
     from illumcli.baking.report import BakeReport
     from illumcli.baking.settings import BakeJob
     from illumcli.commands.report import Report
+    from illumcli.gonioreflectometer.estimate import Estimate
+    from illumcli.gonioreflectometer.rows import Instrument
+    from illumcli.gonioreflectometer.work import MeasureRow, MeasureWork
 
-Unit: TypeAlias = "RenderJob | BakeJob"
+Unit: TypeAlias = "RenderJob | BakeJob | MeasureRow"
 
 
 class SharedParts(Record):
@@ -62,6 +65,7 @@ class Worker:
     def __init__(self, images: ImageStore = ImageFiles()) -> None:  # noqa: B008
         self._images = images
         self._scenes: dict[Path, SharedParts] = {}
+        self._instruments: dict[object, Instrument] = {}
         self._speeds = SpeedRecorder()
 
     @cached_property
@@ -78,7 +82,9 @@ class Worker:
     def prepare(self, unit: RenderJob) -> Work: ...
     @overload
     def prepare(self, unit: BakeJob) -> BakeWork: ...
-    def prepare(self, unit: Unit) -> Work | BakeWork:
+    @overload
+    def prepare(self, unit: MeasureRow) -> MeasureWork: ...
+    def prepare(self, unit: Unit) -> Work | BakeWork | MeasureWork:
         """The work of a unit: its description read and checked, and its key, `content`.
 
         Raises
@@ -90,14 +96,9 @@ class Worker:
             shared = self.shared(unit.scene)
             loaded = load(unit.scene, unit.options.overrides, shared.text, unit.frame)
             return replace(work_of(unit, loaded, shared.files), images=self._images)
-        from illumcli.baking.inputs import prepare_bake
+        from illumcli.baking.settings import BakeJob
 
-        work = prepare_bake(unit)
-        if unit.preview is not None:
-            from illumcli.baking.preview import refuse_preview
-
-            refuse_preview(work)
-        return work
+        return _prepared_bake(unit) if isinstance(unit, BakeJob) else unit.prepared(self._instruments)
 
     @overload
     def run(
@@ -105,22 +106,22 @@ class Worker:
     ) -> tuple[list[Path], Report]: ...
     @overload
     def run(self, work: BakeWork, progress: Progress = no_progress) -> tuple[list[Path], BakeReport]: ...
+    @overload
+    def run(self, work: MeasureWork, progress: Progress = no_progress) -> tuple[list[Path], Estimate]: ...
     def run(
-        self, work: Work | BakeWork, progress: Progress = no_progress, following: Work | None = None
-    ) -> tuple[list[Path], Report] | tuple[list[Path], BakeReport]:
+        self,
+        work: Work | BakeWork | MeasureWork,
+        progress: Progress = no_progress,
+        following: Work | None = None,
+    ) -> tuple[list[Path], Report] | tuple[list[Path], BakeReport] | tuple[list[Path], Estimate]:
         """Write the files of a unit that do not exist with its content. Returns all its files and the report.
 
         Buffers that the `following` work reads, too, stay in memory.
         """
         if not isinstance(work, Work):
-            from illumcli.baking.bake import bake_prepared
+            from illumcli.baking.inputs import BakeWork
 
-            baked = bake_prepared(work, progress)
-            if work.job.preview is None:
-                return baked
-            from illumcli.baking.preview import with_preview
-
-            return with_preview(work, *baked)
+            return _baked(work, progress) if isinstance(work, BakeWork) else ([], work.run(progress))
         store = self._store if work.job.options.cache else None
         if work.job.options.target_error is not None:
             from illumcli.commands.target import rendered_to_target
@@ -140,3 +141,25 @@ class Worker:
         self._speeds.keep(self._store)
         self._store.finish()
         return (self._store.warning,) if self._store.warning else ()
+
+
+def _prepared_bake(job: BakeJob) -> BakeWork:
+    from illumcli.baking.inputs import prepare_bake
+
+    work = prepare_bake(job)
+    if job.preview is not None:
+        from illumcli.baking.preview import refuse_preview
+
+        refuse_preview(work)
+    return work
+
+
+def _baked(work: BakeWork, progress: Progress) -> tuple[list[Path], BakeReport]:
+    from illumcli.baking.bake import bake_prepared
+
+    baked = bake_prepared(work, progress)
+    if work.job.preview is None:
+        return baked
+    from illumcli.baking.preview import with_preview
+
+    return with_preview(work, *baked)

@@ -9,7 +9,7 @@ import numpy as np
 
 from illumcli.color import luminance
 from illumcli.errors import InputError, LimitError
-from illumcli.geometry.formula import Formula, parse
+from illumcli.formula import Formula, parse
 from illumcli.geometry.triangulate import triangulate
 from illumcli.gonioreflectometer.settings import SurfaceSource
 from illumcli.gonioreflectometer.surface import Surface, height_field, refuse_gaps

@@ -96,9 +96,9 @@ class Worker:
             shared = self.shared(unit.scene)
             loaded = load(unit.scene, unit.options.overrides, shared.text, unit.frame)
             return replace(work_of(unit, loaded, shared.files), images=self._images)
-        from illumcli.baking.settings import BakeJob
+        from illumcli.commands.other_units import prepared
 
-        return _prepared_bake(unit) if isinstance(unit, BakeJob) else unit.prepared(self._instruments)
+        return prepared(unit, self._instruments)
 
     @overload
     def run(
@@ -119,9 +119,9 @@ class Worker:
         Buffers that the `following` work reads, too, stay in memory.
         """
         if not isinstance(work, Work):
-            from illumcli.baking.inputs import BakeWork
+            from illumcli.commands.other_units import done
 
-            return _baked(work, progress) if isinstance(work, BakeWork) else ([], work.run(progress))
+            return done(work, progress)
         store = self._store if work.job.options.cache else None
         if work.job.options.target_error is not None:
             from illumcli.commands.target import rendered_to_target
@@ -141,25 +141,3 @@ class Worker:
         self._speeds.keep(self._store)
         self._store.finish()
         return (self._store.warning,) if self._store.warning else ()
-
-
-def _prepared_bake(job: BakeJob) -> BakeWork:
-    from illumcli.baking.inputs import prepare_bake
-
-    work = prepare_bake(job)
-    if job.preview is not None:
-        from illumcli.baking.preview import refuse_preview
-
-        refuse_preview(work)
-    return work
-
-
-def _baked(work: BakeWork, progress: Progress) -> tuple[list[Path], BakeReport]:
-    from illumcli.baking.bake import bake_prepared
-
-    baked = bake_prepared(work, progress)
-    if work.job.preview is None:
-        return baked
-    from illumcli.baking.preview import with_preview
-
-    return with_preview(work, *baked)

@@ -18,6 +18,7 @@ FOLDERS = (
     "cluster",
     "api",
     "commands",
+    "fitting",
     "accuracy baking brdf gonioreflectometer html_report verification",
     "render_graph",
     "cache",
@@ -51,7 +52,8 @@ HOMES = {
     "distributed": ("cluster/",),
     "dask": ("cluster/",),
     "jinja2": ("html_report/",),
-    "matplotlib": ("brdf/", "accuracy/", "images/sheet_drawing.py"),
+    "matplotlib": ("brdf/", "accuracy/", "fitting/figure.py", "images/sheet_drawing.py"),
+    "scipy": ("fitting/",),
 }
 
 
@@ -124,6 +126,14 @@ def test_plan_loads_no_ray_core(root):
     assert not loaded_after(code) & {"embreex", "OpenImageIO"}
 
 
+def test_only_a_fit_loads_scipy(root, tmp_path):
+    command = "from illumcli.cli import illum\ntry:\n    illum({words})\nexcept SystemExit: pass"
+    table = str(root / "scenes" / "satin.csv")
+    for words in (["fit", "--help"], ["models"], ["brdf", "lambert", "--csv", str(tmp_path / "l.csv")]):
+        assert not loaded_after(command.format(words=words)) & {"scipy"}, words
+    assert "scipy" in loaded_after(command.format(words=["fit", table, "--model", "lambert", "-q"]))
+
+
 def test_a_plain_render_loads_no_costs_audits_or_sweeps(tmp_path):
     scene = tmp_path / "s.yaml"
     scene.write_text("version: 1\nobjects: [{mesh: {shape: box}}]\nfilm: {width: 8, height: 6, samples: 1}\n")
@@ -134,6 +144,7 @@ try:
 except SystemExit as end:
     assert end.code == 0
 late = ("illumcli.render_graph.costs", "illumcli.accuracy", "illumcli.html_report", "illumcli.scene.variants")
+late += ("scipy", "illumcli.fitting")
 late += tuple(f"illumcli.commands.{{name}}" for name in ("bands", "merge", "plan", "sharding", "sweep"))
 loaded = [name for name in sys.modules if name.startswith((*late, "OpenImageIO"))]
 assert not loaded, loaded

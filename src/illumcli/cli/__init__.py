@@ -36,6 +36,7 @@ COMMANDS = {
     "models": "List models, their parameters, ranges, formulas, sources.",
     "brdf": "Draw models: polar slices, a lit sphere and floor, lobes.",
     "measure": "Measure the BRDF of a surface with real bumps.",
+    "fit": "Fit models to a measured BRDF; print materials.",
     "cache": "List, verify and prune the cache.",
     "schema": "Print the JSON schema of scenes.",
 }

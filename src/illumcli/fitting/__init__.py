@@ -1,0 +1,1 @@
+"""Fit the parameters of illumination models to measured BRDFs."""

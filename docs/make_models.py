@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 from illumcli.commands.models import CLAIMS, page
-from illumcli.schema.families import member, tags
+from illumcli.schema.families import member
+from illumcli.schema.sources import tags
 
 PAGE = Path(__file__).with_name("models.md")
 PACKAGE = "illumcli.models"

@@ -30,6 +30,17 @@ def commands(page: Path) -> list[str]:
     return [line for line in lines if line.startswith(("illum ", "for "))]
 
 
+FILE = re.compile(r"^`([\w./-]+)`\n\n```(?:yaml|python|toml)\n(.*?)^```", re.M | re.S)
+"""A file that a page shows in full, below its name."""
+
+
+def place_files(page: Path, folder: Path) -> None:
+    """Write the files that a page shows."""
+    for name, text in FILE.findall(page.read_text()):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder as a reader of the pages has it: the scenes, a mesh and a measurement of their own."""
@@ -42,6 +53,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_runs(page, folder):
+    place_files(page, folder)
     for line in commands(page):
         small = re.sub(r"\billum (render|sweep)\b", rf"illum \1 {SMALL}", line)
         command = ["bash", "-ec", f'illum() {{ {shlex.quote(sys.executable)} -m illumcli "$@"; }}; {small}']

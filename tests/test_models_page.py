@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import runpy
 
-from illumcli.schema.families import tags
+from illumcli.schema.sources import tags
 
 
 def test_the_page_is_up_to_date(root):

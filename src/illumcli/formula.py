@@ -83,6 +83,8 @@ class Formula(Value):
     text: str
     variables: tuple[str, ...]
     tree: ast.expr
+    names: frozenset[str]
+    """The variables that occur in it."""
 
     def value(self, *values: ArrayLike) -> NDArray[np.float64]:
         """The formula at the values of its variables, float64 in their common shape.
@@ -140,7 +142,8 @@ def parse(text: str, variables: tuple[str, ...]) -> Formula:
     except (RecursionError, MemoryError):
         raise ValueError("formula is nested too deeply") from None
     _check(tree, variables, indent, 1)
-    return Formula(text, variables, tree)
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return Formula(text, variables, tree, frozenset(names.intersection(variables)))
 
 
 def checked(text: str, variables: tuple[str, ...]) -> str:
@@ -155,6 +158,14 @@ def _full(values: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.flo
 
 def _refusal(place: int, fact: str) -> ValueError:
     return ValueError(f"position {place + 1}: {fact}")
+
+
+def _advice(name: str, known: tuple[str, ...]) -> str:
+    """The known name that is most similar, or all."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
 
 
 def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) -> None:
@@ -173,8 +184,8 @@ def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) 
             parts = []
         case ast.Name(id=name):
             if name not in variables and name not in CONSTANTS:
-                known = ", ".join((*variables, *CONSTANTS))
-                raise _refusal(place, f"unknown name '{name}'; there are: {known}")
+                known = (*variables, *CONSTANTS)
+                raise _refusal(place, f"unknown name '{name}'; {_advice(name, known)}")
             parts = []
         case ast.UnaryOp() if type(node.op) in _UNARY:
             parts = [node.operand]

@@ -52,7 +52,10 @@ def short_name(function: Callable[..., Any]) -> str:
 
 
 def required(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Names of the parameters that have no default and are not bound yet."""
+    """Names of the parameters that have no default and are not bound yet; of a record with `needs`, these."""
+    if isinstance(function, Value):
+        needs: tuple[str, ...] = function.needs
+        return needs
     if isinstance(function, partial):
         bound, inner = set(function.keywords), required(function.func)
         return tuple(name for name in inner[len(function.args) :] if name not in bound)

@@ -7,7 +7,8 @@ import pytest
 from illumcli.commands.models import page, table
 from illumcli.errors import InputError
 from illumcli.schema.docs import field_docs
-from illumcli.schema.families import members, tag_of, tags
+from illumcli.schema.families import members, tag_of
+from illumcli.schema.sources import tags
 
 MODELS = members("illumcli.models")
 

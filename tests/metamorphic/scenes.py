@@ -170,6 +170,11 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
     "blinn_phong": lambda r: _lobe(r) | {"normalised": r.random() < 0.3},
     "burley": lambda r: {"diffuse": color(r), "roughness": number(r, 0, 1)},
     "cook_torrance": _cook_torrance,
+    "formula": lambda r: {
+        "parameters": {"kd": color(r), "m": number(r, 1, 9)},
+        "response": r.choice(["n_l * (kd / pi + (1 - n_v)**m)", "kd * n_l * n_h**m"]),
+        "specular": r.choice([None, "kd * max(0, 1 - gap_rv)**m"]),
+    },
     "kajiya_kay": _lobe,
     "lafortune": lambda r: _lobe(r) | {"cx": number(r, -1, -0.5), "cy": number(r, -1, -0.5)},
     "lambert": lambda r: {"diffuse": color(r)},

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from illumcli.scene.spec import Scene
-from illumcli.schema.families import tags
+from illumcli.schema.sources import tags
 from metamorphic import of_bakes, of_light, of_meshes, of_motions, of_objects, of_runs, of_visibility
 from metamorphic.pictures import Studio
 from metamorphic.relation import Relation

@@ -14,19 +14,32 @@ from hypothesis import strategies as st
 from numpy.polynomial.legendre import leggauss
 
 import rgl_files
-from illumcli.arrays import column_major, cross, dot, unit
+from illumcli.arrays import column_major, cross, dot
 from illumcli.commands.schema_generator import schema_of
 from illumcli.measured_files import merl
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
-from illumcli.schema.description import nested
-from illumcli.schema.families import member, members, tags
+from illumcli.schema.description import nested, parts_of
+from illumcli.schema.families import member, members
+from illumcli.schema.sources import tags
 from illumcli.shading.batches import batches
 from illumcli.shading.terms import evaluate, given_terms
+from illumcli.verification.claims import directions, turned
 
 MODELS = members("illumcli.models")
+WHOLE = [Model for Model in MODELS if not any(each.is_required() for each in Model.model_fields.values())]
+"""Models whose parameters all have defaults: neither measurements nor formulas."""
+FORMULAS = (
+    "n_l * kd / (pi + m)",
+    "n_l * (kd / pi + (1 - n_v)**m)",
+    "kd * max(0, 1 - gap_rv)**m",
+    "n_l * kd * exp(-sin2_h / n_h**2 / (m*m + 0.01)) + abs(t_l) * m",
+    "1 / (n_v - 0.5) * kd + log(m - 1)",
+)
 CLAIMS = ("reciprocal", "conserving", "isotropic", "physical")
+NOT_DRAWN = ("emission", "ambient", "claims")
 seeds = st.integers(0, 2**32 - 1)
+colors = st.tuples(*[st.floats(0, 1)] * 3)
 
 every_model = pytest.mark.parametrize("Model", MODELS, ids=lambda Model: Model.__name__)
 
@@ -68,9 +81,11 @@ def _object(schema, defs, choices, gentle):
     fields = {
         name: st.builds(lambda: MEASURED[tag])
         if name == "file"
+        else st.fixed_dictionaries({"kd": colors, "m": st.floats(0, 20)})
+        if name == "parameters"
         else _field(name, field, defs, choices, gentle)
         for name, field in schema["properties"].items()
-        if name not in ("emission", "ambient")
+        if name not in NOT_DRAWN
     }
     return st.fixed_dictionaries(fields)
 
@@ -94,6 +109,8 @@ def _field(name, field, defs, choices, gentle):
         return value(field["oneOf"][0])
     if "enum" in field:
         return st.sampled_from(field["enum"]) if choices else st.just(field["default"])
+    if field["type"] == "string":
+        return st.sampled_from(FORMULAS)
     if field["type"] == "boolean":
         return st.booleans() if choices else st.just(field["default"])
     if field["type"] == "array" and "minItems" not in field:  # a list of parts
@@ -114,46 +131,6 @@ def _number(name, field, gentle):
     middle = st.floats(low, min(high, 10.0 + low), exclude_min=open_low)
     sharp = st.sampled_from([x for x in (1e-3, 0.999, 1e3, 1e6) if low < x < high] or ends)
     return middle if gentle else st.one_of(middle, sharp, st.sampled_from(ends))
-
-
-def directions(seed, count, dtype=np.float64, least=0.0):
-    """`count` vectors with n.l > 0: general ones, grazing, mirrored, retro-reflected, below.
-
-    With `least` > 0, light and eye are at least that cosine above the surface.
-    """
-    random = np.random.default_rng(seed)
-    n = unit(column_major(random.normal(size=(count, 3))))
-    t = unit(cross(n, unit(column_major(random.normal(size=(count, 3))))))
-    b = cross(n, t)
-
-    def above():
-        height = (
-            random.random(count) if least else random.choice([1e-7, 1e-4, 1.0], count) * random.random(count)
-        )
-        height = least + (1 - least) * height
-        turn = random.random(count) * 2 * np.pi
-        level = np.sqrt((1 - height) * (1 + height))
-        return column_major(
-            height[:, None] * n + (level * np.cos(turn))[:, None] * t + (level * np.sin(turn))[:, None] * b
-        )
-
-    l, v = above(), above()
-    kind = random.integers(0, 6, count)
-    mirrored = 2 * dot(n, l)[:, None] * n - l
-    v[kind == 1] = mirrored[kind == 1]
-    v[kind == 2] = (
-        unit(mirrored + 1e-3 * random.normal(size=(count, 3)))[kind == 2] if not least else v[kind == 2]
-    )
-    v[kind == 3] = l[kind == 3]
-    if not least:
-        v[kind == 4] -= (1.5 * dot(n, v))[kind == 4][:, None] * n[kind == 4]
-        v[kind == 5] = n[kind == 5]
-        v = unit(v)
-    given = {"n": n, "t": t, "l": l, "v": v}
-    given = {name: column_major(value.astype(dtype)) for name, value in given.items()}
-    lit = dot(given["n"], given["l"]) > 0
-    given = {name: column_major(value[lit]) for name, value in given.items()}
-    return given | {"light": np.array([1, 0.5, 0.25], dtype)}
 
 
 def response(model, given):
@@ -306,8 +283,8 @@ def numbers(model, other):
 def varied(part, count, prefix=""):
     """Path -> one value per element, for every parameter that may vary over the surface."""
     found = {}
-    for name, value in part:
-        if isinstance(value, float | tuple) and may_vary(type(part), name):
+    for name, value in parts_of(part):
+        if isinstance(value, float | tuple) and (isinstance(part, dict) or may_vary(type(part), name)):
             found[prefix + name] = (
                 column_major(np.tile(value, (count, 1)))
                 if isinstance(value, tuple)
@@ -318,9 +295,7 @@ def varied(part, count, prefix=""):
     return found
 
 
-@pytest.mark.parametrize(
-    "Model", [Model for Model in MODELS if "file" not in Model.model_fields], ids=lambda Model: Model.__name__
-)
+@pytest.mark.parametrize("Model", WHOLE, ids=lambda Model: Model.__name__)
 def test_single_precision_follows_double(Model):
     given = directions(1, 5000, np.float32, least=0.02)
     single = response(Model(), given)
@@ -372,17 +347,6 @@ def albedo(model, cosine, turn=0.0):
     return area @ response(model, given)
 
 
-def turned(given, angle):
-    """Light and eye turned about the normal."""
-    n = given["n"]
-
-    def turn(w):
-        along = dot(n, w)[:, None] * n
-        return column_major(along + np.cos(angle) * (w - along) + np.sin(angle) * cross(n, w))
-
-    return given | {"l": turn(given["l"]), "v": turn(given["v"])}
-
-
 @pytest.mark.parametrize(
     "Model",
     [Model for Model in MODELS if Model.isotropic and "file" not in Model.model_fields],  # tables jump
@@ -397,7 +361,9 @@ def test_turning_the_surface_changes_nothing(Model, data, seed, angle):
     np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9 * one.max(initial=1e-300))
 
 
-@claiming("isotropic", False)
+@pytest.mark.parametrize(
+    "Model", [Model for Model in WHOLE if not Model.isotropic], ids=lambda Model: Model.__name__
+)
 def test_turning_the_grain_changes_something(Model):
     model = Model() if Model().has_grain() else Model(anisotropic=0.8)
     assert "t" in given_terms(model.lobes())
@@ -450,6 +416,7 @@ def test_every_parameter_says_what_it_means(name):
                 "D",
                 "F",
                 "surface_color",
+                "formula",
                 "scales",
             ):
                 assert isinstance(following, ast.Expr), f"{cls.name}.{field.target.id}"

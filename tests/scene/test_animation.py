@@ -92,7 +92,7 @@ def test_faults_of_curves_stand_beside_all_others(scene):
     assert len(told) == 3
     assert "materials.clay.diffuse.curve: no curve 'linea'; did you mean 'linear'?" in told[0]
     assert "no model 'cook_torance'" in told[1]
-    assert "lights.0.position.0.value: position 3: unknown name 'tim'; there are: frame, time" in told[2]
+    assert "lights.0.position.0.value: position 3: unknown name 'tim'; did you mean 'time'?" in told[2]
 
 
 def test_a_curve_needs_frames(scene):

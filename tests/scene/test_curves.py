@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from illumcli.scene.curves import CURVES
 from illumcli.scene.frames import Moment
-from illumcli.schema.families import member, tags
+from illumcli.schema.families import member
+from illumcli.schema.sources import tags
 
 
 def curve(kind, **fields):

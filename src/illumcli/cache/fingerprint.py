@@ -17,6 +17,7 @@ from types import FunctionType
 from illumcli.errors import InputError
 from illumcli.graph import short_name
 from illumcli.records import Value
+from illumcli.schema.foreign import source_digest
 
 
 def fingerprint(value: object) -> str:
@@ -48,6 +49,8 @@ def fingerprint(value: object) -> str:
         named = {part.name: getattr(value, part.name) for part in fields(value) if part.repr}
     elif isinstance(value, Iterable) and type(value).__module__.startswith("illumcli."):
         named = dict(value)  # descriptions list their fields
+    elif isinstance(value, Iterable) and (sources := source_digest(type(value))):
+        named = {"sources of its class": sources, **dict(value)}
     else:
         raise TypeError(f"{type(value).__name__} has no fingerprint")
     return type(value).__name__ + fingerprint(named)

@@ -44,10 +44,9 @@ def _samplers() -> Iterable[str]:
 
 
 def _falloffs() -> Iterable[str]:
-    from illumcli import visibility
-    from illumcli.schema.modules import modules
+    from illumcli.schema.sources import tags
 
-    return modules(f"{folder}/falloffs" for folder in visibility.__path__)
+    return tags("illumcli.visibility.falloffs")
 
 
 SAMPLER = _Names(_samplers)
@@ -61,7 +60,8 @@ scenes_argument = click.argument("scenes", metavar="SCENE...", type=SCENE, nargs
 
 
 def overrides_option(command: C) -> C:
-    """Adds `-D` as the parameter `overrides`, and `--allow`, which reaches `load` by the environment."""
+    """Adds `-D` as the parameter `overrides`, and `--allow` and `--models`, which reach `load` by the
+    environment."""
     replaced = click.option(
         "-D",
         "overrides",
@@ -69,13 +69,18 @@ def overrides_option(command: C) -> C:
         metavar="PATH=VALUE",
         help="Replace a value of the scene, as in -D film.samples=16; the value is YAML.",
     )
-    return replaced(allow_option(command))
+    return replaced(allow_option(models_option(command)))
+
+
+def _add_to(variable: str, folders: Iterable[str]) -> None:
+    """Add folders to those of an environment variable, which workers inherit."""
+    given = [os.environ[variable]] if os.environ.get(variable) else []
+    os.environ[variable] = os.pathsep.join(dict.fromkeys([*given, *folders]))
 
 
 def _allow(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> None:
     if folders:
-        given = [os.environ["ILLUM_ALLOW"]] if os.environ.get("ILLUM_ALLOW") else []
-        os.environ["ILLUM_ALLOW"] = os.pathsep.join([*given, *folders])
+        _add_to("ILLUM_ALLOW", folders)
 
 
 allow_option = click.option(
@@ -86,6 +91,23 @@ allow_option = click.option(
     type=click.Path(exists=True, file_okay=False),
     metavar="DIR",
     help="Let scenes read files and write images below DIR, too (also: ILLUM_ALLOW).",
+)
+
+
+def _models(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> None:
+    if folders:
+        _add_to("ILLUM_MODELS", map(os.path.abspath, folders))
+
+
+models_option = click.option(
+    "--models",
+    "folders_of_models",
+    multiple=True,
+    expose_value=False,
+    callback=_models,
+    type=click.Path(exists=True, file_okay=False),
+    metavar="DIR",
+    help="Run the Python files of DIR, each an illumination model (also: ILLUM_MODELS).",
 )
 
 

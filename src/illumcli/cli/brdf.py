@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import FILE, force_option, quiet_option
+from illumcli.cli._options import FILE, force_option, models_option, quiet_option
 from illumcli.cli._printing import print_paths, say_kept
 
 _EPILOG = """\b
@@ -52,6 +52,7 @@ Examples:
 )
 @click.option("--log", is_flag=True, help="Slices and lobes on a logarithmic scale, four decades.")
 @click.option("--times-cos", is_flag=True, help="The response, cosine included, instead of the BRDF.")
+@models_option
 @force_option("Replace files that differ.")
 @quiet_option
 def brdf(

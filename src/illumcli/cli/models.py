@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import click
 
-from illumcli.cli._options import json_option
+from illumcli.cli._options import json_option, models_option
 
 
 @click.command()
 @click.argument("name", required=False)
+@models_option
 @json_option
 def models(name: str | None, as_json: bool) -> None:
     """Print the illumination models, or all about the model NAME.

@@ -10,6 +10,7 @@ import click
 from illumcli.cli._options import (
     allow_option,
     gathered,
+    models_option,
     no_cache_option,
     only_option,
     pattern_option,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @scene_argument
 @variants_options
 @allow_option
+@models_option
 @pattern_option
 @only_option
 @threads_option

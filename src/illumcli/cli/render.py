@@ -159,6 +159,9 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
         say_kept(report.kept)
         for line in repair_lines(report.repairs, verbose):
             say_once(f"{done.scene}: {line}")
+        for name, count in report.mended.items():
+            fact = f"{count} values of its model were negative or not finite, and are 0"
+            say_once(f"{done.scene}: material {name}: {fact}; see illum verify {done.scene}")
         for camera, error in report.audited_error.items():
             interval = f"(95 %: {error['low']:.3g} to {error['high']:.3g})"
             say(f"{done.scene}: RMSE of {error['layer']} of {camera}: {error['rmse']:.3g} {interval}")

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import click
 
+from illumcli.cli._options import models_option
+
 
 @click.command()
+@models_option
 def schema() -> None:
     """Print the JSON schema of scene files.
 

@@ -17,6 +17,7 @@ from illumcli.cli._options import (
     html_option,
     json_results_option,
     keep_going_option,
+    models_option,
     no_cache_option,
     only_option,
     pattern_option,
@@ -81,6 +82,7 @@ def _files(options: dict[str, Any]) -> SweepFiles:
 @no_cache_option
 @shard_option
 @allow_option
+@models_option
 @quiet_option
 @verbose_option
 @gathered("files", _files)

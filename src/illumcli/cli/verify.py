@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from illumcli.cli._options import FILE, json_option
+from illumcli.cli._options import FILE, json_option, models_option
 
 _EPILOG = """\b
 Examples:
@@ -14,6 +14,8 @@ Examples:
   illum verify --only phong --only cook_torrance
   illum verify --precision single
   illum verify my_vectors.json --json
+  illum verify scene.yaml --only velvet
+  illum verify --models my_models --only fuzz
 """
 
 
@@ -26,10 +28,17 @@ Examples:
     show_default=True,
     help="`single` runs the formulas in float32 and reports where digits are lost, with the cause.",
 )
-@click.option("--only", multiple=True, metavar="TYPE", help="Only cases of this type; may be repeated.")
+@click.option(
+    "--only",
+    multiple=True,
+    metavar="TYPE",
+    help="Only this case type, model or material; may be repeated.",
+)
+@models_option
 @json_option
 def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bool) -> None:
-    """Check the renderer's formulas against the vectors in FILE (.json, .json.xz or .json.gz).
+    """Check the renderer's formulas against the vectors in FILE (.json, .json.xz or .json.gz), and the claims
+    of illumination models, or those of the materials of a scene (FILE.yaml), at random directions.
 
     By default the vectors of the package, computed with 50 digits. A case passes if its largest deviation is
     at most atol + rtol * the largest expected value, with its own atol and rtol. Obscurance is estimated by
@@ -40,8 +49,14 @@ def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bo
     tolerance    what the worst case allows
     used         largest share of its own tolerance that any case of the type needs
 
-    Exit status: 0 all within tolerance, 3 some case beyond it, 2 when FILE is malformed or holds a case type
-    that is not known. `--precision single` judges nothing.
+    \b
+    light        no value is negative or not finite; worst is the share that is
+    reciprocal   light and eye may change places; worst relative difference
+    isotropic    turning the surface about its normal changes nothing
+    conserving   no more light leaves than arrives; worst is the largest reflected share
+
+    Exit status: 0 all within tolerance, 3 some case beyond it or a claim that does not hold, 2 when FILE is
+    malformed or holds a case type that is not known. `--precision single` judges nothing.
     """
     import json
 
@@ -52,6 +67,15 @@ def verify(file: Path | None, precision: str, only: tuple[str, ...], as_json: bo
         single = job.verify_single(file, only)
         click.echo(json.dumps(job.single_data(single), indent=2) if as_json else job.single_table(single))
         return
-    results = job.verify(file, only)
-    click.echo(json.dumps(job.as_data(results), indent=2) if as_json else job.as_table(results))
-    job.refuse_failures(results)
+    is_scene = file.suffix.lower() in (".yaml", ".yml")
+    results = [] if is_scene else job.verify(file, only)
+    if is_scene:
+        claims = job.verify_materials(file, only)
+    else:
+        claims = job.verify_claims(only) if file == job.PACKAGED else []
+    if as_json:
+        click.echo(json.dumps(job.as_data(results, claims), indent=2))
+    else:
+        tables = [job.as_table(results)] if results else []
+        click.echo("\n\n".join([*tables, *([job.claims_table(claims)] if claims else [])]))
+    job.refuse_failures(results, claims)

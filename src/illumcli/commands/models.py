@@ -10,15 +10,10 @@ from typing import Any
 
 from illumcli.commands.schema_generator import schema_of
 from illumcli.errors import InputError
+from illumcli.models._base import CLAIMS
 from illumcli.schema.families import member, members, tag_of
 
 PACKAGE = "illumcli.models"
-CLAIMS = {
-    "physical": "a BRDF times the cosine",
-    "reciprocal": "light and eye may change places",
-    "conserving": "no more light leaves than arrives",
-    "isotropic": "turning the surface about its normal changes nothing",
-}
 SHARED = ("emission", "ambient")  # what every model has
 
 
@@ -117,6 +112,11 @@ def allowed(field: Mapping[str, Any]) -> str:
         return " | ".join(map(str, field["enum"]))
     if field["type"] == "array" and "$ref" in field["items"]:
         return "a list of mappings"
+    if "patternProperties" in field:
+        (value,) = field["patternProperties"].values()
+        return f"names with values: {allowed(value)}"
+    if field["type"] == "array" and "enum" in field["items"]:
+        return f"list of {allowed(field['items'])}"
     if field["type"] == "array":
         return f"colour, {_range(field['items'])}"
     if field["type"] == "number":
@@ -131,6 +131,8 @@ def _range(number: Mapping[str, Any]) -> str:
 
 
 def _default(field: Mapping[str, Any]) -> str:
+    if "patternProperties" in field:
+        return "by default none"
     if "default" not in field:
         return "required"
     default = field["default"]

@@ -48,6 +48,8 @@ class Report(Value):
     """Object -> the file that its obscurance is read from: it cast no obscurance rays."""
     warnings: tuple[str, ...] = ()
     clamped: int = 0
+    mended: Mapping[str, int] = field(default_factory=dict)
+    """Material -> values that its formula or class gave as negative or not finite, and that are 0."""
     error: Mapping[str, float] = field(default_factory=dict)
     """The target error, the error reached, and the sample counts; empty without a target."""
     chosen: tuple[str, ...] = ()
@@ -79,6 +81,7 @@ class Report(Value):
             rays=dict(stats.rays),
             saved=dict(stats.saved),
             refined=stats.refined,
+            mended=dict(stats.mended),
             ray_loop=ray_loop_name() if any(stats.rays.values()) else None,
         )
 
@@ -102,7 +105,7 @@ class Report(Value):
         def union(name: str) -> dict[str, Any]:
             return {key: value for report in reports for key, value in getattr(report, name).items()}
 
-        combined: dict[str, Any] = {name: total(name) for name in ("seconds", "rays", "saved")}
+        combined: dict[str, Any] = {name: total(name) for name in ("seconds", "rays", "saved", "mended")}
         combined |= {name: union(name) for name in ("repairs", "reused", "standard_error", "audited_error")}
         return replace(
             reports[-1],

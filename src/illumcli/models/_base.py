@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from illumcli.models._parameters import Texture, Varying, VertexValues
-from illumcli.schema.description import Description, nested
+from illumcli.schema.description import Description, nested, parts_of
 from illumcli.schema.fields import Color
 
 Lobe = Callable[..., Any]
-D = TypeVar("D", bound=Description)
+CLAIMS = {
+    "physical": "a BRDF times the cosine",
+    "reciprocal": "light and eye may change places",
+    "conserving": "no more light leaves than arrives",
+    "isotropic": "turning the surface about its normal changes nothing",
+}
+"""What models may claim, and what it means."""
+LOBES = ("diffuse_lobe", "specular_lobe")
+"""The methods that are lobes."""
 
 
 class IlluminationModel(Description):
@@ -40,7 +48,8 @@ class IlluminationModel(Description):
         "diffuse_lobe": ("diffuse",),
         "specular_lobe": ("specular",),
     }
-    """For each lobe, the parameters that are its factors: if one is 0, the lobe is not evaluated."""
+    """For each lobe, the parameters that are its factors, if the model has them: if one is 0, the lobe is not
+    evaluated."""
     reciprocal: ClassVar[bool] = False
     """Claim: response / n_l does not change if light and eye are exchanged."""
     conserving: ClassVar[bool] = False
@@ -51,14 +60,31 @@ class IlluminationModel(Description):
     """True if the response is a BRDF times the cosine; False for intensity models, which have no
     radiometric units."""
 
+    @classmethod
+    def faults_of_class(cls) -> list[str]:
+        """What keeps a class of somebody else from being a model."""
+        scales = [name for names in vars(cls).get("scales", {}).values() for name in names]
+        faults = [
+            f"class {cls.__name__}: scales name '{name}', which is no parameter"
+            for name in scales
+            if name not in cls.model_fields
+        ]
+        if cls.lobes is IlluminationModel.lobes and not any(hasattr(cls, method) for method in LOBES):
+            faults.append(f"class {cls.__name__} has no lobe; define {' or '.join(LOBES)}")
+        return faults
+
     def lobes(self) -> dict[str, Lobe]:
         """The lobes by name (`diffuse`, `specular`), without those that a parameter makes black."""
         return {
             method.removesuffix("_lobe"): getattr(self, method)
-            for method in ("diffuse_lobe", "specular_lobe")
+            for method in LOBES
             if hasattr(self, method)
             and not any(self._is_always(name, 0) for name in self.scales.get(method, ()))
         }
+
+    def claimed(self) -> frozenset[str]:
+        """The claims that hold for this material."""
+        return frozenset(name for name in CLAIMS if getattr(self, name))
 
     def ambient_color(self) -> Any:
         """k_a: the field `ambient`, or what the model reflects diffusely."""
@@ -84,11 +110,12 @@ class IlluminationModel(Description):
         values : mapping
             Path, as in `varying` -> (N,) numbers or (N, 3) colours, one per point.
         """
-        return _replace_parameters(self, values)
+        replaced: Self = _replace_parameters(self, values)
+        return replaced
 
     def _is_always(self, name: str, number: float) -> bool:
-        """True if a parameter has this value everywhere, in all channels."""
-        return is_always(getattr(self, name), number)
+        """True if a parameter has this value everywhere, in all channels; False if the model has none."""
+        return is_always(getattr(self, name, None), number)
 
 
 def is_always(value: Any, number: float) -> bool:
@@ -100,8 +127,10 @@ def is_always(value: Any, number: float) -> bool:
     )
 
 
-def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture | VertexValues]]:
-    for name, value in part:
+def _varying(
+    part: Description | Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Texture | VertexValues]]:
+    for name, value in parts_of(part):
         if isinstance(value, Texture | VertexValues):
             yield prefix + name, value
             continue
@@ -109,7 +138,7 @@ def _varying(part: Description, prefix: str = "") -> Iterator[tuple[str, Texture
             yield from _varying(inner, f"{prefix}{name}{step}.")
 
 
-def _replace_parameters(part: D, values: Mapping[str, Any]) -> D:
+def _replace_parameters(part: Any, values: Mapping[str, Any]) -> Any:
     changes = {path: value for path, value in values.items() if "." not in path}
     for name in {path.partition(".")[0] for path in values if "." in path}:
         whole = getattr(part, name)
@@ -118,7 +147,7 @@ def _replace_parameters(part: D, values: Mapping[str, Any]) -> D:
             for step, each in nested(whole).items()
         }
         changes[name] = inner[""] if "" in inner else tuple(inner.values())
-    return part.model_copy(update=changes)
+    return {**part, **changes} if isinstance(part, Mapping) else part.model_copy(update=changes)
 
 
 def _below(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from illumcli.records import Record
 from illumcli.render_graph.build import READ
 from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.schedule import Plan, uncached_plans
+from illumcli.shading.direct import Lobes
 from illumcli.visibility.object_pixels import FittedPixels
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32; ids are uint32
@@ -45,6 +47,8 @@ class RenderStats:
     adaptive sampling left out; polygons of culled objects."""
     refined: int = 0
     """Pixels that adaptive sampling gave all their samples."""
+    mended: Counter[str] = field(default_factory=Counter)
+    """Material -> values that its model gave as negative or not finite, and that are 0."""
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(
@@ -53,10 +57,12 @@ class RenderStats:
         rays: Mapping[str, int],
         saved: Mapping[str, int] | None = None,
         refined: int = 0,
+        mended: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
         """Add the statistics of a node or tile."""
         with self.lock:
             self.refined += refined
+            self.mended.update(mended)
             for name, value in seconds.items():
                 self.seconds[name] += value
             for name, count in rays.items():
@@ -155,6 +161,7 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
     """Run the nodes of these numbers on the buffers of a tile."""
     buffers, tracer = started.buffers, started.buffers.get("tracer")
     seconds, rays, unlit = {}, {}, {}
+    mended: Counter[str] = Counter()
     plan = started.plan
     if id(plan) not in common.last_use:
         common.last_use[id(plan)] = plan.last_use()
@@ -172,6 +179,8 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
             rays[node.output] = tracer.rays - before
         if isinstance(value, LitPoints):
             unlit[node.output] = value.count - len(value.index)
+        elif isinstance(value, Lobes):
+            mended.update(value.mended)
 
         # Hand it to the cache, and drop the buffers that no later node needs.
         if node.output == FITTED:
@@ -187,7 +196,7 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
         for name in node.inputs.values():
             if last_use.get(name) == number:
                 buffers.pop(name, None)
-    common.stats.add(seconds, rays, unlit)
+    common.stats.add(seconds, rays, unlit, mended=mended)
 
 
 def pixel_layers(plan: Plan, buffers: Buffers, tile: Tile) -> Planes:

@@ -12,8 +12,8 @@ from illumcli.scene import source
 from illumcli.scene.access import file_inside, paths_in
 from illumcli.scene.curves import CURVES
 from illumcli.scene.source import MAX_BYTES, MAX_NODES, Node, Place, Problem
-from illumcli.schema.families import tags
 from illumcli.schema.messages import describe
+from illumcli.schema.sources import has_member
 
 MAX_EXTENDS = 8  # length of a chain of files, each of which extends the next
 MAX_FILES = 64
@@ -113,7 +113,7 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
     """The tag of a mapping, from its keys; a mesh or material that is named like a tag is not text."""
     texts = {key: node.value for key, node in entries.items() if isinstance(node.value, str)}
     kind: dict[str, Any] = {key: value for key, value in texts.items() if key in CHOICES}
-    if "curve" in texts and texts["curve"] in tags(CURVES):
+    if "curve" in texts and has_member(CURVES, texts["curve"]):
         return kind | {"curve": texts["curve"]}
     return kind | {key: True for key in ("file", "texture", "vertex") if key in texts}
 

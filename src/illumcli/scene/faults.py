@@ -10,8 +10,10 @@ from pydantic import Discriminator, ValidationError
 from illumcli.scene.source import Path
 from illumcli.schema.annotations import choices, inside, split
 from illumcli.schema.description import Description
-from illumcli.schema.families import Family, UnknownMember, member, tag_of, tags
+from illumcli.schema.families import Family, UnknownMember, member, tag_of
+from illumcli.schema.foreign import BrokenMember
 from illumcli.schema.messages import no_choice, sentence, short, suggestion, wrong_length
+from illumcli.schema.sources import tags
 
 Fault = tuple[Path, str]  # path of the part, what is wrong with it
 
@@ -132,7 +134,10 @@ def _other_faults(family: Family, mapping: Mapping[str, Any]) -> Iterator[Fault]
         return
     refused: dict[str, list[list[Fault]]] = {key: [] for key in mapping if key != family.tag}
     for tag in tags(family.package):
-        each = member(family.package, tag)
+        try:
+            each = member(family.package, tag)
+        except BrokenMember:
+            continue
         as_this = list(_faults_as(each, family.tag, mapping))
         for key in refused.keys() & each.model_fields:
             refused[key].append([fault for fault in as_this if fault[0][:1] == (key,)])

@@ -12,6 +12,7 @@ from illumcli.scene.faults import Fault, faults
 from illumcli.scene.source import Path
 from illumcli.schema.description import Description
 from illumcli.schema.families import member
+from illumcli.schema.foreign import BrokenMember
 from illumcli.schema.messages import suggestion
 
 
@@ -94,7 +95,7 @@ def _override_faults(material: Any, override: dict[str, Any]) -> Iterator[Fault]
         base = material if isinstance(material, dict) else {"model": "lambert"}
     try:
         model = member("illumcli.models", base["model"])
-    except (LookupError, TypeError):
+    except (LookupError, TypeError, BrokenMember):
         return
     merged = {**base, **override}
     try:

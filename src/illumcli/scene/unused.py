@@ -13,8 +13,7 @@ from illumcli.models._parameters import Texture
 from illumcli.scene.faults import Fault
 from illumcli.scene.source import Path
 from illumcli.scene.spec import MeshFile, Object, Scene
-from illumcli.schema.annotations import field_annotation, number_range
-from illumcli.schema.description import owner_of
+from illumcli.schema.annotations import annotation_at, number_range
 from illumcli.shading.rates import RATES
 
 
@@ -160,6 +159,5 @@ def _object(scene: Scene, number: int, thing: Object, source: Any) -> Iterator[F
 def _colored_by(model: Any) -> Iterator[str]:
     """Paths of the colours of a model that vary by an image."""
     for name, value in model.varying().items():
-        owner, last = owner_of(model, name)
-        if isinstance(value, Texture) and number_range(field_annotation(type(owner), last)).width == 3:
+        if isinstance(value, Texture) and number_range(annotation_at(model, name)).width == 3:
             yield name

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 from pydantic import Discriminator, Tag
 from pydantic.fields import FieldInfo
 
-from illumcli.schema.description import Description
+from illumcli.schema.description import Description, owner_of
 from illumcli.schema.families import Family
 
 
@@ -28,6 +28,16 @@ def field_annotation(cls: type[Description], name: str) -> Any:
     """The annotation of a field with its metadata."""
     info = cls.model_fields[name]
     return Annotated[(info.annotation, *info.metadata)] if info.metadata else info.annotation
+
+
+def annotation_at(description: Description, path: str) -> Any:
+    """The annotation of the value at a path, such as `distribution.m`."""
+    owner, name = owner_of(description, path)
+    if isinstance(owner, Description):
+        return field_annotation(type(owner), name)
+    whole, name = owner_of(description, path.rpartition(".")[0])
+    # a mapping, whose values share an annotation
+    return get_args(split(field_annotation(type(whole), name))[0])[1]
 
 
 def split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -33,9 +33,15 @@ class Description(BaseModel):
     )
 
 
-def nested(value: Any) -> dict[str, Description]:
-    """The descriptions in the value of a field, by the rest of their path: itself, or those of a list."""
-    if isinstance(value, Description):
+def parts_of(part: Description | Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+    """The values of a description, or of a mapping of values by name."""
+    return part.items() if isinstance(part, Mapping) else part
+
+
+def nested(value: Any) -> dict[str, Description | Mapping[str, Any]]:
+    """The descriptions in the value of a field, by the rest of their path: itself, or those of a list; or a
+    mapping of values by name."""
+    if isinstance(value, Description | Mapping):
         return {"": value}
     if isinstance(value, tuple):
         return {f".{i}": part for i, part in enumerate(value) if isinstance(part, Description)}

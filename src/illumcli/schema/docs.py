@@ -12,11 +12,15 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 
+from illumcli.schema.description import Description
+
 
 def field_docs(cls: type) -> dict[str, str]:
     """Field -> its docstring, with inherited fields; fields without a docstring are left out."""
     docs: dict[str, str] = {}
     for base in reversed(cls.__mro__):
+        if not issubclass(base, Description):
+            continue
         docs |= _docs_of_module(base.__module__).get(base.__qualname__, {})
     return docs
 
@@ -38,10 +42,11 @@ def choices(text: str, names: Sequence[str]) -> list[str]:
 
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
-    """Class -> field -> docstring, of a module; empty for modules of other packages."""
-    if not module.startswith("illumcli."):
+    """Class -> field -> docstring, of a module; empty if its source is not there."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:
         return {}
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {each.name: _in_class(each) for each in tree.body if isinstance(each, ast.ClassDef)}
 
 

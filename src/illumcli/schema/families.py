@@ -1,7 +1,8 @@
 """Open families: each module defines one member, and the module's name is its tag.
 
 A scene names tags, and only the modules of these names are imported: the start-up time does not depend on the
-size of a family. Members are not registered in any list.
+size of a family. Members are not registered in any list: they are modules of this package, files in folders
+that the user names, and entry points of other packages (`sources`).
 """
 
 from __future__ import annotations
@@ -14,18 +15,20 @@ from typing import Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, TypeAdapter, ValidationError
 
+from illumcli.errors import InputError
 from illumcli.schema.description import Description
+from illumcli.schema.foreign import BrokenMember, class_in, loaded
 from illumcli.schema.messages import nearest, suggestion
-from illumcli.schema.modules import modules
+from illumcli.schema.sources import entry_points, own_tags, tags
+from illumcli.schema.sources import files as source_files
 
 
 @cache
-def tags(package: str) -> tuple[str, ...]:
-    """The tags of a family, sorted: its modules, without the helpers that begin with an underscore."""
-    return modules(import_module(package).__path__)
+def _own_member(package: str, tag: str) -> type[Any]:
+    module = import_module(f"{package}.{tag}")
+    return class_in(module, module.__name__)
 
 
-@cache
 def member(package: str, tag: str) -> type[Any]:
     """The one class that the module of this name defines.
 
@@ -33,18 +36,18 @@ def member(package: str, tag: str) -> type[Any]:
     ------
     LookupError
         No such module; the text suggests the nearest tag.
+    InputError
+        A folder that the user names has a member with the tag of another.
+    BrokenMember
+        The module is not ours, and cannot be used.
     """
-    if tag not in tags(package):
+    files = source_files(package)
+    if tag in own_tags(package):
+        return _own_member(package, tag)
+    source = files.get(tag) or entry_points(package).get(tag)
+    if source is None:
         raise LookupError(suggestion(tag, tags(package)))
-    module = import_module(f"{package}.{tag}")
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, Description)
-    ]
-    if len(classes) != 1:
-        raise TypeError(f"{module.__name__} must define one class, defines {len(classes)}")
-    return classes[0]
+    return loaded(package, tag, source)
 
 
 def tag_of(cls: type[Any]) -> str:
@@ -53,8 +56,23 @@ def tag_of(cls: type[Any]) -> str:
 
 
 def members(package: str) -> tuple[type[Any], ...]:
-    """Every class of a family, by tag."""
-    return tuple(member(package, tag) for tag in tags(package))
+    """Every class of a family, by tag.
+
+    Raises
+    ------
+    InputError
+        What is wrong with all modules that cannot be used.
+    """
+    found: list[type[Any]] = []
+    problems: list[str] = []
+    for tag in tags(package):
+        try:
+            found.append(member(package, tag))
+        except BrokenMember as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -83,6 +101,8 @@ class Family:
             raise ValueError(f"must name its {self.tag}: {', '.join(tags(self.package))}")
         try:
             chosen = member(self.package, name)
+        except BrokenMember as error:
+            raise ValueError("; ".join(error.problems)) from error
         except LookupError as error:
             unknown = UnknownMember(f"no {self.tag} '{name}'; {error}", self)
             raise ValidationError.from_exception_data(
@@ -95,7 +115,10 @@ class Family:
         """The member that a mapping names or most likely means; None if there is none."""
         name = value.get(self.tag) if isinstance(value, dict) else None
         near = nearest(name, tags(self.package)) if isinstance(name, str) else None
-        return member(self.package, near) if near else None
+        try:
+            return member(self.package, near) if near else None
+        except BrokenMember:
+            return None
 
 
 class UnknownMember(ValueError):

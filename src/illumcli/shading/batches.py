@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from illumcli.arrays import Ids, take_rows
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
 from illumcli.records import Record
-from illumcli.schema.description import Description, nested
+from illumcli.schema.description import Description, nested, parts_of
 
 Constant: TypeAlias = float | tuple[float, ...]
 NOT_OF_LOBES = ("emission", "ambient")
@@ -75,16 +75,18 @@ def batches(models: Sequence[IlluminationModel]) -> Batches:
     return Batches(tuple(every), batch, row)
 
 
-def _parts(part: Description, constants: dict[str, Constant], prefix: str = "") -> Iterator[object]:
+def _parts(
+    part: Description | Mapping[str, Any], constants: dict[str, Constant], prefix: str = ""
+) -> Iterator[object]:
     """What materials of a batch have in common; adds the numbers and colours of lobes to `constants`."""
-    for name, value in part:
+    for name, value in parts_of(part):
         path = prefix + name
         if path in NOT_OF_LOBES:
             continue
         if inner := nested(value):
             for step, each in inner.items():
                 yield from _parts(each, constants, f"{path}{step}.")
-        elif value is not None and may_vary(type(part), name):
+        elif value is not None and (isinstance(part, Mapping) or may_vary(type(part), name)):
             constants[path] = value
             yield path
         else:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,13 @@ def take_group(values: NDArray[Any], index: Ids | slice) -> NDArray[Any]:
     return values if isinstance(index, slice) else take_rows(values, index)
 
 
+class Lobes(dict[str, Vectors]):
+    """The response lobe by lobe."""
+
+    mended: Mapping[str, int] = MappingProxyType({})
+    """Material -> number of values that its model gave as negative or not finite, and that are 0."""
+
+
 def direct(
     color: tuple[float, float, float],
     materials: PointMaterials,
@@ -46,7 +55,7 @@ def direct(
     incident: LitPoints,
     v: Vectors | None = None,
     t: Vectors | None = None,
-) -> dict[str, Vectors]:
+) -> Lobes:
     """The response to one light at the M samples, lobe by lobe, without shadows.
 
     Parameters
@@ -58,13 +67,15 @@ def direct(
 
     Returns
     -------
-    dict
+    Lobes
         `diffuse` and `specular`, (M, 3) float32, only lobes that some material has.
     """
     known = {"n": points.n, "v": v, "t": t}
     given = {term: values for term, values in known.items() if values is not None}
     at_points = response(materials, incident, color, given)
-    return {name: points.to_samples(value) for name, value in at_points.items()}
+    of_samples = Lobes((name, points.to_samples(value)) for name, value in at_points.items())
+    of_samples.mended = at_points.mended
+    return of_samples
 
 
 def response(
@@ -72,7 +83,7 @@ def response(
     incident: LitPoints,
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
-) -> dict[str, Vectors]:
+) -> Lobes:
     """Radiance towards the eye at every point, lobe by lobe, without shadows.
 
     Models are evaluated at lit points only, and materials without lobes nowhere.
@@ -84,7 +95,7 @@ def response(
 
     Returns
     -------
-    dict
+    Lobes
         `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
     """
     models, lobes = materials.materials.models, materials.materials.lobes
@@ -96,6 +107,7 @@ def response(
     by_material = {name: np.zeros((3, count + 1), F) for name in names}
     column = np.full(incident.count, count, np.intp)  # of each point
     light = np.asarray(color, F)
+    out, mended = Lobes(), Counter[str]()
     first = 0
     material = take_or_all(materials.number, incident.index)
     batch = material if len(batches.every) == len(models) else batches.batch.take(material)
@@ -121,15 +133,20 @@ def response(
         # Response times irradiance.
         irradiance = light[:, None] * take_group(incident.irradiance_scale, group)
         last = first + len(points)
-        for name, value in evaluate(own_lobes, here).items():
+        wrong = Counter[str]()
+        for name, value in evaluate(own_lobes, here, wrong).items():
             np.multiply(value.T, irradiance, out=by_material[name][:, first:last])
+        mended[materials.materials.names[one]] += wrong.total()
+        out.mended = +mended
         if len(points) == incident.count:
-            return {name: columns[:, :count].T for name, columns in by_material.items()}
+            out.update((name, columns[:, :count].T) for name, columns in by_material.items())
+            return out
         column[points] = np.arange(first, last)
         first = last
 
     # Back to the order of the points by a gather, which is four times as fast as scattering each group.
-    return {name: take_rows(columns.T, column) for name, columns in by_material.items()}
+    out.update((name, take_rows(columns.T, column)) for name, columns in by_material.items())
+    return out
 
 
 def sum_lobes(hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:

@@ -11,6 +11,7 @@ noise, and no quotient overflows.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -20,6 +21,7 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, cross, dot, length, mirror, unit
 from illumcli.graph import Node, required, topological_order
 from illumcli.models._terms import Angle, Components
+from illumcli.shading.untested import is_tested, mended_values, unknown_term
 
 GIVEN = ("n", "l", "v", "t", "light")
 
@@ -209,7 +211,9 @@ def ordered_terms(needs: tuple[str, ...], given: tuple[str, ...] = GIVEN) -> tup
     return tuple(topological_order(TERMS, needs, given))
 
 
-def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dict[str, Any]:
+def evaluate(
+    lobes: dict[str, Callable[..., Any]], given: dict[str, Any], mended: Counter[str] | None = None
+) -> dict[str, Any]:
     """The value of each lobe at N points; terms that lobes share are computed once.
 
     Parameters
@@ -219,6 +223,9 @@ def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dic
     given : dict
         The given terms that the lobes need (`given_terms`): (N, 3) vectors of one precision, in column-major
         order. Other terms may be given, too, if they are already known.
+    mended : Counter, optional
+        Of lobes that no test covers, the number of values that are 0 because they were negative or not
+        finite is added here, by the lobe's name.
 
     Returns
     -------
@@ -228,7 +235,15 @@ def evaluate(lobes: dict[str, Callable[..., Any]], given: dict[str, Any]) -> dic
     buffers = dict(given)
     for node in ordered_terms(_needs(lobes), tuple(given)):
         buffers[node.output] = node.run(buffers)
-    return {name: lobe(**{need: buffers[need] for need in required(lobe)}) for name, lobe in lobes.items()}
+    counted = Counter[str]() if mended is None else mended
+    values = {}
+    for name, lobe in lobes.items():
+        needed = {need: buffers[need] for need in required(lobe)}
+        if is_tested(lobe):
+            values[name] = lobe(**needed)
+        else:
+            values[name] = mended_values(lobe, needed, given["l"], counted, name)
+    return values
 
 
 def given_terms(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
@@ -239,4 +254,8 @@ def given_terms(lobes: dict[str, Callable[..., Any]]) -> frozenset[str]:
 
 
 def _needs(lobes: dict[str, Callable[..., Any]]) -> tuple[str, ...]:
+    for lobe in lobes.values():
+        for need in required(lobe):
+            if need not in TERMS and need not in GIVEN:
+                raise unknown_term(lobe, need, (*TERMS, *GIVEN))
     return tuple(dict.fromkeys(need for lobe in lobes.values() for need in required(lobe)))

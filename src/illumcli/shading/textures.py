@@ -24,8 +24,7 @@ from illumcli.models._parameters import Texture, VertexValues
 from illumcli.rays.corner_weights import CornerWeights, TriangleCorners
 from illumcli.rays.interaction import Hits, uv_at
 from illumcli.records import Record, Value
-from illumcli.schema.annotations import field_annotation, number_range
-from illumcli.schema.description import owner_of
+from illumcli.schema.annotations import annotation_at, number_range
 from illumcli.schema.fields import LARGEST
 from illumcli.shading.materials import Materials, colors_at
 
@@ -102,8 +101,7 @@ class Range(Value):
 
 def parameter_range(model: IlluminationModel, path: str) -> Range:
     """Range of the parameter at `path` (`diffuse`, `distribution.m`), from its description."""
-    owner, name = owner_of(model, path)
-    number = number_range(field_annotation(type(owner), name))
+    number = number_range(annotation_at(model, path))
     low = (number.gt or 0.0) + float(np.finfo(F).tiny) if number.ge is None else number.ge
     return Range(number.width, low, LARGEST if number.le is None else number.le)
 

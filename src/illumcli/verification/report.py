@@ -7,8 +7,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from illumcli.tables import table
+from illumcli.verification.claims import ClaimResult
 from illumcli.verification.outcome import STANDARD_ERRORS, Outcome, TypeResult
 from illumcli.verification.single import FINE, SingleResult
+
+MEANINGS = {
+    "light": "negative or not finite",
+    "reciprocal": "changes if light and eye change places",
+    "isotropic": "changes if the surface is turned",
+    "conserving": "reflects more light than arrives",
+}
+"""What it says of a model that a claim does not hold."""
 
 
 def as_table(results: Sequence[TypeResult]) -> str:
@@ -27,6 +36,24 @@ def as_table(results: Sequence[TypeResult]) -> str:
     return f"{table(lines, right=(1, 2, 4, 5))}\n\n{summary(results)}"
 
 
+def claims_table(results: Sequence[ClaimResult]) -> str:
+    """One line per claim, those that do not hold with the place, and a summary."""
+    lines = [("claims of", "claim", "parameters", "worst", "tolerance", "verdict")]
+    for each in results:
+        worst, allowed = f"{each.worst:.1e}", f"{each.allowed:.0e}"
+        if each.claim == "conserving":
+            worst, allowed = f"{1 + each.worst:.4f}", f"{1 + each.allowed:.4f}"
+        verdict = "ok" if each.passed else "does not hold"
+        if each.worst == -float("inf"):
+            worst, verdict = "", "lobes too narrow to tell"
+        lines.append((each.name, each.claim, str(each.checked), worst, allowed, verdict))
+    failed = [each for each in results if not each.passed]
+    places = [f"{each.name}: {MEANINGS[each.claim]}: {each.where}" for each in failed]
+    held = f"{len(failed)} do not hold" if failed else "all hold"
+    text = table(lines, right=(2, 3, 4))
+    return "\n\n".join([text, *(["\n".join(places)] if places else []), f"{len(results)} claims: {held}"])
+
+
 def summary(results: Sequence[TypeResult]) -> str:
     """Number of verified cases, and of those beyond their tolerance."""
     count = sum(len(result.outcomes) for result in results)
@@ -39,10 +66,22 @@ def summary(results: Sequence[TypeResult]) -> str:
     return text
 
 
-def as_data(results: Sequence[TypeResult]) -> dict[str, Any]:
+def as_data(results: Sequence[TypeResult], claims: Sequence[ClaimResult] = ()) -> dict[str, Any]:
     """The results for JSON."""
     return {
         "precision": "double",
+        "claims": [
+            {
+                "name": each.name,
+                "claim": each.claim,
+                "parameters": each.checked,
+                "worst": _finite(abs(each.worst)) and each.worst,
+                "tolerance": each.allowed,
+                "holds": each.passed,
+                "where": each.where,
+            }
+            for each in claims
+        ],
         "types": [
             {
                 "type": result.type,

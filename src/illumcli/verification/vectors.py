@@ -55,7 +55,9 @@ class Case(Record):
         return self.atol + self.rtol * float(np.abs(self.expected).max())
 
 
-def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -> list[Case]:
+def read_cases(
+    path: Path, known: Collection[str], only: Collection[str] = (), may_lack: Collection[str] = ()
+) -> list[Case]:
     """The cases of a vectors file (`.json`, also `.xz` or `.gz`), in its order, or of a folder of them.
 
     Parameters
@@ -64,6 +66,8 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
         Case types that have an evaluator.
     only : collection of str
         Keep these types alone; by default all.
+    may_lack : collection of str
+        Types of `only` that need no case.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def read_cases(path: Path, known: Collection[str], only: Collection[str] = ()) -
         cases += wanted
         if not entries:
             problems.append(f"{file}: holds no case")
-    missing = set(only) - {case.type for case in cases}
+    missing = set(only) - {case.type for case in cases} - set(may_lack)
     problems += [f"{path}: holds no case of type '{name}'" for name in sorted(missing) if not problems]
     if problems:
         raise InputError(_shortened(path, problems))

@@ -10,7 +10,8 @@ from illumcli.geometry.polygon_normals import area_vectors, polygon_normals
 from illumcli.geometry.shapes import AnyShape
 from illumcli.geometry.shapes._base import MAX_TRIANGLES
 from illumcli.geometry.triangulate import triangulate
-from illumcli.schema.families import members, tags
+from illumcli.schema.families import members
+from illumcli.schema.sources import tags
 
 SHAPE = TypeAdapter(AnyShape)
 PACKAGE = "illumcli.geometry.shapes"

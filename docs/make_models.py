@@ -53,12 +53,15 @@ illum render scenes/gallery.yaml -o out/gallery.png
 illum render scenes/gallery.yaml -D 'meshes.pot={file: ../bunny.obj}' -o out/gallery-bunny.png
 illum render scenes/moon.yaml -o 'out/moon-{camera}.png'
 illum render scenes/copper.yaml scenes/grain.yaml scenes/textures.yaml -o 'out/{scene}.png'
+illum render scenes/masking.yaml -o out/masking.png
 ```
 
 - `moon`: lit from behind the eye, Lambert's ball darkens to its rim; Oren-Nayar's is flatter, the rougher it
   is; Minnaert's at k = 0.5 and Lommel-Seeliger's are discs of one brightness, as the full Moon is.
 - `copper`: at grazing a highlight takes the colour of its light. With the index of about 10 that copper's F0
   implies, Cook and Torrance's interpolation turns only in the last two degrees; the scene says 1.5.
+- `masking`: rough aluminium under V-grooves, Smith's masking, and Smith's correlated by height; in the last
+  column it is anisotropic. V-grooves leave a crease where they begin to block light; Smith's masking is smooth.
 - `grain`: highlights lie across the grain, so a turned disc and a record have two, on opposite sides.
 """
 

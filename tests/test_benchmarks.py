@@ -63,6 +63,16 @@ def test_mitsuba_draws_the_same_picture(root, tmp_path):
     assert float(text.partition("difference of the references: RMSE ")[2].split()[0]) < 0.06
 
 
+def test_mitsuba_draws_the_same_rough_conductors(root, tmp_path):
+    if not os.environ.get("PEERS"):
+        pytest.skip("needs PEERS, the python of an environment with mitsuba")
+    rows = printed(root, tmp_path, "rough_conductors").splitlines()[-6:]
+    # after the name: lit, alone, then three differences, and three with Mitsuba's own masking of Beckmann
+    numbers = [row.partition("  ")[2].split() for row in rows]
+    medians = [float(row[5] if len(row) > 5 else row[2]) for row in numbers]
+    assert max(medians) < 1e-5
+
+
 @pytest.fixture
 def torus(tmp_path):
     shape = Torus(segments=24, sides=12).mesh()

@@ -21,7 +21,7 @@ and does not conserve energy; the 1 / (4 m^2 cos^4) of other texts with 1 / pi i
 
 Not followed: G without min(1, ...); Fresnel's g as sqrt(n^2 + c^2) - 1 or with + 1, and with n.l for c; the
 colour shift multiplied by F once more; n_l n_v outside of the denominator. Walter's rational fit of
-Beckmann's Lambda, with which G is off by up to 0.35 %: it is exact here.
+Beckmann's Lambda, with which each G1 is off by up to 0.31 %: it is exact here.
 
 References
 ----------

@@ -61,7 +61,7 @@ illum render scenes/masking.yaml -o out/masking.png
 - `copper`: at grazing a highlight takes the colour of its light. With the index of about 10 that copper's F0
   implies, Cook and Torrance's interpolation turns only in the last two degrees; the scene says 1.5.
 - `masking`: rough aluminium under V-grooves, Smith's masking, and Smith's correlated by height; in the last
-  column it is anisotropic. V-grooves leave a crease where they begin to block light; Smith's masking is smooth.
+  column it is anisotropic. V-grooves leave a crease where they begin to block light; Smith's is smooth.
 - `grain`: highlights lie across the grain, so a turned disc and a record have two, on opposite sides.
 """
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from importlib import import_module
 
 from illumcli import __version__
+from illumcli.schema.sources import FAMILIES, entry_points
 from illumcli.versions import versions
 
 CLASSES = {"AVX512_SKX": "AVX-512", "AVX2": "AVX2", "AVX": "AVX", "SSE42": "SSE4.2", "ASIMD": "NEON"}
@@ -24,6 +25,11 @@ def facts() -> dict[str, str]:
         "illum": __version__,
         **{name: version for name, version in versions().items() if name not in WITHOUT_EFFECT},
         "instructions": instruction_class(),
+        **{
+            f"package {name}": version
+            for family in FAMILIES
+            for name, _, version in (point.package.partition(" ") for point in entry_points(family).values())
+        },
     }
 
 

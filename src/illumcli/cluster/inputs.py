@@ -18,10 +18,11 @@ from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.scene.access import file_inside
 from illumcli.scene.load import SceneText, load, read_text
 from illumcli.scene.override import parse
+from illumcli.schema.sources import folders, source_files
 
 
 class Inputs:
-    """Finds and hashes the files of units; each is read once."""
+    """Finds and hashes the files of units, and of models of the user; each is read once."""
 
     def __init__(self) -> None:
         self._digests: dict[Path, str] = {}
@@ -36,7 +37,8 @@ class Inputs:
         InputError
             The scene has a fault.
         """
-        paths = dict.fromkeys(path for unit in units for path in self._paths(unit))
+        own = [path for folder in folders("ILLUM_MODELS") for path in source_files(folder)]
+        paths = dict.fromkeys([*own, *(path for unit in units for path in self._paths(unit))])
         return {path: self._digest(path) for path in paths if path.is_file()}
 
     def _paths(self, unit: Unit) -> Iterator[Path]:

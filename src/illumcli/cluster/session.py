@@ -21,6 +21,7 @@ from illumcli.cluster.inputs import Inputs
 from illumcli.commands.unit import Unit
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes
+from illumcli.schema.sources import folders
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -55,7 +56,8 @@ class Session:
             token = {} if self._token is None else {self._token: file_digest(self._token)}
             allowed = os.environ.get("ILLUM_ALLOW", "")
             wanted = {} if is_mixed else facts()
-            self._command = Command(name, str(Path.cwd()), token, wanted, allowed)
+            models = tuple(folders("ILLUM_MODELS"))
+            self._command = Command(name, str(Path.cwd()), token, wanted, allowed, models)
             self._register()
         except BaseException:
             self.close()

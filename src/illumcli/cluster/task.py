@@ -53,6 +53,8 @@ class Command(Value):
     """Those of the client that workers must share."""
     allowed: str
     """The client's ILLUM_ALLOW."""
+    models: tuple[Path, ...]
+    """The folders of the client's ILLUM_MODELS."""
 
 
 class UnitResult(Value):
@@ -108,20 +110,25 @@ class CommandPlugin(WorkerPlugin):
         """In the client's folder, what does its units; copies of its files go below `folder`."""
         with ONE_BLOCK:
             before, allowed = os.getcwd(), os.environ.get("ILLUM_ALLOW", "")
+            models = os.environ.get("ILLUM_MODELS", "")
             try:
                 if self.worker is None:
                     if not is_shared(self.command.token):
                         self.mirror = Mirror(Path(mkdtemp(prefix="illum-", dir=folder)))
                     self.worker = Worker()
+                folders = self.command.models
                 if self.mirror is not None:
                     self.mirror.enter(self.command.folder)
+                    folders = tuple(self.mirror.at(each) for each in folders)
                 else:
                     os.chdir(self.command.folder)
                     os.environ["ILLUM_ALLOW"] = self.command.allowed
+                os.environ["ILLUM_MODELS"] = os.pathsep.join(map(str, folders))
                 yield self.worker
             finally:
                 os.chdir(before)
                 os.environ["ILLUM_ALLOW"] = allowed
+                os.environ["ILLUM_MODELS"] = models
                 if self.is_ended:
                     self._remove_copies()
 

@@ -19,7 +19,7 @@ from typing import Any, get_args
 
 from illumcli.errors import InputError
 from illumcli.schema.description import Description
-from illumcli.schema.sources import EntryPoint
+from illumcli.schema.sources import EntryPoint, source_files
 
 PREFIX = "illum_models_"
 DIGEST = "__illum_digest__"
@@ -80,7 +80,7 @@ def source_digest(cls: type[Any]) -> str | None:
 def _from_file(path: Path) -> ModuleType:
     """The module of a file, which may import others beside it: `from ._helpers import fuzz`."""
     folder = path.parent
-    digest = _digest([*folder.glob("*.py"), *folder.glob("_*/**/*.py")])
+    digest = _digest(source_files(folder))
     name = PREFIX + hashlib.blake2b(f"{folder}{digest}".encode(), digest_size=8).hexdigest()
     if name not in sys.modules:
         top = ModuleType(name)

@@ -17,6 +17,14 @@ from illumcli.errors import InputError
 from illumcli.records import Value
 from illumcli.schema.modules import modules
 
+FAMILIES = (
+    "illumcli.models",
+    "illumcli.lights",
+    "illumcli.visibility.falloffs",
+    "illumcli.geometry.shapes",
+    "illumcli.scene.curves",
+)
+"""The packages of the open families."""
 FOLDERS = {"illumcli.models": "ILLUM_MODELS"}
 """Family -> the environment variable with folders of its members, one in each file. `--models` sets it, and
 no scene can: the files are run."""
@@ -44,6 +52,16 @@ def own_tags(package: str) -> tuple[str, ...]:
     return modules(f"{folder}/{name}" for folder in import_module(parent).__path__)
 
 
+def folders(variable: str) -> list[Path]:
+    """The absolute paths of the folders that an environment variable names."""
+    return [Path(text).absolute() for text in os.environ.get(variable, "").split(os.pathsep) if text]
+
+
+def source_files(folder: Path) -> list[Path]:
+    """The Python files of a folder of members: those at its top, and those in folders of helpers."""
+    return sorted([*folder.glob("*.py"), *folder.glob("_*/**/*.py")])
+
+
 def files(package: str) -> dict[str, Path]:
     """Tag -> file, of the members in folders that the user names.
 
@@ -55,14 +73,14 @@ def files(package: str) -> dict[str, Path]:
     variable = FOLDERS.get(package, "")
     found: dict[str, Path] = {}
     problems: list[str] = []
-    for folder in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+    for folder in folders(variable):
         try:
-            names = modules([folder])
+            names = modules([str(folder)])
         except OSError as error:
             problems.append(f"{variable}: {folder}: {(error.strerror or str(error)).lower()}; name a folder")
             continue
         for tag in names:
-            path = Path(folder).absolute() / f"{tag}.py"
+            path = folder / f"{tag}.py"
             if not path.is_file() or tag.startswith(NO_MEMBERS):
                 continue
             if tag in own_tags(package):

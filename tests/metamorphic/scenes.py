@@ -162,6 +162,9 @@ def _lobe(r: Random) -> dict[str, Any]:
     return {"diffuse": color(r), "specular": color(r), "exponent": number(r, 0.5, 80)}
 
 
+FACETS = ("hn**20", "exp(-((theta - 0.4) / 0.2)**2)", "exp(-(x / 0.2)**2 - (y / 0.7)**2) / hn**4")
+"""Distributions of facet normals."""
+
 MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
     "ashikhmin_shirley": lambda r: {
         "diffuse": color(r), "specular": color(r), "exponent_u": number(r, 1, 90),
@@ -174,6 +177,10 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
         "parameters": {"kd": color(r), "m": number(r, 1, 9)},
         "response": r.choice(["n_l * (kd / pi + (1 - n_v)**m)", "kd * n_l * n_h**m"]),
         "specular": r.choice([None, "kd * max(0, 1 - gap_rv)**m"]),
+    },
+    "generated": lambda r: {
+        "diffuse": color(r), "specular_weight": number(r, 0, 1), "fresnel": {"F": "schlick", "f0": color(r)},
+        "distribution": {"p": "formula", "formula": r.choice(FACETS)},
     },
     "kajiya_kay": _lobe,
     "lafortune": lambda r: _lobe(r) | {"cx": number(r, -1, -0.5), "cy": number(r, -1, -0.5)},
@@ -207,7 +214,15 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
 """Parameters by model."""
 SMALL = tuple(name for name in MODELS if name != "merl")
 """Models that need no large file."""
-GRAINED = ("ashikhmin_shirley", "kajiya_kay", "lafortune", "poulin_fournier", "principled", "ward")
+GRAINED = (
+    "ashikhmin_shirley",
+    "generated",
+    "kajiya_kay",
+    "lafortune",
+    "poulin_fournier",
+    "principled",
+    "ward",
+)
 """Models that follow the grain."""
 
 

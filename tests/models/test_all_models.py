@@ -16,6 +16,7 @@ from numpy.polynomial.legendre import leggauss
 import rgl_files
 from illumcli.arrays import column_major, cross, dot
 from illumcli.commands.schema_generator import schema_of
+from illumcli.images.drawings import read_numbers
 from illumcli.measured_files import merl
 from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import may_vary
@@ -56,11 +57,33 @@ def measured(tmp_path_factory):
     noise = np.random.default_rng(1).random((3, 90, 90, 180))
     (folder / "noise.binary").write_bytes(merl.encode(np.where(noise < 0.1, np.nan, noise)))
     (folder / "noise.bsdf").write_bytes(rgl_files.tensor_file(rgl_files.noise()))
+    for each in FACETS:  # tabulated once, before examples are drawn
+        member("illumcli.models", "generated").model_validate({"distribution": each}).prepared(read_numbers)
     MEASURED.update(merl=str(folder / "noise.binary"), rgl=str(folder / "noise.bsdf"))
 
 
 MEASURED: dict[str, str] = {}
 """A file for each model that reads one."""
+
+
+def facets(formula):
+    """Facets with normals by a formula."""
+    return {"p": "formula", "formula": formula}
+
+
+WIDE = (
+    facets("1"),
+    facets("exp(-(slope / 0.4)**2) / hn**4"),
+    facets("exp(-(x / 0.3)**2 - (y / 0.8)**2) / hn**4"),
+    facets("max(0, hb) + 0.2"),
+)
+FACETS = (
+    *WIDE,
+    facets("exp(-(slope / 0.001)**2) / hn**4"),
+    facets("exp(-((x - 0.5) / 0.05)**2 - ((y + 0.2) / 0.3)**2) / hn**4"),
+    {"p": "slopes", "range": [0.2, 3.0], "file": str(Path(__file__).parents[2] / "scenes" / "tiles.png")},
+)
+"""Distributions of facet normals, narrow ones too; those of the picture are coloured."""
 
 
 # -- random parameters, from the schema of a model
@@ -73,7 +96,8 @@ def parameters(Model, choices=True, gentle=False):
     `gentle` keeps lobes wide enough for a quadrature.
     """
     schema = schema_of(Model)
-    return _object(schema, schema.get("$defs", {}), choices, gentle).map(Model.model_validate)
+    keys = _object(schema, schema.get("$defs", {}), choices, gentle)
+    return keys.map(Model.model_validate).map(lambda model: model.prepared(read_numbers))
 
 
 def _object(schema, defs, choices, gentle):
@@ -83,6 +107,8 @@ def _object(schema, defs, choices, gentle):
         if name == "file"
         else st.fixed_dictionaries({"kd": colors, "m": st.floats(0, 20)})
         if name == "parameters"
+        else st.sampled_from(WIDE if gentle else FACETS)
+        if "p" in field.get("discriminator", {}).values()
         else _field(name, field, defs, choices, gentle)
         for name, field in schema["properties"].items()
         if name not in NOT_DRAWN
@@ -365,7 +391,8 @@ def test_turning_the_surface_changes_nothing(Model, data, seed, angle):
     "Model", [Model for Model in WHOLE if not Model.isotropic], ids=lambda Model: Model.__name__
 )
 def test_turning_the_grain_changes_something(Model):
-    model = Model() if Model().has_grain() else Model(anisotropic=0.8)
+    grain = {"distribution": WIDE[2]} if Model.__name__ == "Generated" else {"anisotropic": 0.8}
+    model = Model() if Model().has_grain() else Model.model_validate(grain)
     assert "t" in given_terms(model.lobes())
     given = directions(5, 64, least=0.1)
     assert not np.allclose(response(model, given), response(model, turned(given, 1.0)), rtol=1e-3)

@@ -14,6 +14,7 @@ from illumcli.brdf import views
 from illumcli.brdf.plot import PLOT, VIEWS, Plot
 from illumcli.errors import InputError, OutputError
 from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
+from illumcli.images.drawings import read_numbers
 from illumcli.models._base import IlluminationModel
 from illumcli.scene.faults import faults
 from illumcli.scene.override import Override, parse
@@ -62,7 +63,7 @@ def draw_brdfs(
         if path is not None:
             refuse_unwritable(path)
 
-    models = described(names, overrides)
+    models = {title: model.prepared(read_numbers) for title, model in described(names, overrides).items()}
     files: dict[Path, bytes] = {}
     if table is not None:
         files[table] = slices_table(models, plot).encode()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from illumcli.models._parameters import Texture, Varying, VertexValues
 from illumcli.schema.description import Description, nested, parts_of
@@ -100,7 +101,34 @@ class IlluminationModel(Description):
 
     def varying(self) -> dict[str, Texture | VertexValues]:
         """The parameters that vary over the surface, by path: `specular`, or `distribution.m`."""
-        return dict(_varying(self))
+        return {path: value for path, value in _parts(self) if isinstance(value, Texture | VertexValues)}
+
+    def files(self) -> dict[str, str]:
+        """The files that lobes read, by the path of the parameter that names each: `distribution.file`."""
+        return {
+            path: value
+            for path, value in _parts(self)
+            if path.split(".")[-1] == "file" and isinstance(value, str)
+        }
+
+    def prepared(self, read: Callable[[str], NDArray[np.float32]]) -> Self:
+        """This model with what its lobes need beforehand, as tables; by default the model itself.
+
+        Parameters
+        ----------
+        read : callable
+            Path of an image -> (H, W, 3) its numbers as stored, the top row first; black where transparent.
+
+        Raises
+        ------
+        InputError
+            A file that cannot be used.
+        """
+        return self
+
+    def repairs(self) -> dict[str, int]:
+        """What was put right or is uncertain in the files of a prepared model: kind -> how often."""
+        return {}
 
     def at(self, values: Mapping[str, Any]) -> Self:
         """This model with arrays in place of parameters, by path, without validation.
@@ -127,15 +155,14 @@ def is_always(value: Any, number: float) -> bool:
     )
 
 
-def _varying(
-    part: Description | Mapping[str, Any], prefix: str = ""
-) -> Iterator[tuple[str, Texture | VertexValues]]:
+def _parts(part: Description | Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """All parameters and the parameters of their descriptions, by path."""
     for name, value in parts_of(part):
-        if isinstance(value, Texture | VertexValues):
+        inner = {} if isinstance(value, Texture | VertexValues) else nested(value)
+        if not inner:
             yield prefix + name, value
-            continue
-        for step, inner in nested(value).items():
-            yield from _varying(inner, f"{prefix}{name}{step}.")
+        for step, each in inner.items():
+            yield from _parts(each, f"{prefix}{name}{step}.")
 
 
 def _replace_parameters(part: Any, values: Mapping[str, Any]) -> Any:

@@ -37,7 +37,7 @@ def material_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> 
         models |= {("material", name): model for name, model in scene.materials.items()}
 
     # Measured materials and textures are identified by the content of their files.
-    tables = {model.file for model in models.values() if hasattr(model, "file")}
+    tables = {file for model in models.values() for file in model.files().values()}
     measured = {path: files.of(path, partial(resolve, loaded)) for path in sorted(tables)}
     named = sorted({each.texture for each in _varied(models.values()) if isinstance(each, Texture)})
     contents = {path: files.of(path, partial(resolve, loaded)) for path in named}

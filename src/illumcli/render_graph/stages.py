@@ -18,14 +18,16 @@ from illumcli.film.view import View, distance
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.mesh_checks import faults
+from illumcli.geometry.repairs import Repair, joined, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.shapes import Shape
+from illumcli.images.drawings import read_numbers
 from illumcli.rays import sampling
 from illumcli.rays.embree import Tracer
 from illumcli.rays.interaction import Hits, SurfaceInteraction
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import DepthCue
-from illumcli.shading.materials import Materials, Numbering, Token, materials, textures_at
+from illumcli.shading.materials import Materials, Numbering, Token, materials, origin, textures_at
 from illumcli.shading.textures import Varying, texel_positions
 from illumcli.visibility.hemisphere import Hemispheres
 from illumcli.visibility.obscurance import Method
@@ -90,16 +92,35 @@ def materials_of(
     numbering: Numbering,
     meshes: tuple[Mesh, ...] = (),
 ) -> Materials:
-    """The materials by number, with the paths of measured ones resolved.
+    """The materials by number; those that are used have the paths of their files resolved and are prepared.
 
     `meshes` are given if materials of mesh files are imported.
+
+    Raises
+    ------
+    InputError
+        Files that models cannot use; all of them.
     """
-    resolved = {
-        token: model.at({"file": str(measured[model.file].path)}) if hasattr(model, "file") else model
-        for token, model in models.items()
-    }
+    used = {origin(token) for token in numbering.tokens}
+    known: dict[Token, Any] = {}
+    repairs: dict[str, Repair] = {}
+    problems: list[str] = []
+    for token, model in models.items():
+        if token not in used:
+            continue
+        paths = {path: str(measured[file].path) for path, file in model.files().items()}
+        try:
+            known[token] = model.at(paths).prepared(read_numbers)
+        except InputError as error:
+            problems += [f"material {token[-1]}: {problem}" for problem in error.problems]
+            continue
+        for what, count in known[token].repairs().items():
+            note(repairs, what, f"material {token[-1]}", count)
+    if problems:
+        raise InputError(problems)
     libraries = {name: mesh for name, mesh in zip(imported, meshes, strict=False) if name}
-    return materials(numbering, resolved, libraries)
+    result = materials(numbering, known, libraries)
+    return replace(result, repairs=joined([result.repairs, repairs]))
 
 
 # --- per tile ---------------------------------------------------------------------------------------------

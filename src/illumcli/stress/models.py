@@ -81,6 +81,8 @@ def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
         inner = defs[field["$ref"].rpartition("/")[2]]
         if "properties" not in inner:
             return _ends(inner, defs)
+        if "file" in inner.get("required", ()):
+            return []
         fixed = {n: f["const"] for n, f in inner["properties"].items() if "const" in f}
         free = {n: f for n, f in inner["properties"].items() if "const" not in f}
         return [fixed] + [{**fixed, n: end} for n, f in free.items() for end in _ends(f, defs)]
@@ -94,6 +96,8 @@ def _ends(field: dict[str, Any], defs: dict[str, Any]) -> list[Any]:
         return [field["const"]]
     if "enum" in field:
         return list(field["enum"])
+    if field.get("type") == "string":
+        return [field["default"]]
     if field.get("type") == "boolean":
         return [False, True]
 

@@ -1,1 +1,1 @@
-"""Files of measured BRDFs, one module per format: what they hold, without evaluating it."""
+"""Files of measurements, one module per format: what they hold, without evaluating it."""

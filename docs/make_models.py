@@ -41,12 +41,13 @@ illum brdf ward ashikhmin_shirley --view sphere --view lobe -o out/streaks.png
 illum verify --only ward
 ```
 
-![Forty teapots: a column per model, a row per parameter](gallery.png)
+![Fifty teapots: a column per model, a row per parameter](gallery.png)
 
 The columns, from the left: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as
 copper and as plastic; Cook-Torrance's distributions; Ward; Ashikhmin-Shirley; Kajiya-Kay, Poulin-Fournier,
-Lafortune. The values stand in [scenes/gallery.yaml](../scenes/gallery.yaml). One command renders it, on the
-teapot or on any mesh; other scenes show one thing each:
+Lafortune; principled; Fujii, EON, metallic-roughness. The values stand in
+[scenes/gallery.yaml](../scenes/gallery.yaml). One command renders it, on the teapot or on any mesh; other
+scenes show one thing each:
 
 ```sh
 illum render scenes/gallery.yaml -o out/gallery.png

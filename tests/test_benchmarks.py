@@ -73,6 +73,14 @@ def test_mitsuba_draws_the_same_rough_conductors(root, tmp_path):
     assert max(medians) < 1e-5
 
 
+def test_three_js_draws_the_same_materials(root, tmp_path):
+    if not os.environ.get("THREE") or shutil.which("chromedriver") is None:
+        pytest.skip("needs THREE, a folder node_modules with three, and chromedriver")
+    text = printed(root, tmp_path, "gltf_peers", os.environ["THREE"])
+    rows = [line.split()[-3:] for line in text.splitlines() if line.startswith("plain ")]
+    assert float(rows[-1][0]) < 0.01 < float(rows[0][1])
+
+
 @pytest.fixture
 def torus(tmp_path):
     shape = Torus(segments=24, sides=12).mesh()

@@ -366,9 +366,11 @@ def vary(random: Random, case: Case, thing: dict[str, Any]) -> None:
     if (surface.uvs is not None and not source["file"].endswith("stl")) if surface else has_uvs(source):
         by.append(texture(random, case))
     if by:
-        model = random.choice(SMALL)
+        classes = [member("illumcli.models", name) for name in SMALL]
+        Model = random.choice([each for each in classes if each.surface_color in each.model_fields])
+        model = Model.model_fields["model"].default
         thing["material"] = {"model": model, **MODELS[model](random)}
-        thing["override"] = {member("illumcli.models", model).surface_color: random.choice(by)}
+        thing["override"] = {Model.surface_color: random.choice(by)}
 
 
 def has_uvs(source: dict[str, Any]) -> bool:

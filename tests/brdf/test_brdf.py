@@ -8,8 +8,12 @@ import sys
 import numpy as np
 import pytest
 
-from illumcli.brdf import VIEWS, Plot, described, draw_brdfs
-from illumcli.brdf.views import lit_plane, lit_sphere, lobe, polar_slice, slice_angles
+from illumcli.brdf import DEFAULT_VIEWS, VIEWS, Plot, described, draw_brdfs, write_merl
+from illumcli.brdf.albedo import albedo
+from illumcli.brdf.curves import panels
+from illumcli.brdf.style import style
+from illumcli.brdf.views import across_slice, lit_plane, lit_sphere, lobe, polar_slice, slice_angles
+from illumcli.cli.brdf import brdf
 from illumcli.errors import IllumError, InputError, OutputError
 from illumcli.images.reader import read_image
 from illumcli.schema.families import members
@@ -100,6 +104,45 @@ def test_every_model_has_finite_views(name):
     assert np.isfinite(lit_plane(model, 32)).all()
 
 
+def test_a_slice_across_meets_the_other_in_the_mirror_direction():
+    model = only("ward", "alpha_x=0.1", "alpha_y=0.3")
+    angles, found = across_slice(model, 40)
+    at_mirror = polar_slice(model, 40)[1][polar_slice(model, 40)[0] == 40]
+    np.testing.assert_allclose(found[angles == 0], at_mirror, rtol=1e-12)
+    np.testing.assert_allclose(found, found[::-1], rtol=1e-9)
+
+    def width(angles, values):
+        return np.ptp(angles[values[:, 0] > values[:, 0].max() / 2])
+
+    narrow = across_slice(only("ward", "diffuse=0", "alpha_x=0.3", "alpha_y=0.1"), 0)
+    assert width(*across_slice(only("ward", "diffuse=0", "alpha_x=0.1", "alpha_y=0.3"), 0)) > 2 * width(
+        *narrow
+    )
+
+
+@pytest.mark.parametrize("incidence", [0, 50, 89])
+def test_the_albedo_of_lambert_is_its_parameter(incidence):
+    found, error = albedo(only("lambert", "diffuse=[0.2, 0.4, 0.6]"), incidence)
+    assert error < 1e-3
+    np.testing.assert_allclose(found, [0.2, 0.4, 0.6], rtol=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [1, 100, 1e6])
+def test_the_albedo_of_wide_and_narrow_lobes_is_their_closed_form(exponent):
+    lobe = only("phong", f"exponent={exponent}", "normalised=true", "diffuse=0", "specular=1")
+    found, error = albedo(lobe, 0)
+    assert error < 1e-3
+    np.testing.assert_allclose(found, 1, rtol=1e-3)  # (n + 2) / (2 pi) times the integral of cos^(n + 1)
+
+
+def test_what_the_albedo_misses_is_said(monkeypatch):
+    monkeypatch.setattr(sys.modules[albedo.__module__], "ANGLES", (40.0,))
+    # a narrow lobe towards the light, away from the directions that are dense
+    retro = only("lafortune", "diffuse=0", "specular=1", "exponent=1e5", "cx=1", "cy=1", "cz=1")
+    (panel,) = panels("albedo", [("retro", retro)], Plot())
+    assert panel.note.startswith("albedo to")
+
+
 # --- what is asked for ---------------------------------------------------------------------------------
 
 
@@ -185,9 +228,9 @@ def test_no_other_file_is_replaced_unasked(tmp_path):
     assert path.read_text().startswith("model,")
 
 
-def test_only_png_and_svg_are_drawn(tmp_path):
-    with pytest.raises(InputError, match=r"is written as \.png or \.svg"):
-        draw_brdfs(["lambert"], output=tmp_path / "x.pdf")
+def test_other_formats_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"is written as \.png or \.svg or \.pdf"):
+        draw_brdfs(["lambert"], output=tmp_path / "x.gif")
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
@@ -205,3 +248,100 @@ def test_the_command_prints_its_files_and_needs_no_pyplot(illum, tmp_path):
     assert done.stdout == "brdf.png\n", done.stderr
     assert (tmp_path / "brdf.png").read_bytes().startswith(b"\x89PNG")
     assert "matplotlib.pyplot" not in sys.modules  # drawn in this process by the tests above
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+
+
+COPPER = ["diffuse=[0.9, 0.5, 0.1]"]
+
+
+def test_an_overlay_has_one_axis_and_a_curve_for_each_model_and_light():
+    models = list(described(["lambert", "oren_nayar"]).items())
+    (one,) = panels("cartesian", models, Plot(overlay=True, angles=(10.0, 50.0)))
+    assert [curve.name for curve in one.curves] == ["lambert"] * 2 + ["oren_nayar"] * 2
+    assert len({curve.style for curve in one.curves}) == 2
+    apart = panels("cartesian", models, Plot(angles=(10.0, 50.0)))
+    assert [[curve.incidence for curve in each.curves] for each in apart] == [[10, 50], [10, 50]]
+    assert len({curve.style for curve in apart[0].curves}) == 2
+
+
+def test_channels_have_curves_of_their_own():
+    models = list(described(["lambert"], COPPER).items())
+    (panel,) = panels("cartesian", models, Plot(per_channel=True, angles=(30.0,)))
+    assert [curve.name for curve in panel.curves] == ["R", "G", "B"]
+    np.testing.assert_allclose([curve.y[0] * np.pi for curve in panel.curves], [0.9, 0.5, 0.1])
+    (whole,) = panels("cartesian", models, Plot(angles=(30.0,)))
+    assert whole.curves[0].y[0] * np.pi == pytest.approx(0.2126 * 0.9 + 0.7152 * 0.5 + 0.0722 * 0.1, rel=1e-3)
+
+
+def test_curves_differ_in_grey():
+    assert len({style(number).dashes for number in range(5)}) == 5
+    assert len({style(number) for number in range(35)}) == 35
+
+
+def test_a_figure_has_the_width_and_words_of_its_user(tmp_path):
+    path = tmp_path / "figure.svg"
+    plot = Plot(("cartesian", "albedo"), overlay=True, width=7.0, labels=("Johann", r"$\alpha$ & 2"))
+    draw_brdfs(["lambert", "oren_nayar"], output=path, plot=plot)
+    text = path.read_text()
+    assert 'width="504pt"' in text
+    for word in ("Johann", "angle of view", "albedo"):
+        assert f">{word}" in text  # text, no outlines
+    assert "-90" not in text.partition("<text")[0]
+
+
+def test_a_pdf_has_fonts_and_no_date_and_is_the_same_twice(tmp_path):
+    one, two = tmp_path / "one.pdf", tmp_path / "two.pdf"
+    for path in (one, two):
+        draw_brdfs(["phong"], output=path, plot=Plot(VIEWS))
+    assert one.read_bytes() == two.read_bytes()
+    assert b"/FontFile2" in one.read_bytes()
+    assert b"Date" not in one.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("labels", "fact"),
+    [
+        (("one",), "1 for 2 models; give one for each"),
+        (("same", "same"), "two models have the same"),
+        (("one", r"$\nonsense$"), "is no formula"),
+    ],
+)
+def test_faulty_labels_are_refused(tmp_path, labels, fact):
+    with pytest.raises(InputError, match=fact):
+        draw_brdfs(["lambert", "phong"], output=tmp_path / "x.svg", plot=Plot(("polar",), labels=labels))
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_knows_all_views():
+    (views,) = (option for option in brdf.params if option.name == "views")
+    assert tuple(views.type.choices) == (*VIEWS, "all")
+    assert tuple(views.default) == DEFAULT_VIEWS == Plot().views
+
+
+# --- MERL tables --------------------------------------------------------------------------------------------
+
+
+def test_a_model_written_as_a_merl_table_is_read_as_itself(tmp_path):
+    path = tmp_path / "burley.binary"
+    assert write_merl(["burley"], COPPER, path) == ([], [])
+    assert write_merl(["burley"], COPPER, path) == ([path], [])
+    for incidence in (0, 30, 70):
+        angles, found = polar_slice(only("merl", f"file={path}"), incidence)
+        expected = polar_slice(only("burley", *COPPER), incidence)[1]
+        inner = np.abs(angles) < 80
+        np.testing.assert_allclose(found[inner], expected[inner], rtol=0.01)
+
+
+def test_what_a_merl_table_cannot_hold_is_said(tmp_path):
+    path = tmp_path / "table.binary"
+    with pytest.raises(InputError, match="holds one model, and 2 are named"):
+        write_merl(["burley", "lambert"], [], path)
+    with pytest.raises(InputError, match="ward is anisotropic"):
+        write_merl(["ward"], [], path)
+    with pytest.raises(InputError, match=r"is written as \.binary"):
+        write_merl(["lambert"], [], tmp_path / "table.bin")
+    assert not path.exists()
+    notes = write_merl(["phong"], [], path)[1]
+    assert notes == [f"phong changes if light and eye are exchanged; {path} holds the mean of both"]

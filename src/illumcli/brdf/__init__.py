@@ -1,4 +1,4 @@
-"""Draw BRDFs: polar slices, a lit sphere, a lit plane, the lobe in space."""
+"""Draw BRDFs: slices, albedo, a lit sphere, a lit plane, the lobe in space; and tables of them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from illumcli.brdf import views
-from illumcli.brdf.plot import PLOT, VIEWS, Plot
-from illumcli.errors import InputError, OutputError
-from illumcli.files.outputs import refresh, refuse_empty_link, refuse_suffix, refuse_unwritable
+from illumcli.brdf.outputs import write_files
+from illumcli.brdf.plot import DEFAULT_VIEWS, PLOT, VIEWS, Plot
+from illumcli.errors import InputError
+from illumcli.files.outputs import refuse_suffix, refuse_unwritable
 from illumcli.images.drawings import read_numbers
 from illumcli.models._base import IlluminationModel
 from illumcli.scene.faults import faults
@@ -23,7 +24,7 @@ from illumcli.schema.description import Description
 from illumcli.schema.families import member, tag_of
 from illumcli.schema.messages import suggestion
 
-__all__ = ["PLOT", "VIEWS", "Plot", "described", "draw_brdfs", "slices_table"]
+__all__ = ["DEFAULT_VIEWS", "PLOT", "VIEWS", "Plot", "described", "draw_brdfs", "slices_table", "write_merl"]
 
 PACKAGE = "illumcli.models"
 
@@ -43,7 +44,7 @@ def draw_brdfs(
     overrides : sequence of str
         `PARAMETER=VALUE` for every model, or `MODEL.PARAMETER=VALUE`; MODEL is a name or a number from 1.
     output : Path, optional
-        A picture, .png or .svg.
+        A picture, .png, .svg or .pdf.
     table : Path, optional
         The polar slices as CSV.
 
@@ -56,14 +57,14 @@ def draw_brdfs(
     """
     # Refuse outputs that cannot be written before anything is computed.
     if output is not None:
-        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg")
+        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg", ".pdf")
     if table is not None:
         refuse_suffix(table, "a table", ".csv")
     for path in (table, output):
         if path is not None:
             refuse_unwritable(path)
 
-    models = {title: model.prepared(read_numbers) for title, model in described(names, overrides).items()}
+    models = _labelled(_prepared(described(names, overrides)), plot.labels)
     files: dict[Path, bytes] = {}
     if table is not None:
         files[table] = slices_table(models, plot).encode()
@@ -71,7 +72,62 @@ def draw_brdfs(
         from illumcli.brdf.figure import figure_file
 
         files[output] = figure_file(models, plot, output.suffix.lower().removeprefix("."))
-    return list(files), _write(files, force)
+    return list(files), write_files(files, force)
+
+
+def _prepared(models: Mapping[str, IlluminationModel]) -> dict[str, IlluminationModel]:
+    """The models with what they read from files."""
+    return {title: model.prepared(read_numbers) for title, model in models.items()}
+
+
+def _labelled(models: Mapping[str, IlluminationModel], labels: Sequence[str]) -> dict[str, IlluminationModel]:
+    """The models by the user's labels, if there are any."""
+    if not labels:
+        return dict(models)
+    if len(labels) != len(models):
+        raise InputError(f"--label: {len(labels)} for {len(models)} models; give one for each")
+    if len(set(labels)) < len(labels):
+        raise InputError("--label: two models have the same; give each its own")
+    return dict(zip(labels, models.values(), strict=True))
+
+
+def write_merl(
+    names: Sequence[str], overrides: Sequence[str], path: Path, force: bool = False
+) -> tuple[list[Path], list[str]]:
+    """Write one isotropic model as a MERL table, which `model: merl` reads.
+
+    Returns
+    -------
+    kept : list of Path
+        The file, if it has the same bytes already.
+    notes : list of str
+        What the table cannot hold.
+
+    Raises
+    ------
+    InputError
+        Not one model, or one with a grain; otherwise as `draw_brdfs`.
+    OutputError
+        A different file exists and `force` is not given.
+    """
+    from illumcli.brdf.merl_table import merl_table
+    from illumcli.measured_files import merl
+
+    refuse_suffix(path, "a MERL table", ".binary")
+    refuse_unwritable(path)
+    models = _prepared(described(names, overrides))
+    if len(models) != 1:
+        raise InputError(f"{path}: a MERL table holds one model, and {len(models)} are named; name one")
+    ((title, model),) = models.items()
+    if model.has_grain():
+        raise InputError(
+            f"{path}: {title} is anisotropic with these parameters, and a MERL table is isotropic; "
+            "choose parameters without a grain, or another model"
+        )
+    table = merl_table(model)
+    kept = write_files({path: merl.encode(table.values)}, force)
+    fact = f"{title} changes if light and eye are exchanged; {path} holds the mean of both"
+    return kept, [] if table.is_reciprocal else [fact]
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
@@ -169,26 +225,3 @@ def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:
             for angle, color in zip(angles.tolist(), values.tolist(), strict=True):
                 rows.writerow([title, f"{incidence:g}", f"{angle:.10g}", *(repr(each) for each in color)])
     return out.getvalue()
-
-
-def _write(files: Mapping[Path, bytes], force: bool) -> list[Path]:
-    """Write the files. Returns those that are kept because they have the same bytes."""
-    from illumcli.files.atomic import os_errors_as_output_errors, write_bytes
-
-    # Refuse different files before any is written.
-    kept = []
-    for path, data in files.items():
-        with os_errors_as_output_errors(str(path)):
-            if not force and path.is_file():
-                if path.read_bytes() != data:
-                    fact = "a different file is there; use --force to replace it, or another name"
-                    raise OutputError(f"{path}: {fact}")
-                kept.append(path)
-            elif not force:
-                refuse_empty_link(path)
-    for path, data in files.items():
-        if path in kept:
-            refresh(path)
-        else:
-            write_bytes(path, data)
-    return kept

@@ -1,52 +1,48 @@
-"""Views of BRDFs drawn by matplotlib: a column per model, a row per view, scales shared along a row."""
+"""Views of BRDFs on one sheet: a row per view, a column per model or curves of all on one axis."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from illumcli.brdf import views
-from illumcli.brdf.plot import Plot
-from illumcli.brdf.views import Doubles
-from illumcli.color import luminance, to_srgb
+from illumcli.brdf.curves import draw_curves, legend, panels
+from illumcli.brdf.pictures import draw_pictures
+from illumcli.brdf.plot import COLUMN, CURVES, Plot
+from illumcli.brdf.style import SETTINGS, Style
 from illumcli.errors import InputError
 from illumcli.models._base import IlluminationModel
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpec
-    from matplotlib.projections.polar import PolarAxes
 
-DECADES = 4
-"""Range of a logarithmic scale below the largest value."""
-STEEPEST = 85.0
-"""Larger angles of view do not count for the scale: some models grow without bound there [degrees]."""
-HEIGHTS = {"polar": 2.1, "sphere": 2.4, "plane": 1.5, "lobe": 2.3}
-"""Heights of the rows [inches]."""
+SHAPES = {"polar": 0.66, **dict.fromkeys(CURVES[1:], 0.62), "sphere": 0.77, "plane": 0.48, "lobe": 0.74}
+"""Height of an axis, relative to the width."""
+LEGEND_LINE = 0.17
+"""Height of a line of the legend [inches]."""
 PROJECTIONS = {"polar": "polar", "lobe": "3d"}
-
-Models: TypeAlias = Sequence[IlluminationModel]
-Slice: TypeAlias = tuple[Doubles, Doubles]
-"""(K,) angles of view [degrees], and (K, 3) values."""
+METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""Without date and version, so that equal drawings are equal files."""
 
 
 def figure_file(models: Mapping[str, IlluminationModel], plot: Plot, kind: str) -> bytes:
-    """The picture as a PNG or SVG file.
+    """The picture as a PNG, SVG or PDF file.
 
     Parameters
     ----------
     models : mapping
-        By the title of their column.
-    kind : {'png', 'svg'}
+        By their titles.
+    kind : {'png', 'svg', 'pdf'}
 
     Raises
     ------
     InputError
-        matplotlib is not installed.
+        matplotlib is not installed, or a title has a faulty formula.
     """
     try:
         from matplotlib import rc_context
@@ -55,146 +51,99 @@ def figure_file(models: Mapping[str, IlluminationModel], plot: Plot, kind: str) 
         raise InputError(
             "pictures of BRDFs need matplotlib; install it: pip install 'illumcli[plot]', or write --csv"
         ) from None
-    heights = [HEIGHTS[view] for view in plot.views]
-    with rc_context({"svg.hashsalt": "illum", "font.size": 8, "path.simplify": True}):
-        figure = Figure(figsize=(3.1 * len(models), sum(heights) + 0.45), dpi=150, layout="constrained")
-        grid = figure.add_gridspec(len(plot.views), len(models), height_ratios=heights)
-        for row, view in enumerate(plot.views):
-            row_axes = _row_axes(figure, grid, row, PROJECTIONS.get(view))
-            ROWS[view](row_axes, list(models.values()), plot)
-            if row == 0:
-                for axes, title in zip(row_axes, models, strict=True):
-                    axes.set_title(title, fontsize=9)
-        figure.supxlabel(_caption(plot), fontsize=7)
+    for title in models:
+        _refuse_faulty_math(title)
+    width = plot.inches(len(models))
+    rows = _rows(plot, len(models), width)
+    heights = [SHAPES[row[0]] * width / len(row) for row in rows]
+    with rc_context(SETTINGS):
+        figure = Figure(dpi=150, layout="constrained")
+        grid = figure.add_gridspec(len(rows), 1, height_ratios=heights)
+        named: dict[str, Style] = {}
+        has_titles = False
+        for number, row in enumerate(rows):
+            inner = grid[number, 0].subgridspec(1, len(row))
+            axes = [
+                figure.add_subplot(inner[k], projection=PROJECTIONS.get(view)) for k, view in enumerate(row)
+            ]
+            named |= _draw_row(axes, row, models, plot)
+            if not plot.shares_axis(row[0]) and not has_titles:
+                has_titles = True
+                for one, title in zip(axes, models, strict=True):
+                    one.set_title(title)
+        lines = _draw_legend(figure, named, width)
+        figure.set_size_inches(width, sum(heights) + LEGEND_LINE * lines)
+        _fix_layout(figure)
         file = io.BytesIO()
-        # Without date and version, so that equal drawings are equal files.
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(file, format=kind, metadata=metadata)
-    return file.getvalue()
+        figure.savefig(file, format=kind, metadata=METADATA[kind])
+    return _with_numbered_clips(file.getvalue()) if kind == "svg" else file.getvalue()
 
 
-def _row_axes(figure: Figure, grid: GridSpec, row: int, projection: str | None) -> list[Axes]:
-    """The axes of a row, one for each model."""
-    return [figure.add_subplot(grid[row, column], projection=projection) for column in range(grid.ncols)]
+def _fix_layout(figure: Figure) -> None:
+    """Lay out the figure; last digits of matplotlib's solver vary from run to run, and are rounded off."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        left, bottom, width, height = (round(each, 6) for each in axes.get_position(original=True).bounds)
+        axes.set_position((left, bottom, width, height))
 
 
-def _caption(plot: Plot) -> str:
-    quantity = "response, the cosine included" if plot.times_cos else "response / n.l [1/sr]"
-    shown = f"{quantity}, luminance{', logarithmic' if plot.log else ''}"
-    parts = []
-    if "polar" in plot.views:
-        parts.append(f"polar: {shown}; lights marked on the left rim, their mirror directions dotted")
-    if "lobe" in plot.views:
-        parts.append(f"lobe: {shown}, light at {plot.lobe_angle:g}°, red")
-    return "\n".join(parts)
+def _with_numbered_clips(svg: bytes) -> bytes:
+    """An SVG whose clip paths are named by number; matplotlib names them after places in memory."""
+    numbers: dict[bytes, int] = {}
+    named = rb'(?<=clipPath id="p)[0-9a-f]+|(?<=url\(#p)[0-9a-f]+(?=\))'
+    return re.sub(named, lambda name: b"%d" % numbers.setdefault(name[0], len(numbers)), svg)
 
 
-def _polar_row(row_axes: Sequence[Any], models: Models, plot: Plot) -> None:
-    """Slices of every model, on one scale."""
-    slices = [
-        [views.polar_slice(model, incidence, plot.times_cos) for incidence in plot.angles] for model in models
-    ]
-    top = _scale([luminance(f[np.abs(angle) < STEEPEST]) for each in slices for angle, f in each])
-    for axes, of_model in zip(row_axes, slices, strict=True):
-        _draw_slices(axes, of_model, plot, top)
+def _refuse_faulty_math(label: str) -> None:
+    """Raise InputError for a label whose formula between dollar signs cannot be read."""
+    from matplotlib.mathtext import MathTextParser
+
+    try:
+        MathTextParser("path").parse(label)
+    except ValueError:
+        fact = "is no formula that matplotlib reads"
+        raise InputError(f"--label '{label}': {fact}; correct it, or write \\$ for a dollar sign") from None
 
 
-def _draw_slices(axes: PolarAxes, slices: Sequence[Slice], plot: Plot, top: float) -> None:
-    """The slices of one model, with a colour for each angle of incidence; the value `top` is at the rim."""
-    from matplotlib import colormaps
-
-    # The upper half circle, the normal upwards.
-    axes.set_theta_zero_location("N")
-    axes.set_theta_direction(-1)
-    axes.set_thetamin(-90)
-    axes.set_thetamax(90)
-
-    # The slice, the mirror direction, and a mark at the light.
-    for k, (incidence, (angle, f)) in enumerate(zip(plot.angles, slices, strict=True)):
-        color = colormaps["viridis"](0.85 * k / max(len(plot.angles) - 1, 1))
-        axes.plot(np.radians(angle), _radius(luminance(f), top, plot.log), color=color, linewidth=1.2)
-        axes.plot([np.radians(incidence)] * 2, [0, 1], ":", color=color, linewidth=0.6)
-        axes.plot([np.radians(-incidence)] * 2, [0.93, 1.0], color=color, linewidth=2.5)
-    axes.set_rmax(1.0)
-    _radial_ticks(axes, top, plot.log)
-    axes.set_xticks(np.radians([-90, -60, -30, 0, 30, 60, 90]))
-    axes.grid(alpha=0.35, linewidth=0.4)
+def _rows(plot: Plot, models: int, width: float) -> list[list[str]]:
+    """The views of the axes of each row: a view of every model, or views of all models side by side."""
+    beside = max(1, round(width / COLUMN))
+    shared = [view for view in plot.views if plot.shares_axis(view)]
+    rows = [shared[k : k + beside] for k in range(0, len(shared), beside)]
+    return rows + [[view] * models for view in plot.views if not plot.shares_axis(view)]
 
 
-def _radial_ticks(axes: PolarAxes, top: float, log: bool) -> None:
-    if log:
-        steps = np.arange(1, DECADES + 1)
-        axes.set_yticks(steps / DECADES, [f"{top * 10.0 ** (k - DECADES):.2g}" for k in steps])
-    else:
-        axes.set_yticks([0.5, 1.0], [f"{top / 2:.3g}", f"{top:.3g}"])
-    axes.tick_params(labelsize=6, pad=1)
+def _draw_row(
+    axes: Sequence[Any], row: Sequence[str], models: Mapping[str, IlluminationModel], plot: Plot
+) -> dict[str, Style]:
+    """Draw the axes of a row; the styles of its curves by name."""
+    if row[0] not in CURVES:
+        draw_pictures(row[0], axes, list(models.values()), plot)
+        return {}
+    named: dict[str, Style] = {}
+    apart = [([one], view) for one, view in zip(axes, row, strict=True)]
+    for group, view in apart if plot.overlay else [(axes, row[0])]:
+        drawn = panels(view, list(models.items()), plot)
+        draw_curves(view, group, drawn, plot)
+        named |= legend(drawn)
+    return named
 
 
-def _lobe_row(row_axes: Sequence[Any], models: Models, plot: Plot) -> None:
-    """The lobe of every model, on one scale."""
-    lobes = [views.lobe(model, plot.lobe_angle, plot.times_cos) for model in models]
-    is_visible = np.cos(np.radians(STEEPEST))
-    top = _scale([luminance(f[v[..., 2] > is_visible]) for v, f in lobes])
-    for axes, (v, f) in zip(row_axes, lobes, strict=True):
-        _draw_lobe(axes, v * _radius(luminance(f), top, plot.log)[..., None], plot.lobe_angle)
+def _draw_legend(figure: Figure, named: Mapping[str, Style], width: float) -> int:
+    """Draw the names of curves above the axes, in as many columns as fit. Returns the number of lines."""
+    from matplotlib.lines import Line2D
 
-
-def _draw_lobe(axes: Any, surface: Doubles, incidence: float) -> None:
-    """One lobe, (R, C, 3) points of its surface, with the light's direction and the horizon.
-
-    `axes` is an Axes3D, for which matplotlib has no types.
-    """
-    x, y, z = np.moveaxis(surface, -1, 0)
-    axes.plot_surface(x, y, z, color="#e0b64a", rcount=61, ccount=61, linewidth=0, antialiased=False)
-    angle = np.radians(incidence)
-    axes.plot([0, -np.sin(angle)], [0, 0], [0, np.cos(angle)], color="crimson", linewidth=1.2)
-    ring = np.linspace(0, 2 * np.pi, 97)
-    axes.plot(np.cos(ring), np.sin(ring), 0 * ring, color="0.6", linewidth=0.5)
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(0, 1))
-    axes.set_box_aspect((2, 2, 1), zoom=1.35)
-    axes.view_init(elev=24, azim=-65)
-    axes.set_axis_off()
-
-
-def _sphere_row(row_axes: Sequence[Any], models: Models, plot: Plot) -> None:
-    for axes, model in zip(row_axes, models, strict=True):
-        _draw_picture(axes, views.lit_sphere(model))
-
-
-def _plane_row(row_axes: Sequence[Any], models: Models, plot: Plot) -> None:
-    for axes, model in zip(row_axes, models, strict=True):
-        _draw_picture(axes, views.lit_plane(model))
-
-
-def _draw_picture(axes: Axes, picture: Doubles) -> None:
-    """A picture, (H, W, 4) linear R, G, B, premultiplied, and coverage."""
-    alpha = picture[..., 3:]
-    color = to_srgb(np.clip(picture[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
-    axes.imshow(np.concatenate([color, alpha], axis=-1), interpolation="antialiased")
-    axes.set_axis_off()
-
-
-def _scale(values: Sequence[Doubles]) -> float:
-    """The largest of the values, rounded up to a number with few digits, above 0."""
-    largest = max((float(each.max()) for each in values), default=0.0)
-    if not largest > 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(largest))
-    return float(
-        next(step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if step * power >= largest * (1 - 1e-12)) * power
+    if not named:
+        return 0
+    longest = max(len(re.sub(r"\\[a-z]+|[${}]", "", name)) for name in named)
+    columns = max(1, min(len(named), int(width / (0.5 + 0.06 * longest))))
+    figure.legend(
+        handles=[Line2D([], [], label=name, **each.line()) for name, each in named.items()],
+        loc="outside upper center",
+        ncols=columns,
+        frameon=False,
+        handlelength=2.4,
+        columnspacing=1.2,
     )
-
-
-def _radius(values: Doubles, top: float, log: bool) -> Doubles:
-    """Values as radii, 1 at `top` and beyond; on a logarithmic scale 0 at DECADES below."""
-    share = np.minimum(values / top, 1)
-    return np.maximum(1 + np.log10(np.maximum(share, 1e-300)) / DECADES, 0) if log else share
-
-
-ROWS: dict[str, Callable[[Sequence[Any], Models, Plot], None]] = {
-    "polar": _polar_row,
-    "sphere": _sphere_row,
-    "plane": _plane_row,
-    "lobe": _lobe_row,
-}
-"""View -> the function that draws its row."""
+    return -(-len(named) // columns)

@@ -6,25 +6,50 @@ from collections.abc import Sequence
 
 from illumcli.records import Value
 
-VIEWS = ("polar", "sphere", "plane", "lobe")
+CURVES = ("polar", "cartesian", "across", "albedo")
+"""Views that are curves, of which several models may share one axis."""
+VIEWS = (*CURVES, "sphere", "plane", "lobe")
+DEFAULT_VIEWS = ("polar", "sphere", "plane", "lobe")
+COLUMN = 3.3
+"""Width of a column of a paper [inches]."""
+PER_MODEL = 3.1
+"""Width of a model's column where none is given [inches]."""
 
 
 class Plot(Value):
-    """The rows of a drawing, and the quantities on their axes."""
+    """The views of a drawing, the quantities on their axes, and its size."""
 
-    views: Sequence[str] = VIEWS
-    """Names of the rows."""
+    views: Sequence[str] = DEFAULT_VIEWS
+    """Names of the views, from the top."""
     angles: Sequence[float] = (15.0, 40.0, 65.0)
-    """Angles of incidence of the polar slices [degrees]."""
+    """Angles of incidence of the slices [degrees]."""
     log: bool = False
     """True for a logarithmic scale of slices and lobes."""
     times_cos: bool = False
     """True for the response, cosine included, instead of the BRDF."""
+    overlay: bool = False
+    """True if the curves of all models share an axis."""
+    per_channel: bool = False
+    """True for a curve of each channel instead of luminance."""
+    labels: Sequence[str] = ()
+    """What titles and legends call the models, in their order; by default their names."""
+    width: float | None = None
+    """Of the whole drawing [inches]; by default that of a column for each model."""
 
     @property
     def lobe_angle(self) -> float:
         """Angle of incidence of the lobe [degrees]: the middle one of the slices."""
         return sorted(self.angles)[len(self.angles) // 2]
+
+    def shares_axis(self, view: str) -> bool:
+        """True if all models are drawn on one axis of this view."""
+        return self.overlay and view in CURVES
+
+    def inches(self, models: int) -> float:
+        """Width of the whole drawing."""
+        if self.width is not None:
+            return self.width
+        return COLUMN if all(map(self.shares_axis, self.views)) else PER_MODEL * models
 
 
 PLOT = Plot()

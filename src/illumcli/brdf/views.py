@@ -48,7 +48,7 @@ def values(
     return out
 
 
-def _seen_from(model: IlluminationModel, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
+def seen_from(model: IlluminationModel, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
     """(N, 3) values of the flat surface lit from `incidence` degrees, seen from unit vectors `v`."""
 
     def everywhere(vector: tuple[float, float, float]) -> Vectors:
@@ -83,7 +83,25 @@ def polar_slice(
     angles = slice_angles(incidence)
     theta = np.radians(angles)
     v = column_major(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1))
-    return angles, _seen_from(model, incidence, v, times_cos)
+    return angles, seen_from(model, incidence, v, times_cos)
+
+
+def across_slice(
+    model: IlluminationModel, incidence: float, times_cos: bool = False
+) -> tuple[Doubles, Doubles]:
+    """(K,) angles from the mirror direction in degrees and (K, 3) values, at right angles to the plane of
+    incidence.
+
+    Parameters
+    ----------
+    incidence : float
+        Angle of the light to the normal [degrees].
+    """
+    angles = slice_angles(0)
+    away, angle = np.radians(angles), np.radians(incidence)
+    mirrored = np.cos(away)
+    v = np.stack([mirrored * np.sin(angle), np.sin(away), mirrored * np.cos(angle)], axis=1)
+    return angles, seen_from(model, incidence, column_major(v), times_cos)
 
 
 def lobe(
@@ -103,7 +121,7 @@ def lobe(
     # Rotate the axis from the mirror direction to the normal.
     x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
     v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
-    values = _seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
+    values = seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
     return v, np.reshape(values, v.shape)
 
 

@@ -28,7 +28,7 @@ CASES = {
     "cook_torrance, beckmann": (
         "cook_torrance",
         ["diffuse=[.3,.2,.1]", "specular_weight=.4", "distribution.m=.2"],
-        ["fresnel={F: dielectric, ior: 1.5}"],
+        ["distribution={D: beckmann}", "fresnel={F: dielectric, ior: 1.5}"],
     ),
     "cook_torrance, ggx": (
         "cook_torrance",
@@ -111,6 +111,6 @@ def z_scores(case, seeds, count=2000, metric="cosine", with_errors=True):
         held = np.array([case == "lafortune" and label == "cx" for label in parameters.labels()])
         x, held = within_limits(problem, true, held)
         errors = measurement.standard_error * measurement.l[:, 2:] if with_errors else None
-        known = uncertainty(problem, Optimum(x, held, 0 * held, 1, 1), errors)
+        known = uncertainty(problem, Optimum(x, held, np.zeros_like(held), 1, 1), errors)
         out.append(((x - true) * slopes(problem, x) / known.standard_error)[~held])
     return np.array(out)

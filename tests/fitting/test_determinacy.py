@@ -106,3 +106,13 @@ def test_two_lobes_are_told_apart():
 def test_models_of_one_lobe_refuse_two():
     with pytest.raises(InputError, match=r"ward: has one specular lobe.*models with several: lafortune"):
         with_lobes(only("ward"), 2)
+
+
+def test_common_noise_of_the_channels_counts_once():
+    """Three channels of one noise tell no more than one of a model that is grey."""
+    pairs = measured("oren_nayar", 400, 0)
+    ratios = {}
+    for common in (False, True):
+        fit = fit_model(only("oren_nayar"), replace(pairs, is_noise_common=common))
+        ratios[common] = fit.uncertainty.standard_error[-1]
+    assert 1.4 < ratios[True] / ratios[False] < 3**0.5 + 1e-9

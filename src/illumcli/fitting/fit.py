@@ -65,7 +65,7 @@ def fit_model(
     optimum = solve(problem, progress)
     errors = measurement.standard_error
     errors = None if errors is None else errors * measurement.l[:, 2:]
-    known = uncertainty(problem, optimum, errors)
+    known = uncertainty(problem, optimum, errors, measurement.is_noise_common)
 
     # The distances at the parameters as they are shown.
     material = material_of(model, parameters, optimum.x, known.standard_error)

@@ -45,6 +45,7 @@ def measured_pairs(path: Path) -> Measurement:
         standard_error=errors[kept],
         is_isotropic=table.is_isotropic,
         about=f"{kept.size} of {table.brdf[0].size} cells below {STEEPEST:g} degrees",
+        is_noise_common=True,
     )
 
 

@@ -32,6 +32,8 @@ class Measurement(Record):
     """True if the file's format has no azimuth of the surface."""
     about: str
     """How the pairs were chosen."""
+    is_noise_common: bool = False
+    """True if the channels of a pair have the same noise, from the same rays; otherwise it is independent."""
 
 
 def read_measurement(path: Path) -> Measurement:

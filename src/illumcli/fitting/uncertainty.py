@@ -45,13 +45,17 @@ class Uncertainty(Record):
     """Names of parameters of which a combination has a standard error above `LOOSE`."""
 
 
-def uncertainty(problem: Problem, optimum: Optimum, standard_error: Doubles | None) -> Uncertainty:
+def uncertainty(
+    problem: Problem, optimum: Optimum, standard_error: Doubles | None, is_noise_common: bool = False
+) -> Uncertainty:
     """Standard errors and undetermined parameters.
 
     Parameters
     ----------
     standard_error : ndarray, optional
         (N, 3) of the data, f_r n.l.
+    is_noise_common : bool
+        The channels of a pair have the same noise, instead of independent noise.
     """
     free = np.flatnonzero(~optimum.is_held)
     labels = np.array(problem.parameters.labels())[free]
@@ -66,7 +70,11 @@ def uncertainty(problem: Problem, optimum: Optimum, standard_error: Doubles | No
     inverse = (axes.T / np.square(values)) @ axes
     residuals = problem.residuals(optimum.x).reshape(-1, 3)
     spread = _spread(problem, optimum.x, standard_error)
-    C = inverse @ _middle(directions.J, inverse, residuals, spread) @ inverse
+    if spread is None:
+        middle = _middle(directions.J, inverse, residuals)
+    else:
+        middle = _known_middle(directions.J, spread, is_noise_common)
+    C = inverse @ middle @ inverse
     variances, combinations = np.linalg.eigh(C)
     loose = [directions.members(axis) for axis in combinations.T[variances > LOOSE**2]]
 
@@ -93,12 +101,16 @@ def _spread(problem: Problem, x: Doubles, standard_error: Doubles | None) -> Dou
     return slope * standard_error * np.sqrt(problem.weight / 3)[:, None]
 
 
-def _middle(J: Doubles, inverse: Doubles, residuals: Doubles, spread: Doubles | None) -> Doubles:
-    """(P, P) the sum of J_i^T S_i J_i."""
+def _known_middle(J: Doubles, spread: Doubles, is_noise_common: bool) -> Doubles:
+    """(P, P) the sum of J_i^T S_i J_i, from the standard errors of the residuals, (N, 3)."""
+    scaled = J.reshape(-1, 3, J.shape[1]) * spread[..., None]
+    pulled = scaled.sum(axis=1) if is_noise_common else scaled.reshape(J.shape)
+    return pulled.T @ pulled
+
+
+def _middle(J: Doubles, inverse: Doubles, residuals: Doubles) -> Doubles:
+    """(P, P) the sum of J_i^T S_i J_i, from the residuals, (N, 3)."""
     blocks = J.reshape(-1, 3, J.shape[1])
-    if spread is not None:
-        scaled = blocks * spread[..., None]
-        return np.einsum("ncp,ncq->pq", scaled, scaled)
     rest = np.eye(3) - np.einsum("ncp,pq,ndq->ncd", blocks, inverse, blocks, optimize=True)
     values, vectors = np.linalg.eigh(rest)
     turned = np.einsum("ncd,nc->nd", vectors, residuals) / np.sqrt(np.maximum(values, 1e-6))

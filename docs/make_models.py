@@ -32,7 +32,8 @@ Any colour or number marked so may vary over the surface: `{texture: bark.png}` 
 may have a `factor`; a texture may be multiplied by an attribute too, `{texture: bark.png, vertex: color}`,
 and looked up by another attribute than the mesh's uv, `uv: uv1`. The samples of a pixel average what it
 covers (`film.samples`); there are no smaller copies of the image. Values beyond a parameter's range are
-clipped to it, and the report counts them.
+clipped to it, and the report counts them. In films a parameter may vary over time and surface at once
+([animation](animation.md#over-time-and-surface)).
 
 ```sh
 illum models

@@ -38,7 +38,7 @@ def schema() -> dict[str, Any]:
     scene_schema = schema_of(Scene)
     parts = scene_schema.pop("$defs")
     frames = parts.pop("Frames")
-    parts = {name: _varying(part) for name, part in parts.items()} | {"Frames": frames} | _curves()
+    parts = _curves() | {name: _varying(part) for name, part in parts.items()} | {"Frames": frames}
     fixed = {key: scene_schema["properties"][key] for key in FIXED}
     scene_schema = _varying(scene_schema)
     scene_schema["properties"] = {"extends": EXTENDS, **scene_schema["properties"], **fixed}

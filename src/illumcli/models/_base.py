@@ -7,8 +7,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError, model_validator
 
-from illumcli.models._parameters import Texture, Varying, VertexValues
+from illumcli.models._parameters import CurveOverSurface, OverSurface, Varying
+from illumcli.schema.annotations import annotation_at, number_range
 from illumcli.schema.description import Description, nested, parts_of
 from illumcli.schema.fields import Color
 
@@ -74,6 +76,19 @@ class IlluminationModel(Description):
             faults.append(f"class {cls.__name__} has no lobe; define {' or '.join(LOBES)}")
         return faults
 
+    @model_validator(mode="after")
+    def _curves_fit(self) -> Self:
+        """Refuse curves of colours for parameters that are numbers."""
+        for path, value in self.varying().items():
+            if not isinstance(value, CurveOverSurface):
+                continue
+            wide = number_range(annotation_at(self, path)).width
+            if value.phi.width not in (1, wide):
+                error = ValueError(f"must be one number, its curve has {value.phi.width}")
+                fault: Any = {"type": "value_error", "loc": tuple(path.split(".")), "input": value}
+                raise ValidationError.from_exception_data(path, [fault | {"ctx": {"error": error}}])
+        return self
+
     def lobes(self) -> dict[str, Lobe]:
         """The lobes by name (`diffuse`, `specular`), without those that a parameter makes black."""
         return {
@@ -99,9 +114,9 @@ class IlluminationModel(Description):
         """What reflects ambient light: the surface colour, unless a model defines it otherwise."""
         return getattr(self, self.surface_color, (0.0, 0.0, 0.0))
 
-    def varying(self) -> dict[str, Texture | VertexValues]:
+    def varying(self) -> dict[str, OverSurface]:
         """The parameters that vary over the surface, by path: `specular`, or `distribution.m`."""
-        return {path: value for path, value in _parts(self) if isinstance(value, Texture | VertexValues)}
+        return {path: value for path, value in _parts(self) if isinstance(value, OverSurface)}
 
     def files(self) -> dict[str, str]:
         """The files that lobes read, by the path of the parameter that names each: `distribution.file`."""
@@ -148,17 +163,13 @@ class IlluminationModel(Description):
 
 def is_always(value: Any, number: float) -> bool:
     """True for this number, or a colour of it in all channels; False for what varies and what is left out."""
-    return (
-        value is not None
-        and not isinstance(value, Texture | VertexValues)
-        and bool(np.all(np.equal(value, number)))
-    )
+    return value is not None and not isinstance(value, Description) and bool(np.all(np.equal(value, number)))
 
 
 def _parts(part: Description | Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """All parameters and the parameters of their descriptions, by path."""
     for name, value in parts_of(part):
-        inner = {} if isinstance(value, Texture | VertexValues) else nested(value)
+        inner = {} if isinstance(value, OverSurface) else nested(value)
         if not inner:
             yield prefix + name, value
         for step, each in inner.items():

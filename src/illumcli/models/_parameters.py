@@ -1,15 +1,19 @@
-"""Parameters of materials: their ranges, and the textures and vertex values that may replace a constant."""
+"""Parameters of materials: their ranges, and the textures, vertex values and curves over the surface that may
+replace a constant."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
+from illumcli.formula import checked
+from illumcli.keyframes import Interpolation
 from illumcli.schema.annotations import field_annotation, split
 from illumcli.schema.description import Description
-from illumcli.schema.fields import Color, Shorthand, Triple, spread
+from illumcli.schema.fields import Color, ListOf, Number, Positive, Shorthand, Triple, spread
 
 
 class Texture(Description):
@@ -44,7 +48,7 @@ class VertexValues(Description):
     """Factor on each value; a scalar parameter takes the first number."""
 
 
-def _kind(value: Any) -> str:
+def _map_kind(value: Any) -> str:
     if isinstance(value, Texture) or (isinstance(value, dict) and "texture" in value):
         return "texture"
     if isinstance(value, VertexValues) or (isinstance(value, dict) and "vertex" in value):
@@ -54,10 +58,102 @@ def _kind(value: Any) -> str:
 
 T = TypeVar("T")
 # a constant, a texture or vertex values
-Varying: TypeAlias = Annotated[
+Mapped: TypeAlias = Annotated[
     Annotated[T, Tag("value")] | Annotated[Texture, Tag("texture")] | Annotated[VertexValues, Tag("vertex")],
+    Discriminator(_map_kind),
+]
+# three numbers, or one for all
+Numbers: TypeAlias = Annotated[Triple[Number], Shorthand(spread)]
+
+
+class Keys(Description):
+    """Values at some moments."""
+
+    positions: Annotated[ListOf[Number], Field(min_length=1)]
+    """The moments, increasing."""
+    values: Annotated[ListOf[ListOf[Number]], Field(min_length=1)]
+    """At each moment, a list of one number, or of three."""
+    interpolation: Interpolation = "linear"
+    """Between moments. `linear`: straight. `smooth`: a cubic. `step`: each value holds until the next."""
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Keys:
+        if len(self.values) != len(self.positions) or {len(row) for row in self.values} not in ({1}, {3}):
+            raise ValueError("must have a list of one or three numbers for each position")
+        if any(a >= b for a, b in zip(self.positions, self.positions[1:], strict=False)):
+            raise ValueError("must have positions that increase")
+        return self
+
+    @property
+    def width(self) -> int:
+        """How many numbers a value has."""
+        return len(self.values[0])
+
+
+def _checked(text: str) -> str:
+    return checked(text, ("frame", "time"))
+
+
+class Formulas(Description):
+    """Values computed from the moment."""
+
+    formulas: Annotated[ListOf[Annotated[str, AfterValidator(_checked)]], Field(min_length=1, max_length=3)]
+    """One formula of `frame` and `time` [s], or three."""
+    over: Literal["frame", "time"] = "frame"
+    """What moments are. `frame`: numbers of frames. `time`: seconds."""
+    fps: Positive = 24.0
+    """Frames per second."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers a value has."""
+        return len(self.formulas)
+
+
+class CurveOverSurface(Description):
+    """A curve with maps at a moment t: scale * phi(rate * t - delay) + offset. Frames make it of `curve`."""
+
+    moment: Number
+    """t, in frames or in seconds."""
+    phi: Annotated[
+        Annotated[Keys, Tag("keys")] | Annotated[Formulas, Tag("formulas")],
+        Discriminator(lambda phi: "formulas" if isinstance(phi, Formulas) or "formulas" in phi else "keys"),
+    ]
+    """The curve."""
+    rate: Mapped[Number] = 1.0
+    """How fast time passes."""
+    delay: Mapped[Number] = 0.0
+    """How much later the curve begins, in the unit of t."""
+    scale: Mapped[Numbers] = (1.0, 1.0, 1.0)
+    """Factor on each value; a scalar parameter takes the first number."""
+    offset: Mapped[Numbers] = (0.0, 0.0, 0.0)
+    """Added to each value; a scalar parameter takes the first number."""
+
+    def maps(self) -> Iterator[tuple[str, Texture | VertexValues]]:
+        """The names and the maps of what varies over the surface."""
+        return ((name, value) for name, value in self if isinstance(value, Texture | VertexValues))
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, CurveOverSurface) or (isinstance(value, dict) and "phi" in value):
+        return "curve"
+    return _map_kind(value)
+
+
+OverSurface: TypeAlias = Texture | VertexValues | CurveOverSurface
+# a constant, or what varies over the surface
+Varying: TypeAlias = Annotated[
+    Annotated[T, Tag("value")]
+    | Annotated[Texture, Tag("texture")]
+    | Annotated[VertexValues, Tag("vertex")]
+    | Annotated[CurveOverSurface, Tag("curve")],
     Discriminator(_kind),
 ]
+
+
+def maps_of(value: OverSurface) -> tuple[Texture | VertexValues, ...]:
+    """The textures and vertex values that a parameter reads: itself, or the maps of a curve."""
+    return tuple(each for _, each in value.maps()) if isinstance(value, CurveOverSurface) else (value,)
 
 
 @cache

@@ -10,7 +10,7 @@ from illumcli.cache.fingerprint import FileFingerprints
 from illumcli.graph import Node
 from illumcli.images.textures import Images
 from illumcli.models._base import IlluminationModel
-from illumcli.models._parameters import Texture
+from illumcli.models._parameters import Texture, maps_of
 from illumcli.render_graph import needs, stages
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
@@ -83,4 +83,4 @@ def _choice(scene: Scene, thing: Object, name: str) -> tuple[Choice, dict[Token,
 
 def _varied(models: Iterable[IlluminationModel]) -> list[Any]:
     """The textures and vertex values of all models."""
-    return [each for model in models for each in model.varying().values()]
+    return [each for model in models for value in model.varying().values() for each in maps_of(value)]

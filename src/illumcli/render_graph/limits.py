@@ -16,7 +16,7 @@ from illumcli.layers import Layer
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.mesh_files import companions, is_mesh_file
 from illumcli.models._base import IlluminationModel
-from illumcli.models._parameters import Texture
+from illumcli.models._parameters import Texture, maps_of
 from illumcli.render_graph import needs
 from illumcli.render_graph.build import Graph
 from illumcli.render_graph.explain import expected_rays
@@ -105,7 +105,8 @@ def _textures(scene: Scene) -> Iterator[tuple[str, str | None]]:
         models |= {id(model): model for model in (own, fallback) if model is not None}
     if by_name:
         models |= {id(model): model for model in scene.materials.values()}
-    values = (value for model in models.values() for value in model.varying().values())
+    varying = (value for model in models.values() for value in model.varying().values())
+    values = (each for value in varying for each in maps_of(value))
     yield from dict.fromkeys((value.texture, value.space) for value in values if isinstance(value, Texture))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from illumcli.scene.faults import faults
 from illumcli.scene.frames import FRAMES_PER_SECOND, Frames, Moment
 from illumcli.scene.problems import problem_at
 from illumcli.scene.scene_file import SceneFile
-from illumcli.scene.source import Node, Place, Problem
+from illumcli.scene.source import Node, Problem
 from illumcli.scene.source import Path as Steps
 from illumcli.schema.families import member
 from illumcli.schema.messages import short
@@ -84,6 +85,9 @@ class AtFrame(Value):
         """The text of a fault at `path`; it names the frame if the fault concerns a value that varies."""
         if not any(path[: len(each)] == each or each[: len(path)] == path for each in self.varying):
             return fact
+        node = self.tree.find(path)
+        if fact.endswith("is a mapping") and node and isinstance(node.value, dict) and "phi" in node.value:
+            fact = "maps vary it over the surface, and only parameters of materials may; leave them out"
         if fact.startswith("must be a whole number"):
             fact += "; whole numbers have curve: step"
         return f"at frame {self.frame}: {fact}"
@@ -113,7 +117,8 @@ def at_frame(tree: Node, frame: int | None, surroundings: Surroundings) -> AtFra
     if frame is None and frames is not None:
         frame = frames.first
     if frame is not None:
-        moment = Moment(frame, frame / (frames.fps if frames else FRAMES_PER_SECOND))
+        fps = frames.fps if frames else FRAMES_PER_SECOND
+        moment = Moment(frame, frame / fps, fps)
     evaluation = _Evaluation(moment, surroundings)
     tree = evaluation.node(tree, ()) if _may_vary(tree) else tree
     if moment is None and "frames" in (tree.value if isinstance(tree.value, dict) else ()):
@@ -200,7 +205,7 @@ class _Evaluation:
                 value = curve.value_at(self.moment, self.surroundings.read)
             except ValueError as error:
                 return self.refuse(node, path, node, (), f"at frame {self.moment.frame}: {error}")
-            written = _placed(value, node.place)
+            written = _placed(value, node)
         self.varying.append(path)
         return self.node(replace(written, key=node.key and written.at), path)
 
@@ -222,8 +227,12 @@ def is_curve(node: Node) -> bool:
     )
 
 
-def _placed(value: Any, place: Place) -> Node:
-    """A plain value as a node, all at one place."""
+def _placed(value: Any, curve: Node) -> Node:
+    """The value of a curve as a node at the curve's place; maps keep their own node."""
+    if isinstance(value, Mapping):
+        given = curve.value if isinstance(curve.value, dict) else {}
+        parts = {name: given[name] if name in given else _placed(part, curve) for name, part in value.items()}
+        return Node(dict(parts), curve.place)
     if isinstance(value, list | tuple):
-        return Node([_placed(part, place) for part in value], place)
-    return Node(value, place)
+        return Node([_placed(part, curve) for part in value], curve.place)
+    return Node(value, curve.place)

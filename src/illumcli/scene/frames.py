@@ -24,9 +24,11 @@ FrameNumber: TypeAlias = Annotated[int, Field(ge=0, le=LAST_FRAME)]
 class Moment(Value):
     """What a curve is evaluated at."""
 
-    frame: int
+    frame: float
+    """A whole number, unless a delay or rate shifts it."""
     time: float
     """frame / fps [s]."""
+    fps: float = FRAMES_PER_SECOND
 
 
 class Frames(Description):

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Ids, Vectors, column_major, take_rows
+from illumcli.arrays import F, Ids, Vectors, column_major, row_blocks, take_rows
 from illumcli.color import Space, Texels
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, Repairs, note
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.models._base import IlluminationModel
-from illumcli.models._parameters import Texture, VertexValues
+from illumcli.models._parameters import CurveOverSurface, OverSurface, Texture, VertexValues
 from illumcli.rays.corner_weights import CornerWeights, TriangleCorners
 from illumcli.rays.interaction import Hits, uv_at
 from illumcli.records import Record, Value
 from illumcli.schema.annotations import annotation_at, number_range
 from illumcli.schema.fields import LARGEST
+from illumcli.shading.curves import WIDTHS, curve_at
 from illumcli.shading.materials import Materials, colors_at
 
 Floats: TypeAlias = NDArray[np.float32]
@@ -126,14 +128,25 @@ class Map(Record):
     uv: Floats | None = None  # (V, 2) texture coordinates that replace those of the meshes
 
 
-class Varying(Record):
-    """The textures and vertex values of all materials."""
+class Curved(Record):
+    """A curve with maps that a parameter is computed from."""
 
-    of_material: tuple[Mapping[str, Map | Attribute], ...] = ()  # by material number, by path
+    curve: CurveOverSurface
+    maps: Mapping[str, Map | Attribute]
+    within: Range
+
+
+Source: TypeAlias = Map | Attribute | Curved
+
+
+class Varying(Record):
+    """The textures, vertex values and curves of all materials."""
+
+    of_material: tuple[Mapping[str, Source], ...] = ()  # by material number, by path
     repairs: Repairs = field(default_factory=dict)
 
 
-def paths(model: IlluminationModel, purpose: str) -> dict[str, Texture | VertexValues]:
+def paths(model: IlluminationModel, purpose: str) -> dict[str, OverSurface]:
     """The varying parameters that are needed for a purpose: `lobes`, `ambient` or `emission`."""
     of_lobes = model.varying()
     others = {name: of_lobes.pop(name) for name in ("emission", "ambient") if name in of_lobes}
@@ -168,10 +181,23 @@ def textures(
     problems: list[str] = []
     repairs: dict[str, Repair] = {}
 
-    def source(number: int, path: str, value: Texture | VertexValues) -> Map | Attribute:
+    def source(number: int, path: str, value: OverSurface) -> Source:
         """The data of one parameter."""
         within = parameter_range(materials.models[number], path)
         where = f"material {materials.names[number]}: {path}"
+        if not isinstance(value, CurveOverSurface):
+            return lookup(number, value, within, where)
+        maps = {}
+        for name, each in value.maps():
+            any_number = Range(min(WIDTHS[name], within.width), -LARGEST, LARGEST)
+            maps[name] = lookup(number, each, any_number, f"{where}.{name}")
+        curved = Curved(value, maps, within)
+        outside = _outside(curved, _vertices_of(geometry, used_by[number]), where)
+        _note_clipped(outside, within, f"values beyond {where}", repairs)
+        return curved
+
+    def lookup(number: int, value: Texture | VertexValues, within: Range, where: str) -> Map | Attribute:
+        """The data of one texture or of vertex values."""
         lacking = [_lacks(geometry, value, i, object_names[i], where, within.width) for i in used_by[number]]
         if any(lacking):
             raise InputError(filter(None, lacking))
@@ -192,9 +218,9 @@ def textures(
         return Map(image, value.filter, value.wrap, within, factor, table, uv)
 
     # Read those of each material in turn; faults of the scene's own materials are reported together.
-    of_material: list[dict[str, Map | Attribute]] = []
+    of_material: list[dict[str, Source]] = []
     for number, model in enumerate(materials.models):
-        sources: dict[str, Map | Attribute] = {}
+        sources: dict[str, Source] = {}
         for path, value in (paths(model, purpose) if used_by[number] else {}).items():
             try:
                 sources[path] = source(number, path, value)
@@ -268,6 +294,13 @@ def _lacks(
     return None
 
 
+def _vertices_of(geometry: SceneGeometry, objects: Sequence[int]) -> Ids:
+    """Numbers of the stored vertices of these objects."""
+    placed = [geometry.placed[which] for which in {int(geometry.placed_mesh[i]) for i in objects}]
+    parts = [each.first_vertex + np.arange(len(each.mesh.vertices), dtype=np.int32) for each in placed]
+    return np.concatenate(parts)
+
+
 def _table(geometry: SceneGeometry, attribute: str, objects: Sequence[int], width: int) -> Floats:
     """(V, C) an attribute of these objects at all stored vertices; 0 at the vertices of others."""
     out = np.zeros((len(geometry.vertices), width), F)
@@ -302,6 +335,60 @@ def _clipped(values: Floats, within: Range, what: str, repairs: dict[str, Repair
 def _note_clipped(outside: int, within: Range, what: str, repairs: dict[str, Repair]) -> None:
     if outside:
         note(repairs, f"{what} clipped to {within.low:g}..{within.high:g}", count=outside)
+
+
+def _outside(curved: Curved, vertices: Ids, where: str) -> int:
+    """How many values of a curve are out of range: at the texels of its largest texture, or at the vertices
+    if it has none. Of vertex values beside textures, the smallest and the largest count.
+
+    Raises
+    ------
+    InputError
+        A value is not finite.
+    """
+    textures = {name: each for name, each in curved.maps.items() if isinstance(each, Map)}
+    of_vertices = {
+        name: _times(each.values.take(vertices, axis=0), each.factor)
+        for name, each in curved.maps.items()
+        if isinstance(each, Attribute)
+    }
+    if not textures:
+        return int(np.count_nonzero(_is_outside(curved, of_vertices, where)))
+
+    # Texel by texel, with all combinations of the extremes of vertex values.
+    image = max((each.image for each in textures.values()), key=lambda each: each.height * each.width)
+    extremes = [(values.min(axis=0), values.max(axis=0)) for values in of_vertices.values()]
+    count = 0
+    for block in row_blocks(image.height * image.width):
+        uv = _texel_centres(image, np.arange(block.start, block.stop))
+        at_texels = {
+            name: _times(FILTERS[each.filter](each.image, uv, each.wrap), each.factor)
+            for name, each in textures.items()
+        }
+        outside: Any = False
+        for row in product(*extremes):
+            ends = {name: np.tile(end, (len(uv), 1)) for name, end in zip(of_vertices, row, strict=True)}
+            outside = outside | _is_outside(curved, at_texels | ends, where)
+        count += int(np.count_nonzero(outside))
+    return count
+
+
+def _is_outside(curved: Curved, maps: Mapping[str, Floats], where: str) -> NDArray[np.bool_]:
+    """(N, C) is each value of a curve out of range, by the values of its maps?"""
+    values = curve_at(curved.curve, maps, curved.within.width)
+    if not np.isfinite(values).all():
+        raise InputError(f"{where}: its formula is not finite at some points; mind its domain")
+    return (values < curved.within.low) | (values > curved.within.high)
+
+
+def _texel_centres(image: Texels, number: NDArray[np.int64]) -> Floats:
+    """(N, 2) uv of the centres of texels, numbered row by row."""
+    v, u = np.divmod(number, image.width)
+    return np.stack([(u + 0.5) / image.width, (v + 0.5) / image.height], axis=1).astype(F)
+
+
+def _times(values: Floats, factor: Floats | None) -> Floats:
+    return values if factor is None else values * factor
 
 
 # --- at points ------------------------------------------------------------------------------------------
@@ -352,24 +439,14 @@ def parameters(
         if not index.size:
             continue
         weights = point_weights.take(index)
-        mesh_uv = None
+        lookup = _Lookup(geometry, weights, uvs)
         for path, source in sources.items():
-            # Interpolate vertex values, or look the texture up.
-            if isinstance(source, Attribute):
-                value = weights.interpolate_vertices(geometry, source.values)
+            # Look it up, clip what rounding or a curve took out of range, and store at the material's points.
+            if isinstance(source, Curved):
+                maps = {name: lookup.of(each) for name, each in source.maps.items()}
+                value = curve_at(source.curve, maps, source.within.width).astype(F)
             else:
-                if source.uv is not None:
-                    uv = weights.interpolate_vertices(geometry, source.uv)
-                else:
-                    assert uvs is not None
-                    uv = mesh_uv = uv_at(geometry, uvs, weights) if mesh_uv is None else mesh_uv
-                value = FILTERS[source.filter](source.image, uv, source.wrap)
-                if source.vertex is not None:
-                    value = value * weights.interpolate_vertices(geometry, source.vertex)
-
-            # Scale, clip what rounding took out of range, and store at the material's points.
-            if source.factor is not None:
-                value = value * source.factor
+                value = lookup.of(source)
             key = path, source.within.width
             at_all = values.setdefault(key, np.zeros((len(material), source.within.width), F, order="F"))
             at_all[index] = np.clip(value, F(source.within.low), F(source.within.high))
@@ -377,6 +454,34 @@ def parameters(
         tuple(names),
         {key: at_all[:, 0] if key[1] == 1 else column_major(at_all) for key, at_all in values.items()},
     )
+
+
+class _Lookup:
+    """Looks textures and vertex values up at points; the uv of the meshes are computed once."""
+
+    def __init__(self, geometry: SceneGeometry, weights: CornerWeights, uvs: CornerVectors | None) -> None:
+        self._geometry, self._weights, self._uvs = geometry, weights, uvs
+        self._mesh_uv: Floats | None = None
+
+    def of(self, source: Map | Attribute) -> Floats:
+        """(N, C) values at the points, times the factor."""
+        if isinstance(source, Attribute):
+            value = self._at_vertices(source.values)
+        else:
+            uv = self._uv() if source.uv is None else self._at_vertices(source.uv)
+            value = FILTERS[source.filter](source.image, uv, source.wrap)
+            if source.vertex is not None:
+                value = value * self._at_vertices(source.vertex)
+        return _times(value, source.factor)
+
+    def _at_vertices(self, table: Floats) -> Floats:
+        return self._weights.interpolate_vertices(self._geometry, table)
+
+    def _uv(self) -> Floats:
+        if self._mesh_uv is None:
+            assert self._uvs is not None
+            self._mesh_uv = uv_at(self._geometry, self._uvs, self._weights)
+        return self._mesh_uv
 
 
 def texel_positions(
@@ -393,9 +498,13 @@ def texel_positions(
     """
     out = np.zeros((len(material), 2), F, order="F")
     for number in range(max((len(each.of_material) for each in varying), default=0)):
-        maps = [
-            each for part in varying for each in part.of_material[number].values() if isinstance(each, Map)
+        sources = [each for part in varying for each in part.of_material[number].values()]
+        sources = [
+            each
+            for source in sources
+            for each in (source.maps.values() if isinstance(source, Curved) else (source,))
         ]
+        maps = [each for each in sources if isinstance(each, Map)]
         at = np.flatnonzero(material == number) if maps else np.zeros(0, np.int64)
         if not at.size:
             continue

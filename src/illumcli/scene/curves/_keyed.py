@@ -7,8 +7,10 @@ from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from illumcli.scene.curves._base import Curve, Over, ReadFile
-from illumcli.scene.curves._keys import Interpolation, between, key_numbers, numeric, same_shape
+from illumcli.keyframes import Interpolation
+from illumcli.scene.curves._base import Over, ReadFile
+from illumcli.scene.curves._keys import between, key_numbers, keys_over_surface, numeric, same_shape
+from illumcli.scene.curves._mapped import MappedCurve
 from illumcli.scene.frames import Moment
 
 
@@ -43,7 +45,7 @@ def _interpolable(keys: dict[str, Any]) -> dict[str, Any]:
 NumberKeys: TypeAlias = Annotated[Keys, AfterValidator(_interpolable)]
 
 
-class KeyedCurve(Curve):
+class KeyedCurve(MappedCurve):
     """Values at some frames or times; the first holds before its key, the last after its own."""
 
     keys: Keys
@@ -55,13 +57,26 @@ class KeyedCurve(Curve):
 
     def key_at(self, moment: Moment) -> str | None:
         """The key at this moment, the first before it or the last after it; for steps, the latest one."""
+        if not self.is_plain():
+            return None
         at, keys = getattr(moment, self.over), key_numbers(self.keys)
         position, text = keys[max(0, bisect_right([number for number, _ in keys], at) - 1)]
         is_outside = at <= keys[0][0] or at >= keys[-1][0]
         return text if is_outside or at == position or self.interpolation == "step" else None
 
-    def value_at(self, moment: Moment, read: ReadFile) -> Any:
+    def axis(self, read: ReadFile) -> Over:
+        return self.over
+
+    def phi_at(self, moment: Moment, read: ReadFile) -> Any:
         keys = key_numbers(self.keys)
-        values = same_shape([numeric(self.keys[text]) for _, text in keys])
+        if self.interpolation == "step":
+            values = [self.keys[text] for _, text in keys]
+        else:
+            values = same_shape([numeric(self.keys[text]) for _, text in keys])
         at = getattr(moment, self.over)
         return between(at, [number for number, _ in keys], values, self.interpolation)
+
+    def phi(self, moment: Moment, read: ReadFile) -> dict[str, Any]:
+        keys = key_numbers(self.keys)
+        values = [self.keys[text] for _, text in keys]
+        return keys_over_surface([number for number, _ in keys], values, self.interpolation)

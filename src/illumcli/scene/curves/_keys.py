@@ -1,10 +1,4 @@
-"""Interpolation between keys: positions on an axis, each with the value there.
-
-References
-----------
-Fritsch, F. N., Butland, J. (1984). A method for constructing local monotone piecewise cubic interpolants.
-SIAM Journal on Scientific and Statistical Computing 5(2).
-"""
+"""Interpolation between keys: positions on an axis, each with the value there."""
 
 from __future__ import annotations
 
@@ -13,13 +7,14 @@ import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
+import numpy as np
+
+from illumcli.keyframes import Interpolation, interpolate
 from illumcli.scene.curves._base import rounded
 from illumcli.schema.fields import color
 from illumcli.schema.messages import describe, short
-
-Interpolation: TypeAlias = Literal["linear", "smooth", "step"]
 
 
 def key_numbers(keys: Mapping[str, Any]) -> list[tuple[float, str]]:
@@ -103,34 +98,33 @@ def between(at: float, positions: Sequence[float], values: Sequence[Any], how: I
     index = bisect_right(positions, at) - 1
     if how == "step" or index < 0 or index == len(positions) - 1:
         return _rounded(values[max(index, 0)])
-    if isinstance(values[0], list):
-        return [between(at, positions, column, how) for column in zip(*values, strict=True)]
-    a, b = values[index], values[index + 1]
-    width = positions[index + 1] - positions[index]
-    t = (at - positions[index]) / width
-    if how == "linear":
-        return rounded((1 - t) * a + t * b)
-
-    # Hermite's cubic with slopes that keep it between the keys.
-    slope_a, slope_b = (_slope(k, positions, values) for k in (index, index + 1))
-    rise = t * t * (3 - 2 * t)
-    ends = t * (1 - t) * width
-    return rounded((1 - rise) * a + rise * b + ends * ((1 - t) * slope_a - t * slope_b))
-
-
-def _slope(k: int, positions: Sequence[float], values: Sequence[float]) -> float:
-    """Slope at a key: 0 at ends and extremes, otherwise Fritsch and Butland's weighted harmonic mean."""
-    if k in (0, len(positions) - 1):
-        return 0.0
-    before, after = positions[k] - positions[k - 1], positions[k + 1] - positions[k]
-    rise_before, rise_after = (values[k] - values[k - 1]) / before, (values[k + 1] - values[k]) / after
-    if rise_before * rise_after <= 0:
-        return 0.0
-    weight_before, weight_after = 2 * after + before, after + 2 * before
-    return (weight_before + weight_after) / (weight_before / rise_before + weight_after / rise_after)
+    table = np.asarray(values, np.float64)
+    row = interpolate([at], positions, table.reshape(len(table), -1), how)
+    return _rounded(row.reshape(table.shape[1:]).tolist())
 
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, list):
         return [_rounded(part) for part in value]
     return rounded(value) if isinstance(value, float) else value
+
+
+def keys_over_surface(
+    positions: Sequence[float], values: Sequence[Any], how: Interpolation
+) -> dict[str, Any]:
+    """Keys in the form of `models._parameters.Keys`.
+
+    Raises
+    ------
+    ValueError
+        The values are neither numbers nor colours.
+    """
+    fact = "must have numbers or colours as keys, to vary over the surface by maps"
+    try:
+        table = same_shape([numeric(value) for value in values])
+    except ValueError:
+        raise ValueError(fact) from None
+    rows = [value if isinstance(value, list) else [value] for value in table]
+    if any(len(row) not in (1, 3) or any(isinstance(part, list) for part in row) for row in rows):
+        raise ValueError(fact)
+    return {"positions": [rounded(each) for each in positions], "values": rows, "interpolation": how}

@@ -9,21 +9,31 @@ import csv
 import io
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from illumcli.keyframes import Interpolation
 from illumcli.records import Value
-from illumcli.scene.curves._base import Curve, ReadFile
-from illumcli.scene.curves._keys import Interpolation, between, key_numbers, number_in, numeric, same_shape
+from illumcli.scene.curves._base import Over, ReadFile
+from illumcli.scene.curves._keys import (
+    between,
+    key_numbers,
+    keys_over_surface,
+    number_in,
+    numeric,
+    same_shape,
+)
+from illumcli.scene.curves._mapped import MappedCurve
 from illumcli.scene.frames import Moment
 from illumcli.schema.fields import ListOf
 from illumcli.schema.messages import suggestion
 
-AXES = ("frame", "time")
+AXES: tuple[Over, ...] = ("frame", "time")
 
 
-class ColumnCurve(Curve):
+class ColumnCurve(MappedCurve):
     curve: Literal["column"]
     file: str
     """Path of the CSV file, from the scene's folder."""
@@ -33,10 +43,11 @@ class ColumnCurve(Curve):
     """Between rows. `linear`: straight from row to row. `smooth`: as the curve of this name. `step`: each row
     holds until the next; for names and whole numbers."""
 
-    def value_at(self, moment: Moment, read: ReadFile) -> Any:
-        path, text = read(self.file)
-        names = (self.column,) if isinstance(self.column, str) else self.column
-        track = _track(text, str(path), names, self.interpolation)
+    def axis(self, read: ReadFile) -> Over:
+        return self._read(read)[1].axis or "frame"
+
+    def phi_at(self, moment: Moment, read: ReadFile) -> Any:
+        path, track = self._read(read)
         if track.axis is None and moment.frame >= len(track.positions):
             missing = f"{path} has {len(track.positions)} rows, for frames 0 to {len(track.positions) - 1}"
             raise ValueError(f"{missing}; add rows, or a column frame")
@@ -44,11 +55,21 @@ class ColumnCurve(Curve):
         row = between(at, track.positions, track.values, self.interpolation)
         return row[0] if isinstance(self.column, str) else row
 
+    def phi(self, moment: Moment, read: ReadFile) -> dict[str, Any]:
+        _, track = self._read(read)
+        return keys_over_surface(track.positions, track.values, self.interpolation)
+
+    def _read(self, read: ReadFile) -> tuple[Path, _Track]:
+        """Where the file is, and its columns."""
+        path, text = read(self.file)
+        names = (self.column,) if isinstance(self.column, str) else self.column
+        return path, _track(text, str(path), names, self.interpolation)
+
 
 class _Track(Value):
     """Columns of a table, by the positions of its rows."""
 
-    axis: str | None
+    axis: Over | None
     """Name of the column of positions; None if rows are numbered."""
     positions: list[float]
     values: list[Any]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from illumcli.keyframes import Interpolation
 from illumcli.scene.curves._keyed import KeyedCurve, NumberKeys
-from illumcli.scene.curves._keys import Interpolation
 
 
 class LinearCurve(KeyedCurve):

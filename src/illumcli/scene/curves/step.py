@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from illumcli.keyframes import Interpolation
 from illumcli.scene.curves._keyed import KeyedCurve, Keys
-from illumcli.scene.curves._keys import Interpolation
 
 
 class StepCurve(KeyedCurve):

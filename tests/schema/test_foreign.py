@@ -103,8 +103,10 @@ def test_broken_files_are_refused_all_at_once_with_their_lines(folder):
         FUZZ.replace("fuzz", "foreign").replace("(IlluminationModel)", "(IlluminationModel.__base__)")
     )
     (folder / "typo.py").write_text(FUZZ.replace("fuzz", "typo").replace("Varying[Share]", "Varyin[Share]"))
+    (folder / "leaving.py").write_text("import sys\nsys.exit(3)\n")
+    (folder / "untyped.py").write_text(FUZZ.replace("fuzz", "untyped").replace(": Varying[Share]", ""))
     told = faults_of(folder)
-    assert len(told) == 8
+    assert len(told) == 10
     for start, fact in (
         ("syntax.py:2: ", ""),
         ("importing.py:3: ", "ModuleNotFoundError: No module named 'no_such_module'"),
@@ -114,8 +116,11 @@ def test_broken_files_are_refused_all_at_once_with_their_lines(folder):
         ("lobeless.py:14: ", "has no lobe; define diffuse_lobe or specular_lobe"),
         ("foreign.py:14: ", "must be a subclass of illumcli.models._base.IlluminationModel"),
         ("typo.py:16: ", "name 'Varyin' is not defined"),
+        ("leaving.py:2: ", "SystemExit: 3"),
+        ("untyped.py:14: ", "PydanticUserError: A non-annotated attribute was detected"),
     ):
         assert any(line.startswith(start) and fact in line for line in told), (start, told)
+    assert not any("\n" in line for line in told)
 
 
 def test_a_tag_of_this_package_or_of_another_folder_is_refused(folder, tmp_path, monkeypatch):

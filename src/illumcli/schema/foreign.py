@@ -103,7 +103,7 @@ def _from_file(path: Path) -> ModuleType:
         exec(compile(path.read_bytes(), path, "exec", dont_inherit=True), vars(module))
     except BaseException as error:
         del sys.modules[full]
-        if not isinstance(error, Exception):
+        if not isinstance(error, Exception | SystemExit):
             raise
         raise BrokenMember(_fact(error, path, str(path))) from error
     finally:
@@ -115,7 +115,7 @@ def _from_package(point: EntryPoint) -> ModuleType:
     """The module of an entry point."""
     try:
         module = import_module(point.module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BrokenMember(_fact(error, None, str(point))) from error
     top = sys.modules[point.module.partition(".")[0]]
     if not hasattr(top, DIGEST):
@@ -137,14 +137,14 @@ def _digest(paths: Iterable[Path]) -> str:
     return hashlib.blake2b(b"".join(texts), digest_size=16).hexdigest()
 
 
-def _fact(error: Exception, path: Path | None, place: str) -> str:
+def _fact(error: Exception | SystemExit, path: Path | None, place: str) -> str:
     """Where a module fails and why."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{error.filename}:{error.lineno}: {error.msg}"
     frames = traceback.extract_tb(error.__traceback__)
     inside = [frame for frame in frames if path is None or Path(frame.filename).parent == path.parent]
     where = f"{inside[-1].filename}:{inside[-1].lineno}" if inside and path else place
-    return f"{where}: {type(error).__name__}: {error}"
+    return ": ".join([where, type(error).__name__, *str(error).splitlines()[:1]])
 
 
 def _unfit(package: str, tag: str, cls: type[Any]) -> Iterable[str]:

@@ -21,6 +21,7 @@ import yaml
 from numpy.typing import NDArray
 
 import rgl_files
+from illumcli.models._parameters import may_vary
 from illumcli.schema.families import member
 from illumcli.shading import rates as shading_rates
 from metamorphic import surfaces
@@ -128,15 +129,19 @@ def direction(random: Random, up: float) -> list[float]:
 
 
 def _cook_torrance(r: Random) -> dict[str, Any]:
+    def grain(across: str) -> dict[str, Any]:
+        return {across: number(r, 0.1, 0.6)} if r.random() < 0.5 else {}
+
     distribution = r.choice(
         [
             {"D": "gaussian", "m": number(r, 0.1, 0.6)},
-            {"D": "beckmann", "m": number(r, 0.1, 0.6)},
+            {"D": "beckmann", "m": number(r, 0.1, 0.6)} | grain("m_y"),
             {"D": "blinn", "beta": number(r, 0.1, 0.8)},
             {"D": "power", "exponent": number(r, 1, 60)},
             {"D": "torrance_sparrow", "beta": number(r, 0.1, 0.8)},
             {"D": "trowbridge_reitz", "beta": number(r, 0.1, 0.8)},
-            {"D": "ggx", "alpha": number(r, 0.1, 0.6)},
+            {"D": "ggx", "alpha": number(r, 0.1, 0.6)} | grain("alpha_y"),
+            {"D": "gtr", "alpha": number(r, 0.1, 0.6), "gamma": number(r, 0.5, 4)},
         ]
     )
     fresnel = r.choice(
@@ -154,6 +159,7 @@ def _cook_torrance(r: Random) -> dict[str, Any]:
         "specular_weight": number(r, 0, 1),
         "distribution": distribution,
         "fresnel": fresnel,
+        "masking": r.choice(["v_groove", "smith", "smith_correlated"]),
         "convention": r.choice(["microfacet", "printed"]),
     }
 
@@ -173,17 +179,31 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
     "blinn_phong": lambda r: _lobe(r) | {"normalised": r.random() < 0.3},
     "burley": lambda r: {"diffuse": color(r), "roughness": number(r, 0, 1)},
     "cook_torrance": _cook_torrance,
+    "eon": lambda r: {"diffuse": color(r), "roughness": number(r, 0, 1)},
     "formula": lambda r: {
         "parameters": {"kd": color(r), "m": number(r, 1, 9)},
-        "response": r.choice(["n_l * (kd / pi + (1 - n_v)**m)", "kd * n_l * n_h**m"]),
+        "response": r.choice(
+            ["n_l * (kd / pi + (1 - n_v)**m)", "kd * n_l * n_h**m", "kd * n_l * exp(-m * (t_s / n_s)**2)"]
+        ),
         "specular": r.choice([None, "kd * max(0, 1 - gap_rv)**m"]),
     },
+    "fujii": lambda r: {"diffuse": color(r)} | r.choice(
+        [{"roughness": number(r, 0, 1)}, {"sigma": number(r, 0, 1.5)}]
+    ),
     "generated": lambda r: {
         "diffuse": color(r), "specular_weight": number(r, 0, 1), "fresnel": {"F": "schlick", "f0": color(r)},
         "distribution": {"p": "formula", "formula": r.choice(FACETS)},
     },
     "kajiya_kay": _lobe,
-    "lafortune": lambda r: _lobe(r) | {"cx": number(r, -1, -0.5), "cy": number(r, -1, -0.5)},
+    "lafortune": lambda r: _lobe(r) | {"cx": number(r, -1, -0.5), "cy": number(r, -1, -0.5)} | {
+        "further": [
+            {
+                "specular": color(r), "cx": number(r, -1, 1), "cz": number(r, 0.1, 1),
+                "exponent": number(r, 0.5, 40),
+            }
+            for _ in range(r.choice([0, 0, 1, 3]))
+        ]
+    },
     "lambert": lambda r: {"diffuse": color(r)},
     "lommel_seeliger": lambda r: {"diffuse": color(r)},
     "merl": lambda r: {"file": MEASUREMENT, "lookup": r.choice(["nearest", "linear"])},
@@ -215,15 +235,10 @@ MODELS: dict[str, Callable[[Random], dict[str, Any]]] = {
 SMALL = tuple(name for name in MODELS if name != "merl")
 """Models that need no large file."""
 GRAINED = (
-    "ashikhmin_shirley",
-    "generated",
-    "kajiya_kay",
-    "lafortune",
-    "poulin_fournier",
-    "principled",
-    "ward",
-)
-"""Models that follow the grain."""
+    "ashikhmin_shirley", "cook_torrance", "formula", "generated", "kajiya_kay", "lafortune",
+    "poulin_fournier", "principled", "ward",
+)  # fmt: skip
+"""Models that follow the grain, some with some parameters only."""
 
 
 def material(random: Random) -> dict[str, Any]:
@@ -357,7 +372,7 @@ def beside(random: Random, lights: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def vary(random: Random, case: Case, thing: dict[str, Any]) -> None:
-    """Let the diffuse colour of an object vary over its surface, by what its mesh has."""
+    """Let the surface colour of an object vary by what its mesh has, and any of its parameters as well."""
     source = case.scene["meshes"][thing["mesh"]]
     surface = case.meshes.get(source.get("file"))
     by: list[dict[str, Any]] = []
@@ -371,6 +386,11 @@ def vary(random: Random, case: Case, thing: dict[str, Any]) -> None:
         model = Model.model_fields["model"].default
         thing["material"] = {"model": model, **MODELS[model](random)}
         thing["override"] = {Model.surface_color: random.choice(by)}
+        if "texture" in by[-1]:
+            names = [name for name in sorted(Model.model_fields) if may_vary(Model, name)]
+            thing["override"] |= dict.fromkeys(
+                random.sample(names, min(random.choice([0, 1, 3]), len(names))), by[-1]
+            )
 
 
 def has_uvs(source: dict[str, Any]) -> bool:

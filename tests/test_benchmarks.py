@@ -25,6 +25,7 @@ SCRIPTS = {
     "packets": "\n0 of ",
     "adaptive": "to full: RMSE",
     "reconstruction": "blades",
+    "gonioreflectometer": "mirror grooves of many slopes",
     "fits": "RMS z",
 }
 

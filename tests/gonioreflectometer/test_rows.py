@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.gonioreflectometer.bench import Bench
 from illumcli.gonioreflectometer.directions import (
     LEAST_COSINE,
     AngleGrid,
     around_half_vector,
     half_angles,
+    mirrored,
 )
 from illumcli.gonioreflectometer.mirrors import Ring, above_horizon
+from illumcli.gonioreflectometer.mirrors_again import of_cells
 from illumcli.gonioreflectometer.rows import Instrument
 from illumcli.gonioreflectometer.settings import MeasureSettings, SurfaceSource
 from illumcli.gonioreflectometer.sources import read_surface
@@ -104,6 +107,30 @@ def test_mirror_rays_lose_nothing():
     grid = AngleGrid(15.0)
     albedo = row.values[0].reshape(grid.around, len(grid)) @ grid.projected
     np.testing.assert_allclose(albedo, 1, atol=5e-3)  # but for what leaves below 1 degree
+
+
+def test_what_is_mirrored_twice_is_what_rays_count():
+    """The share of light from everywhere that steep grooves mirror more than once."""
+    measured = instrument(f"abs(mod(x, 1) - 0.5) * {float(np.tan(np.radians(44)))!r}", samples=8, bounces=4)
+    again = of_cells(np.mean([measured.row(90 + k, 1, no_progress).values[0] for k in range(8)], axis=0))
+    edges = np.cos((np.arange(91) / 90) ** 2 * (np.pi / 2))
+    share = 0.0
+    for row in range(90):
+        l, v = (np.maximum(d[:, 2], 0).reshape(90, 180) for d in cell_directions(row))
+        # d omega_l d omega_v = 4 cos(theta_d) d omega_h d omega_d, over both halves of phi_d
+        squares = np.sin(np.arange(91) / 90 * np.pi / 2) ** 2
+        measure = 2 * np.diff(squares)[:, None] * (2 * np.pi / 180)
+        measure = measure * (2 * np.pi) * (edges[row] - edges[row + 1])
+        share += np.sum(again[row] * l * v * measure) / np.pi
+
+    random, count = np.random.default_rng(1), 100_000
+    radius, turn = np.sqrt(random.random(count)), 2 * np.pi * random.random(count)
+    l = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1 - radius**2)], axis=1)
+    l = l[l[:, 2] > LEAST_COSINE]
+    bench = Bench(measured.surface)
+    hits = bench.first_points(l, random.random((len(l), 2)))
+    once = bench.leaving(hits, mirrored(l, hits.normal))
+    assert abs(share / np.mean(once.is_hit) - 1) < 0.03
 
 
 def test_the_same_row_for_any_number_of_threads():

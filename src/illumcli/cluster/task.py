@@ -256,6 +256,8 @@ def _mirrored(unit: Unit, mirror: Mirror) -> Unit:
         return mirror.at(path) if path.is_absolute() else path
 
     if isinstance(unit, MeasureRow):
+        if not unit.files():
+            return unit
         path = at(unit.path)
         return replace(unit, path=path, source=replace(unit.source, text=str(path)))
     if isinstance(unit, RenderJob):

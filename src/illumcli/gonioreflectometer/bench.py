@@ -165,16 +165,17 @@ class Bench:
         keep = np.flatnonzero(is_open)
         o, d = o[keep], d[keep]
         border = self._margin * self.size * _INSIDE
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = [
-                np.where(d[:, i] > 0, self.size[i] + border[i] - o[:, i], -border[i] - o[:, i]) / d[:, i]
-                for i in (0, 1)
-            ]
-            along = np.fmin(*ends)
-            up = np.where(d[:, 2] > 0, (self.top - o[:, 2]) / d[:, 2], (self.bottom - o[:, 2]) / d[:, 2])
+        borders = [np.where(d[:, i] > 0, self.size[i] + border[i], -border[i]) for i in (0, 1)]
+        along = np.fmin(*(_distance(borders[i] - o[:, i], d[:, i]) for i in (0, 1)))
+        up = _distance(np.where(d[:, 2] > 0, self.top, self.bottom) - o[:, 2], d[:, 2])
         goes_on = along < up
         left, o, d = left[keep[goes_on]], o[goes_on], d[goes_on]
         return left, self._wrapped(o + d * along[goes_on][:, None]), d
+
+
+def _distance(way: Floats, speed: Floats) -> Floats:
+    """(N,) way / speed, infinite where nothing moves."""
+    return np.divide(way, speed, out=np.full_like(way, np.inf), where=speed != 0)
 
 
 def _with_margin(

@@ -36,18 +36,21 @@ def relative_error(values: Floats, errors: Floats, weights: Floats) -> float:
     return float(np.sqrt(np.square(errors[seen], dtype=np.float64) @ squares / total)) if total else 0.0
 
 
-def of_replicates(replicates: Floats, one: Floats) -> tuple[Floats, ...]:
+def of_replicates(replicates: Floats, most: Floats, samples: int) -> tuple[Floats, Floats]:
     """Means and standard errors of the mean of (..., R) replicates.
+
+    To the spread of the replicates comes what one sample may change: something rare may not have come up.
 
     Parameters
     ----------
-    one
-        What a single sample may contribute to the mean at most: if all replicates agree, some rare event may
-        not have come up, and the error is as if it had once.
+    most
+        What a single sample contributes to the mean at most.
+    samples
+        Of all replicates, each of which contributes about alike.
     """
-    mean, count = replicates.mean(axis=-1), replicates.shape[-1]
-    spread = replicates.std(axis=-1, ddof=1) / np.sqrt(count)
-    return mean, np.where(spread > 1e-9 * np.abs(mean), spread, one)
+    mean = replicates.mean(axis=-1)
+    spread = replicates.std(axis=-1, ddof=1) / np.sqrt(replicates.shape[-1])
+    return mean, np.hypot(spread, np.where(mean > 0, np.minimum(mean / samples, most), most))
 
 
 def to_target(

@@ -64,10 +64,9 @@ def above_horizon(ring: Ring, theta_d: Floats, phi_d: Floats) -> Floats:
     """(C,) the part of a ring's solid angle in which light and eye are high enough to be measured."""
     cosines = np.cos(ring.high) + (np.arange(NODES) + 0.5) / NODES * (np.cos(ring.low) - np.cos(ring.high))
     counts = np.zeros(len(theta_d))
-    for cosine in cosines:
-        h = np.broadcast_to([np.sqrt(1 - cosine**2), 0.0, cosine], (len(theta_d), 3))
-        l, v = around_half_vector(h, theta_d, phi_d)
-        counts += (l[:, 2] > LEAST_COSINE) & (v[:, 2] > LEAST_COSINE)
+    along, away = np.cos(theta_d), np.abs(np.sin(theta_d) * np.cos(phi_d))
+    for cosine in cosines:  # the lower of n.l and n.v
+        counts += along * cosine - away * np.sqrt(1 - cosine * cosine) > LEAST_COSINE
     return counts / NODES
 
 
@@ -91,12 +90,12 @@ def mirrored_once(
     per_chunk = max(1, CHUNK // samples)
     for first in range(0, len(measured) if len(ring.triangles) else 0, per_chunk):
         which = measured[first : first + per_chunk]
-        means = _seen_and_lit(bench, (surface, ring), (theta_d[which], phi_d[which]), samples, (*key, first))
+        means = seen_and_lit(bench, (surface, ring), (theta_d[which], phi_d[which]), samples, (*key, first))
         out[which] = means * (ring.density / part[which])[:, None]
     return out
 
 
-def _seen_and_lit(
+def seen_and_lit(
     bench: Bench,
     facets: tuple[Surface, Ring],
     cells: tuple[Floats, Floats],
@@ -123,21 +122,14 @@ def _seen_and_lit(
     return out.reshape(-1, REPLICATES, each).mean(axis=-1)
 
 
-class Mirrored(Record):
-    """What rays from one direction bring to the cells of a grid."""
-
-    values: Floats  # (3, C, REPLICATES) [1/sr]
-    lost: float  # share of the rays that were still under way after the last bounce
-
-
 def mirrored_to(
     bench: Bench,
     l: Floats,
     grid: AngleGrid,
     light: tuple[Fresnel, int],
     draw: tuple[int, tuple[int, ...]],
-) -> Mirrored:
-    """The mean of f_r, weighted with n.v, over the cells of a grid of eyes, for light from l (3,).
+) -> Floats:
+    """(3, C, REPLICATES) the mean of f_r, weighted with n.v, over the cells of a grid, for light from l (3,).
 
     Parameters
     ----------
@@ -148,7 +140,7 @@ def mirrored_to(
     """
     fresnel, bounces = light
     each, key = draw
-    out, lost = np.zeros((3, len(grid), REPLICATES)), 0
+    out = np.zeros((3, len(grid), REPLICATES))
     random = np.random.default_rng(list(key))
     shifts = random.random((REPLICATES, 2))
     for replicate in range(REPLICATES):
@@ -169,6 +161,4 @@ def mirrored_to(
                 for channel in range(3):
                     out[channel, :, replicate] += np.bincount(cell, share[channel, gone], len(grid))
                 d, hits = -d, following
-            lost += int(np.count_nonzero(hits.is_hit))
-    out /= each * grid.projected[:, None]
-    return Mirrored(out, lost / (each * REPLICATES))
+    return out / (each * grid.projected[:, None])

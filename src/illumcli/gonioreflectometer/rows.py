@@ -99,7 +99,7 @@ class Instrument:
             albedo = np.array(settings.albedo)
             powers = albedo[:, None] ** np.arange(1, settings.bounces + 1)  # (3, bounces)
             most = albedo[:, None] / (np.pi * l[seen, 2] * samples)
-            found = of_replicates(np.einsum("ck,knr->cnr", powers, orders), most)
+            found = of_replicates(np.einsum("ck,knr->cnr", powers, orders), most, samples)
             values, errors = (_among(len(l), seen, each) for each in found)
             return Estimate(values, errors, samples, bench.rays - before)
 
@@ -121,7 +121,7 @@ class Instrument:
         def attempt(samples: int, number: int) -> Estimate:
             key, before = self._key("mirrors", row, block.start, number), bench.rays
             once = mirrored_once(bench, (self.surface, ring), (theta_d, phi_d), samples, key)
-            values, errors = of_replicates(once, most / samples)
+            values, errors = of_replicates(once, most / samples, samples)
             errors = np.where(np.isnan(values), np.nan, errors)
             return Estimate(fresnel * values, fresnel * errors, samples, bench.rays - before)
 
@@ -147,7 +147,7 @@ class Instrument:
             light, draw = (self._fresnel, settings.bounces), (each, self._key("rays", cell, number))
             found = mirrored_to(bench, l, grid, light, draw)
             one = 1 / (grid.projected * each * REPLICATES)
-            values, errors = of_replicates(found.values, np.broadcast_to(one, (3, len(grid))))
+            values, errors = of_replicates(found, np.broadcast_to(one, (3, len(grid))), 1)
             return Estimate(values, errors, samples, bench.rays - before)
 
         return to_target(attempt, settings.samples, settings.target_error, grid.directions[:, 2])

@@ -73,7 +73,7 @@ def table_of(rows: Sequence[Estimate], settings: MeasureSettings, about: Mapping
     # What mirrors reflect several times comes in replicates of all cells.
     if again := rows[len(own) :]:
         replicates = np.stack([row.values for row in again], axis=-1)
-        more, spread = of_replicates(replicates, np.zeros((3, BLOCK_COUNT)))
+        more, spread = of_replicates(replicates, np.zeros((3, BLOCK_COUNT)), 1)
         values = values + of_cells(more)
         errors = np.hypot(errors, of_cells(spread))
     samples = np.array([row.samples for row in own], np.int32)

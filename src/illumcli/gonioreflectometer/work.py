@@ -15,11 +15,14 @@ from illumcli.gonioreflectometer.estimate import Estimate
 from illumcli.gonioreflectometer.rows import Instrument
 from illumcli.gonioreflectometer.settings import MeasureSettings, SurfaceSource
 from illumcli.gonioreflectometer.sources import is_file, read_surface
+from illumcli.memory import refuse_beyond
 from illumcli.mesh_files import companions
 from illumcli.progress import Progress, no_progress
 from illumcli.records import Record, Value
 from illumcli.render_graph.keys import code
 
+TRIANGLE_BYTES = 500
+"""Of a triangle with its normal, its place in Embree's tree, and its share of copies around a tile."""
 _HEAD = struct.Struct("<qq")  # samples, rays
 
 
@@ -85,6 +88,8 @@ def instrument_of(source: SurfaceSource, settings: MeasureSettings) -> tuple[Ins
         It cannot be read or understood.
     """
     surface, warnings = read_surface(source)
+    what = f"{source.text}: {len(surface.triangles):,} triangles"
+    refuse_beyond(TRIANGLE_BYTES * len(surface.triangles), what, "take a coarser --grid, or a smaller mesh")
     return Instrument(surface, settings), warnings
 
 

@@ -42,6 +42,11 @@ illum brdf ward ashikhmin_shirley --view sphere --view lobe -o out/streaks.png
 illum verify --only ward
 ```
 
+`illum verify` compares every model with values at 50 digits, computed from its paper by other algebra (angles
+for dot products, integrals for closed forms): 895 cases of parameters as a scene has them, relative error
+2e-13 at most, and 90 of `generated`, whose tables are made by quadrature, within 1.5e-5. The values of `merl`
+and `rgl` stand in files; the tests compare the lookup with values known beforehand.
+
 ![Fifty teapots: a column per model, a row per parameter](gallery.png)
 
 The columns, from the left: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as

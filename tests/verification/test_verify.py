@@ -14,6 +14,7 @@ import pytest
 from illumcli import verification as job
 from illumcli.cli import main
 from illumcli.errors import InputError, ThresholdError
+from illumcli.schema.sources import own_tags
 from illumcli.verification.obscurance import CAST
 from illumcli.verification.vectors import OPENERS
 
@@ -96,6 +97,13 @@ def test_every_vector_of_the_package_passes():
     job.refuse_failures(rows)
     assert sum(len(row.outcomes) for row in rows) == len(ENTRIES) >= 1729
     assert {row.type for row in rows} == TYPES >= set(job.EVALUATORS)
+
+
+def test_every_model_has_vectors_of_its_parameters():
+    """Measurements are compared with the readers' own references: their values are in a file."""
+    measured = {"merl", "rgl"}
+    covered = {entry["model"] for entry in ENTRIES if "parameters" in entry["inputs"]}
+    assert set(own_tags("illumcli.models")) - measured == covered - measured
 
 
 def test_float64_keeps_twelve_digits_wherever_the_inputs_do():
@@ -253,7 +261,8 @@ def test_single_precision_tells_where_digits_go(illum_verify):
     assert status == 0
     assert "above 1e-05" in out.splitlines()[0]
     assert "n.l=" in out
-    assert out.splitlines()[-1].startswith("93 cases of 2 types in float32: ")
+    count = sum(entry["model"] in ("cook_torrance", "lambert_brdf") for entry in ENTRIES)
+    assert out.splitlines()[-1].startswith(f"{count} cases of 2 types in float32: ")
 
 
 def test_single_precision_names_the_cause(write):

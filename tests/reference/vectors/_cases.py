@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mpmath import mp, mpf, nstr, sqrt
+from mpmath import atan2, mp, mpf, nstr, sqrt
 
 mp.dps = 50
 FOLDER = Path(__file__).parents[3] / "src" / "illumcli" / "data" / "vectors"
@@ -48,6 +48,17 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def half(l: Vector, v: Vector) -> Vector:
     return unit([x + y for x, y in zip(l, v, strict=True)])
+
+
+def angle(a: Vector, b: Vector) -> mpf:
+    """Between directions of unit length."""
+    turn = cross(a, b)
+    return atan2(sqrt(dot(turn, turn)), dot(a, b))
+
+
+def color(value: float | list[float]) -> list[mpf]:
+    """Three numbers, from one or three."""
+    return [mpf(x) for x in (value if isinstance(value, list) else [value] * 3)]
 
 
 def cases(

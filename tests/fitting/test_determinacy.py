@@ -116,3 +116,10 @@ def test_common_noise_of_the_channels_counts_once():
         fit = fit_model(only("oren_nayar"), replace(pairs, is_noise_common=common))
         ratios[common] = fit.uncertainty.standard_error[-1]
     assert 1.4 < ratios[True] / ratios[False] < 3**0.5 + 1e-9
+
+
+def test_highlights_far_narrower_than_the_default_are_found():
+    truth = only("ashikhmin_shirley", "exponent_u=3e4", "exponent_v=3e4", "specular=0.4")
+    pairs = replace(of_model(truth, 1000), is_isotropic=True)
+    fit = fit_model(only("ashikhmin_shirley"), pairs, "log")
+    assert fit.model.exponent_u == pytest.approx(3e4, rel=1e-3)

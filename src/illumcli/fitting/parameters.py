@@ -25,6 +25,8 @@ NOT_FITTED = ("emission", "ambient")
 """Parameters that no measurement of a BRDF shows."""
 DECADES = 2
 """A positive range of more decades is fitted by its logarithm."""
+LARGEST_EXPONENT = 1e5
+"""Of the search: a lobe a quarter of a degree wide."""
 SEARCH = 20.0
 """How far from its default a parameter without close limits is sought, as a factor."""
 
@@ -69,7 +71,9 @@ class Parameter(Value):
         low, high = self.low, self.high
         if self.scale == "log":
             low, high = max(low, min(self.default) / SEARCH), min(high, max(self.default) * SEARCH)
-        elif self.scale == "log1p" or high > 1e3:
+        elif self.scale == "log1p":
+            high = min(high, LARGEST_EXPONENT)
+        elif high > 1e3:
             high = min(high, max(1.0, *self.default) * SEARCH)
         return float(self.coordinate(low)), float(self.coordinate(high))
 

@@ -113,6 +113,9 @@ def test_meshes_are_arrays(like):
         (BOX | {"faces": [[0.0, 1, 2]]}, "faces must be vertex numbers"),
         (BOX | {"vertices": np.zeros(4)}, "vertices must be an array of N x 3"),
         (BOX | {"normals": np.zeros((3, 3))}, "4 vertices and 3 normals"),
+        (BOX | {"vertices": np.zeros((4, 3), complex)}, "N x 3 numbers, is complex128"),
+        (BOX | {"vertices": [["a", "b", "c"]] * 4}, "N x 3 numbers, is <U1"),
+        (BOX | {"vertices": [[0, 0], [1]]}, "has rows of several lengths"),
     ],
 )
 def test_faulty_meshes_are_refused(mesh, fact):
@@ -129,6 +132,13 @@ def test_errors_name_the_scene_and_all_faults():
     ]
     with pytest.raises(illumcli.IllumError, match=r"scene: film\.width: a scene holds no object"):
         illumcli.render(SCENE | {"film": {"width": object()}})
+
+
+def test_one_text_is_one_override_and_one_layer(scene_file):
+    rendering = illumcli.render(scene_file, "film.width=9", layers="depth")
+    assert {name: each.shape for name, each in rendering.picture.items()} == {"depth": (16, 9, 1)}
+    with pytest.raises(KeyError, match="no layer 'beauty'; there are: depth"):
+        rendering["beauty"]
 
 
 def test_paths_of_a_mapping_start_in_the_current_folder(folder):
@@ -201,6 +211,20 @@ def test_a_sweep_is_a_table_of_records(scene_file):
         illumcli.sweep(scene_file, {"ambient": [0, 1], "seed": [1]}, together=True)
 
 
+@pytest.mark.parametrize(
+    ("values", "reference", "fact"),
+    [
+        ({"ambient": 0.1}, None, r"ambient: give its values as a list, \[0.1\]"),
+        ({"ambient": "0.1"}, None, "ambient: give its values as a list"),
+        ({"ambient": [0.1]}, 1, "reference 1: there are 1 variants, numbered from 0"),
+        ({"film.width": [8, 9]}, 0, r"'film.width': 9}: is \(16, 9, 3\), but the reference \(16, 8, 3\)"),
+    ],
+)
+def test_faulty_sweeps_are_refused(scene_file, values, reference, fact):
+    with pytest.raises(illumcli.IllumError, match=fact):
+        illumcli.sweep(scene_file, values, reference=reference)
+
+
 def test_pictures_arrays_and_files_are_compared(scene_file):
     one, other = illumcli.render(scene_file), illumcli.render(scene_file, {"ambient": 0.4})
     (path,) = other.save("other.exr")
@@ -224,6 +248,13 @@ def test_baked_values_are_those_of_the_command(illum, folder):
     assert baking.obscurance is baking.channels["obscurance"]
     illumcli.bake("m.obj", ["m2.npz"], samples=32, what=["ao", "bent_normal"])
     np.testing.assert_array_equal(read_npz(folder / "m2.npz").obscurance, expected.obscurance)
+
+
+def test_settings_of_a_bake_are_numbers_of_numpy_too_and_checked():
+    few, same = illumcli.bake(BOX, samples=np.int64(8)), illumcli.bake(BOX, samples=8)
+    np.testing.assert_array_equal(few.obscurance, same.obscurance)
+    with pytest.raises(illumcli.IllumError, match=r"^samples: must be at least 1, is 0$"):
+        illumcli.bake(BOX, samples=0)
 
 
 def test_the_import_loads_nothing_heavy():

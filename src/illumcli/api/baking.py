@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
+import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.api.meshes import is_mesh, write_mesh
@@ -104,7 +105,9 @@ def bake(
     from illumcli.baking.bake import bake_mesh
     from illumcli.baking.settings import BakeOptions, BakeSettings
 
-    given: dict[str, Any] = dict(keywords)
+    given: dict[str, Any] = {
+        name: each.item() if isinstance(each, np.generic) else each for name, each in keywords.items()
+    }
     if isinstance(falloff := given.get("falloff"), str):
         given["falloff"] = {"falloff": falloff}
     given |= {name: tuple(given[name]) for name in ("occluders", "what") if name in given}
@@ -112,10 +115,9 @@ def bake(
         own = Path(folder)
         path = _file_of(mesh, own)
         values, files = own / "values.npz", tuple(map(Path, outputs))
+        settings = BakeSettings(**given)
         with named_scene(own):
-            _, report = bake_mesh(
-                path, (values, *files), BakeSettings(**given), BakeOptions(force=force), progress
-            )
+            _, report = bake_mesh(path, (values, *files), settings, BakeOptions(force=force), progress)
         baked = read_npz(values)
     facts = report.as_data()
     facts["written"] = [name for name in facts["written"] if name != str(values)]

@@ -55,10 +55,17 @@ def write_mesh(value: Any, folder: Path) -> Path:
 
 
 def _array(name: str, values: Any, width: int) -> NDArray[np.float64]:
-    array = np.asarray(values, np.float64)
-    if array.ndim != 2 or array.shape[1] != width:
-        raise InputError(f"mesh: {name} must be an array of N x {width} numbers, is {array.shape}")
-    return array
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise InputError(
+            f"mesh: {name} must be an array of N x {width} numbers, has rows of several lengths"
+        ) from None
+    if array.ndim != 2 or array.shape[1] != width or array.dtype.kind not in "iuf":
+        raise InputError(
+            f"mesh: {name} must be an array of N x {width} numbers, is {array.dtype} of shape {array.shape}"
+        )
+    return array.astype(np.float64)
 
 
 def _faces(faces: Any, vertices: int) -> tuple[bytes, int]:

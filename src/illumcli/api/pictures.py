@@ -18,6 +18,7 @@ from illumcli.commands.report import Report
 from illumcli.commands.targets import image_set
 from illumcli.film.develop import Target
 from illumcli.records import Record
+from illumcli.schema.messages import suggestion
 
 
 class Picture(Mapping[str, NDArray[Any]]):
@@ -31,6 +32,8 @@ class Picture(Mapping[str, NDArray[Any]]):
         self._layers = image.layers()
 
     def __getitem__(self, layer: str) -> NDArray[Any]:
+        if layer not in self._layers:
+            raise KeyError(f"no layer {layer!r}; {suggestion(layer, tuple(self._layers))}")
         return self._layers[layer]
 
     def __iter__(self) -> Iterator[str]:

@@ -23,7 +23,7 @@ from illumcli.scene.frames import frame_numbers
 class Options(TypedDict, total=False):
     """How a scene is rendered; each is the option of ``illum render`` of the same name."""
 
-    layers: Sequence[str]
+    layers: Sequence[str] | str
     """Names of layers, as `--only`; by default those of the scene."""
     seed: int
     threads: int
@@ -70,7 +70,8 @@ class LoadedScene:
         """
         given: dict[str, Any] = dict(options)
         progress = given.pop("progress", no_progress)
-        given["only"] = tuple(given.pop("layers", ()))
+        layers = given.pop("layers", ())
+        given["only"] = (layers,) if isinstance(layers, str) else tuple(layers)
         with named_scene(self._folder):
             texts = override_texts(overrides, self._folder)
             chosen = RenderOptions(overrides=texts, pattern="{camera}.exr", force=True, **given)

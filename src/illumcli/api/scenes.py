@@ -20,7 +20,7 @@ from illumcli.schema.description import Description
 
 AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene"
 """Path of a scene or mesh file, or a scene as a mapping with the keys of the YAML, or as a description."""
-Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str]"
+Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str] | str"
 """Values by path, ``{"materials.clay.sigma": 0.3}``, or `PATH=VALUE` as ``illum render -D`` takes them."""
 
 NAME = "scene.yaml"
@@ -50,7 +50,7 @@ def file_of(scene: AnyScene, folder: Path) -> Path:
 def override_texts(overrides: Overrides, folder: Path) -> tuple[str, ...]:
     """Overrides as `PATH=VALUE`."""
     if not isinstance(overrides, Mapping):
-        return tuple(overrides)
+        return (overrides,) if isinstance(overrides, str) else tuple(overrides)
     return tuple(
         f"{path}={_yaml(_plain(value, tuple(path.split('.')), folder))}" for path, value in overrides.items()
     )

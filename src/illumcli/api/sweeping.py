@@ -71,13 +71,18 @@ def sweep(
     Raises
     ------
     InputError
-        Sequences of different lengths are to go `together`; a fault of the scene with some value.
+        Values that are no sequence, or of different lengths and to go `together`; a `reference` that there is
+        not, or of another size; a fault of the scene with some value.
     """
+    values = {path: _several(path, each) for path, each in values.items()}
     lengths = {path: len(each) for path, each in values.items()}
     if together and len(set(lengths.values())) > 1:
         raise InputError(f"values of different lengths cannot go together: {lengths}")
     rows = zip(*values.values(), strict=True) if together else product(*values.values())
     variants = [dict(zip(values, row, strict=True)) for row in rows]
+
+    if isinstance(reference, int) and not -len(variants) <= reference < len(variants):
+        raise InputError(f"reference {reference}: there are {len(variants)} variants, numbered from 0")
 
     # Render; buffers that no value touches are computed once.
     loaded = LoadedScene(scene)
@@ -91,10 +96,20 @@ def sweep(
         measured: dict[str, Any] = {"seconds": report["total_seconds"], "rays": sum(report["rays"].values())}
         measured["mean"] = float(layer.mean(dtype=np.float64))
         if against is not None:
+            shape = np.shape(against)
+            if shape != layer.shape:
+                raise InputError(f"{variant}: is {layer.shape}, but the reference {shape}; compare one size")
             differs = difference(np.asarray(against), layer, peak=None)
             measured |= {name: getattr(differs, name) for name in MEASURES}
         records.append(variant | measured)
     return Sweep(records, renderings)
+
+
+def _several(path: str, values: Any) -> Sequence[Any]:
+    """The values of a path."""
+    if isinstance(values, str | Mapping) or not hasattr(values, "__len__"):
+        raise InputError(f"{path}: give its values as a list, [{values!r}]")
+    return values
 
 
 def _first_layer(rendering: Rendering) -> NDArray[Any]:

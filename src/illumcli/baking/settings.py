@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from illumcli.records import Value
+from illumcli.scene.faults import validated
 from illumcli.scene.spec import Obscurance
 
 
@@ -33,15 +34,20 @@ class BakeSettings(Value):
     seed: int = 0
 
     def obscurance(self) -> Obscurance:
-        """The settings as a scene describes them."""
-        return Obscurance.model_validate(
-            {
-                "samples": self.samples,
-                "falloff": dict(self.falloff),
-                "sampler": self.sampler,
-                "faces": self.faces,
-            }
-        )
+        """The settings as a scene describes them.
+
+        Raises
+        ------
+        InputError
+            Values that no scene may have.
+        """
+        tree = {
+            "samples": self.samples,
+            "falloff": dict(self.falloff),
+            "sampler": self.sampler,
+            "faces": self.faces,
+        }
+        return validated(Obscurance, tree)
 
     def as_data(self) -> dict[str, Any]:
         """The settings for JSON."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import Discriminator, ValidationError
 
+from illumcli.errors import InputError
 from illumcli.scene.source import Path
 from illumcli.schema.annotations import choices, inside, split
 from illumcli.schema.description import Description
@@ -15,7 +16,23 @@ from illumcli.schema.foreign import BrokenMember
 from illumcli.schema.messages import no_choice, sentence, short, suggestion, wrong_length
 from illumcli.schema.sources import tags
 
+D = TypeVar("D", bound=Description)
 Fault = tuple[Path, str]  # path of the part, what is wrong with it
+
+
+def validated(cls: type[D], tree: Any) -> D:
+    """The description in `tree`: dicts, lists and scalars.
+
+    Raises
+    ------
+    InputError
+        Every fault, with the path of its part.
+    """
+    try:
+        return cls.model_validate(tree)
+    except ValidationError as error:
+        facts = faults(error, cls, tree)
+        raise InputError(f"{'.'.join(map(str, path))}: {fact}" for path, fact in facts) from None
 
 
 def faults(error: ValidationError, cls: type[Description], tree: Any) -> Iterator[Fault]:

@@ -108,6 +108,27 @@ def test_models_of_one_lobe_refuse_two():
         with_lobes(only("ward"), 2)
 
 
+def test_as_many_parameters_as_data_leave_the_noise_unknown():
+    pairs = of_model(only("lambert", "diffuse=0.3"))
+    one = replace(pairs, l=pairs.l[:1], v=pairs.v[:1], values=pairs.values[:1], weight=np.ones(1))
+    fit = fit_model(only("lambert"), one)
+    assert np.all(np.isnan(fit.uncertainty.standard_error))
+    assert "diffuse.R  0.3    unknown" in report(fit)
+    assert any(line.endswith("no standard error is known") for line in notes(fit))
+    fit = fit_model(only("lambert"), replace(one, standard_error=np.full((1, 3), 0.01)))
+    assert fit.uncertainty.standard_error == pytest.approx(np.full(3, 0.01 * np.pi))
+
+
+def test_derivatives_by_very_large_parameters_are_numbers():
+    model, pairs = only("phong"), of_model(only("lambert"))
+    parameters = parameters_of(model, False)
+    _, high = parameters.limits()
+    problem = problem_of(model, parameters, "cosine", pairs)
+    assert high.max() == 1e18
+    for x in (np.minimum(high, 1e17), high):
+        assert np.all(np.isfinite(problem.jacobian(x)))
+
+
 def test_common_noise_of_the_channels_counts_once():
     """Three channels of one noise tell no more than one of a model that is grey."""
     pairs = measured("oren_nayar", 400, 0)

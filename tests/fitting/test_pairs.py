@@ -88,6 +88,7 @@ def test_a_table_of_vectors(tmp_path):
         ("lx,ly,lz,R,G,B\n0,0,1,1,1,1\n", "has no column vx, vy, vz"),
         (TABLE.replace("0.4,", "much,"), "t.csv:5: must have 12 numbers"),
         (TABLE.replace("0.4,", "nan,"), "t.csv:5: has a number that is not finite"),
+        (TABLE.replace("0.4,", "1e300,"), r"t.csv:5: R, G, B must be at most 1e\+18"),
         (TABLE.replace(",0.02,3", ",0,3"), "t.csv:5: standard errors must be above 0"),
         (TABLE.replace(",3\n", ",-3\n"), "t.csv:5: weight must be at least 0"),
         ("lx,ly,lz,vx,vy,vz,R,G,B\n0,0,0,0,0,1,1,1,1\n", "t.csv:2: l has no direction"),

@@ -27,6 +27,8 @@ from illumcli.fitting.measurement import STEEPEST, Measurement, below_steepest
 
 VALUES = ("R", "G", "B")
 ERRORS = ("error_R", "error_G", "error_B")
+LARGEST = 1e18
+"""As large as a colour of a scene may be [1/sr]."""
 Columns = dict[str, NDArray[np.float64]]
 
 
@@ -48,6 +50,9 @@ def read_table(path: Path) -> Measurement:
     values = _three(path, columns, VALUES)
     errors = _three(path, columns, ERRORS) if any(name in columns for name in ERRORS) else None
     weight = columns.get("weight", np.ones(len(values)))
+    _refuse_lines(
+        path, columns, np.any(np.abs(values) > LARGEST, axis=1), f"R, G, B must be at most {LARGEST:g}"
+    )
     _refuse_lines(path, columns, weight < 0, "weight must be at least 0")
     if errors is not None:
         _refuse_lines(path, columns, np.any(errors <= 0, axis=1), "standard errors must be above 0")

@@ -53,8 +53,9 @@ class Problem(Record):
         out = np.zeros((*self.data.shape, len(x)))
         for places in self.together():
             above, below = x.copy(), x.copy()
-            above[places] = np.minimum(x[places] + STEP, high[places])
-            below[places] = np.maximum(x[places] - STEP, low[places])
+            step = STEP * np.maximum(np.abs(x[places]), 1)
+            above[places] = np.minimum(x[places] + step, high[places])
+            below[places] = np.maximum(x[places] - step, low[places])
             change = (self.residuals(above) - self.residuals(below)).reshape(self.data.shape)
             put_columns(out, places, change, (above - below)[places])
         return out.reshape(-1, len(x))

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from illumcli.fitting.fit import Fit
 from illumcli.fitting.material import shown
 from illumcli.fitting.measurement import Measurement
@@ -49,6 +51,10 @@ def notes(fit: Fit) -> list[str]:
         out.append(f"{', '.join(names)} {fact}: the measurement does not change with it; hold it with -D")
     for names in fit.uncertainty.loose:
         out.append(f"{', '.join(names)}: hardly determined by this measurement; hold one with -D")
+    if np.any(np.isnan(fit.uncertainty.standard_error) & ~optimum.is_held):
+        out.append(
+            "there are as many parameters as data, and no data tell the noise: no standard error is known"
+        )
     if fit.chi_squared is not None:
         fact = f"chi squared per value is {fit.chi_squared:.3g}"
         beyond = ": the model does not describe the measurement within its errors, which alone the standard "
@@ -98,7 +104,8 @@ def _values(fit: Fit) -> Iterator[tuple[str, float, float, str]]:
             at = place.start + offset
             error = float(fit.uncertainty.standard_error[at])
             state = "held" if optimum.chosen[at] else "at its limit" if optimum.at_limit[at] else ""
-            yield label, value, error, state or ("not determined" if math.isinf(error) else "")
+            unknown = "not determined" if math.isinf(error) else "unknown" if math.isnan(error) else ""
+            yield label, value, error, state or unknown
 
 
 def _ties(fit: Fit) -> list[tuple[str, str]]:

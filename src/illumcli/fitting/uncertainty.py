@@ -38,7 +38,8 @@ class Uncertainty(Record):
     """What is known of the parameters at an optimum."""
 
     standard_error: Doubles
-    """(P,) of the values, not of the coordinates; inf where not determined, NaN where it is held."""
+    """(P,) of the values, not of the coordinates; inf where not determined; NaN where it is held, and
+    where nothing tells the noise: as many parameters as data, without standard errors."""
     undetermined: tuple[tuple[str, ...], ...]
     """Names of parameters of which only some combination, or nothing, is determined."""
     loose: tuple[tuple[str, ...], ...]
@@ -80,6 +81,8 @@ def uncertainty(
 
     # Back to values.
     errors = np.where(directions.undetermined(), np.inf, np.sqrt(np.maximum(np.diag(C), 0)))
+    if spread is None and residuals.size <= len(values):
+        errors[np.isfinite(errors)] = np.nan  # a model that goes through all data leaves no residuals
     out[free] = errors * directions.unit * slopes(problem, optimum.x)[free]
     undetermined, uncertain = (
         tuple(tuple(labels[members].tolist()) for members in each) for each in (null, loose)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 from types import SimpleNamespace
 
 import numpy as np
@@ -96,6 +98,21 @@ def test_a_loaded_scene_casts_no_ray_again_for_a_material(scene_file):
     fresh = illumcli.render(scene_file, {"materials.clay.sigma": 0.5}, cache=False)
     np.testing.assert_array_equal(second["beauty"], fresh["beauty"])
     np.testing.assert_array_equal(first["beauty"], illumcli.render(scene_file, cache=False)["beauty"])
+
+
+def test_threads_that_render_one_loaded_scene_take_turns(scene_file):
+    loaded, sigmas = illumcli.load(scene_file), (0.1, 0.4, 0.7, 1.0)
+    together = Barrier(len(sigmas))
+
+    def rendered(sigma):
+        together.wait()
+        return loaded.render({"materials.clay.sigma": sigma}, cache=False)["beauty"]
+
+    with ThreadPoolExecutor(len(sigmas)) as pool:
+        pictures = list(pool.map(rendered, sigmas))
+    for sigma, picture in zip(sigmas, pictures, strict=True):
+        alone = illumcli.render(scene_file, {"materials.clay.sigma": sigma}, cache=False)
+        np.testing.assert_array_equal(picture, alone["beauty"])
 
 
 @pytest.mark.parametrize("like", [BOX, SimpleNamespace(**BOX), BOX | {"uv": np.zeros((4, 2))}])

@@ -8,6 +8,7 @@ import weakref
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypedDict, Unpack, overload
 
 from illumcli.api.pictures import Rendering
@@ -40,7 +41,8 @@ class Options(TypedDict, total=False):
 class LoadedScene:
     """A scene to render several times; buffers that no override touches are computed once.
 
-    Its text and its files are read when they are first needed; load it again when they change.
+    Its text and its files are read when they are first needed; load it again when they change. Threads that
+    render it take turns.
 
     Parameters
     ----------
@@ -55,6 +57,7 @@ class LoadedScene:
         weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self.path = file_of(scene, self._folder)
         """The scene file."""
+        self._lock = Lock()
         self._images = HeldImages()
         self._worker = Worker(self._images)
 
@@ -72,14 +75,14 @@ class LoadedScene:
         progress = given.pop("progress", no_progress)
         layers = given.pop("layers", ())
         given["only"] = (layers,) if isinstance(layers, str) else tuple(layers)
-        with named_scene(self._folder):
+        with self._lock, named_scene(self._folder):
             texts = override_texts(overrides, self._folder)
             chosen = RenderOptions(overrides=texts, pattern="{camera}.exr", force=True, **given)
             work = self._worker.prepare(RenderJob(self.path, chosen, frame))
             self._images.images.clear()
             _, report = self._worker.run(work, progress)
             report = replace(report, warnings=(*report.warnings, *unused_keys(work), *self._worker.finish()))
-        return Rendering.of(tuple(self._images.images), report)
+            return Rendering.of(tuple(self._images.images), report)
 
 
 def load(scene: AnyScene) -> LoadedScene:

@@ -152,6 +152,11 @@ def test_rounding_of_terms_is_not_counted():
         ({"response": "rim", "parameters": {"rim": 1, "rmi": 1}}, "parameters.rmi", "did you mean 'rim'?"),
         ({"response": "n_l", "parameters": {"n_l": 1}}, "parameters.n_l", "'n_l' is a term"),
         ({"response": "n_l", "parameters": {"pi": 1}}, "parameters.pi", "'pi' is a term, constant"),
+        (
+            {"response": "lambda * n_l", "parameters": {"lambda": 1}},
+            "parameters.lambda",
+            "'lambda' is a reserved word; choose another name, such as lambda_",
+        ),
         ({"response": "n_l", "parameters": {"k-d": 1}}, "parameters.k-d", "use letters, digits and _"),
         ({"response": "kd", "parameters": {"kd": "red"}}, "parameters.kd", "is text 'red'"),
         ({"response": "kd", "parameters": {"kd": [1, 2]}}, "parameters.kd", "is a list of 2"),

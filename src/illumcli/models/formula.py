@@ -36,6 +36,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import lru_cache
+from keyword import iskeyword
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
@@ -87,6 +88,8 @@ Text: TypeAlias = Annotated[str, Field(max_length=MAX_LENGTH)]
 def _identifier(text: str) -> str:
     if not re.fullmatch(IDENTIFIER, text):
         raise ValueError(f"'{short(text)}' is no name in a formula; use letters, digits and _")
+    if iskeyword(text):
+        raise ValueError(f"'{text}' is a reserved word; choose another name, such as {text}_")
     if text in SCALARS or text in CONSTANTS or text in FUNCTIONS:
         raise ValueError(f"'{text}' is a term, constant or function of formulas; choose another name")
     return text

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from illumcli.cli import illum as command
+from illumcli.errors import InputError
 from illumcli.gonioreflectometer import bench, rows
 from illumcli.gonioreflectometer.bench import Bench
 from illumcli.gonioreflectometer.rows import Instrument, row_count
@@ -140,6 +141,8 @@ def test_a_picture_is_the_formula_that_it_shows(tmp_path):
     formula = "0.06*cos(2*pi*x) + 0.04*sin(8*pi*y)"
     of_formula, _ = read_surface(SurfaceSource(formula, period=(1.0, 0.5), grid=16))
     np.testing.assert_allclose(of_picture.vertices, of_formula.vertices, atol=1e-5)
+    with pytest.raises(InputError, match="--height must be a finite number, is nan"):
+        read_surface(SurfaceSource(str(path), height=float("nan")))
 
 
 def png16(z):

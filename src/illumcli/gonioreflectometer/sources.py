@@ -102,6 +102,8 @@ def _of_picture(path: Path, source: SurfaceSource) -> tuple[Surface, list[str]]:
 
     if source.height is None:
         raise InputError(f"{path}: give the --height of white above black, in units of --period")
+    if not np.isfinite(source.height):
+        raise InputError(f"{path}: --height must be a finite number, is {source.height}")
     image = read_image(path)
     if max(image.width, image.height) > LARGEST_GRID:
         raise LimitError(

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
-import mpmath
-from mpmath import mp, mpf
-
-mp.dps = 50
-FOLDER = Path(__file__).parents[3] / "src/illumcli/data/vectors"
+from _cases import FOLDER, dot, unit
+from mpmath import mpf, sqrt
 
 DIRECTIONS: dict[str, tuple[list[float], list[float], list[float]]] = {
     "all along the normal": ([0, 0, 1], [0, 0, 1], [0, 0, 1]),
@@ -29,21 +25,6 @@ DIRECTIONS: dict[str, tuple[list[float], list[float], list[float]]] = {
     "slanted": ([0.2, -0.5, 1], [0.7, 0.1, 0.6], [-0.3, 0.4, 1.1]),
     "slanted, one side": ([-1, 2, 0.5], [-0.2, 1, 0.9], [-0.5, 0.8, 1.4]),
 }
-
-
-def unit(vector: list[float]) -> list[mpf]:
-    """A vector of doubles, scaled to length 1."""
-    exact = [mpf(x) for x in vector]
-    return [x / mpmath.sqrt(sum(y * y for y in exact)) for x in exact]
-
-
-def dot(a: list[mpf], b: list[mpf]) -> mpf:
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def color(value: float | list[float]) -> list[mpf]:
-    """Three numbers, from one or three."""
-    return [mpf(x) for x in (value if isinstance(value, list) else [value] * 3)]
 
 
 def write(model: str, source: str, cases: Iterator[tuple[str, dict[str, Any], list[mpf]]]) -> None:
@@ -90,5 +71,5 @@ def cases(
             inputs["t"] = tangent
             raw, normal = unit(tangent), axes[0]
             across = [t - dot(raw, normal) * x for t, x in zip(raw, normal, strict=True)]
-            axes.append([x / mpmath.sqrt(dot(across, across)) for x in across])
+            axes.append([x / sqrt(dot(across, across)) for x in across])
         yield note, inputs, response(given, *axes)

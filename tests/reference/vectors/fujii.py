@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import mpmath
-from diffuse_cases import cases, color, dot, write
+from _cases import color, dot
+from diffuse_cases import cases, write
 from mpmath import mpf, pi
 
 PARAMETERS: list[dict[str, Any]] = [

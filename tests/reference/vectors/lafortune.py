@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from diffuse_cases import cases, color, dot, write
+from _cases import color, dot
+from diffuse_cases import cases, write
 from mpmath import mpf, pi
 
 MIRROR = {"cx": -1, "cy": -1, "cz": 1}

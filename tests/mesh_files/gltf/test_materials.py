@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from planned import layers_of, planned
 UV = [[0, 0], [1, 0], [1, 1], [0, 1]]
 PNG = b"\x89PNG not looked at here"
 BLACK, WHITE = (0, 0, 0), (1, 1, 1)
+NO_NUMBERS = "values of materials that are no finite numbers replaced by their defaults"
+OUTSIDE = "values of materials outside their range clipped to it"
 
 
 @pytest.fixture
@@ -76,10 +79,21 @@ def test_factors(library: Any) -> None:
     assert (keys["base_color"], keys["metallic"], keys["roughness"]) == ((0.5, 0.25, 1), 0, 0.5)
 
 
-@pytest.mark.parametrize(("said", "index"), [(2, 2), (0.5, 1), (0, 1e3), (1e9, 1e3), ("much", None)])
-def test_an_index(library: Any, said: Any, index: float | None) -> None:
-    keys = library({"extensions": {"KHR_materials_ior": {"ior": said}}}).materials["paint"]
-    assert keys.get("ior") == index
+@pytest.mark.parametrize(
+    ("said", "index", "what"),
+    [
+        (2, 2, None),
+        (0.5, 1, OUTSIDE),
+        (-1, 1, OUTSIDE),
+        (0, 1e3, None),
+        (1e9, 1e3, None),
+        ("much", None, NO_NUMBERS),
+    ],
+)
+def test_an_index(library: Any, said: Any, index: float | None, what: str | None) -> None:
+    mesh = library({"extensions": {"KHR_materials_ior": {"ior": said}}})
+    assert mesh.materials["paint"].get("ior") == index
+    assert told(mesh) == ({} if what is None else {what: 1})
 
 
 def test_factors_out_of_range_or_none_are_mended(library: Any) -> None:
@@ -90,10 +104,41 @@ def test_factors_out_of_range_or_none_are_mended(library: Any) -> None:
     }
     strength = {"KHR_materials_emissive_strength": {"emissiveStrength": None}}
     material = {"pbrMetallicRoughness": said, "emissiveFactor": [1, 2], "extensions": strength}
-    keys = library(material).materials["paint"]
+    mesh = library(material)
+    keys = mesh.materials["paint"]
     assert (keys["base_color"], keys["metallic"], keys["roughness"]) == ((1, 0, 0.5), 1, 0)
     assert keys["emission"] == BLACK
-    assert library({"pbrMetallicRoughness": 7, "extensions": 3}).materials["paint"]["base_color"] == WHITE
+    assert told(mesh) == {NO_NUMBERS: 3, OUTSIDE: 2}
+    assert mesh.material_repairs[OUTSIDE].first == ": materials[0].baseColorFactor"
+    mesh = library({"pbrMetallicRoughness": 7, "extensions": 3})
+    assert mesh.materials["paint"]["base_color"] == WHITE
+    assert told(mesh) == {"parts of materials that are no objects left out": 1}
+
+
+@pytest.mark.parametrize(
+    ("said", "metallic", "base", "what"),
+    [
+        ({"metallicFactor": 3}, 1, WHITE, OUTSIDE),
+        ({"metallicFactor": math.nan}, 1, WHITE, NO_NUMBERS),
+        ({"metallicFactor": None}, 1, WHITE, NO_NUMBERS),
+        ({"metallicFactor": True}, 1, WHITE, NO_NUMBERS),
+        ({"baseColorFactor": [0.5, 0.5]}, 1, WHITE, NO_NUMBERS),
+        ({"baseColorFactor": [0.5, math.nan, 0.5, 1]}, 1, WHITE, NO_NUMBERS),
+        ({"baseColorFactor": [0.5, 0.5, math.inf, 1]}, 1, WHITE, NO_NUMBERS),
+    ],
+)
+def test_each_mended_factor_is_counted(
+    library: Any, said: Any, metallic: float, base: Any, what: str
+) -> None:
+    mesh = library({"pbrMetallicRoughness": said})
+    assert mesh.materials["paint"]["metallic"] == metallic
+    assert mesh.materials["paint"]["base_color"] == base
+    assert told(mesh) == {what: 1}
+
+
+def test_an_unknown_alpha_mode_is_opaque(library: Any) -> None:
+    assert told(library({"alphaMode": "FOO"})) == {"unknown alphaMode FOO of materials taken as OPAQUE": 1}
+    assert told(library({"alphaMode": "OPAQUE"})) == {}
 
 
 def test_metal_and_roughness_are_channels_of_one_texture(library: Any, tmp_path: Path) -> None:
@@ -269,7 +314,13 @@ def test_what_is_not_drawn_is_named(library: Any) -> None:
     [
         (7, {}, "textures left out (no texture)"),
         ({"index": 9}, {}, "textures left out (refers to textures[9], which is not there)"),
-        ({"index": 0}, {"textures": [{}]}, "textures left out (refers to images[None], which is not there)"),
+        ({"index": 0}, {"textures": [{}]}, "textures left out (names no image)"),
+        ({"texCoord": 0}, {}, "textures left out (names no texture)"),
+        (
+            {"index": 0, "extensions": {"KHR_texture_transform": {"rotation": "much"}}},
+            {},
+            "textures left out (KHR_texture_transform.rotation must be a finite number)",
+        ),
         ({"index": 0, "texCoord": 3}, {}, "textures left out (no TEXCOORD_3 to look them up by)"),
         ({"index": 0, "texCoord": []}, {}, "textures left out (texture.texCoord must be a whole number"),
         ({"index": 1}, {"images": [{}, {"uri": "absent.png"}]}, "textures that are not there left out"),

@@ -53,8 +53,11 @@ _USED = {
     SPECULAR_GLOSSINESS,
     "KHR_materials_variants",
 }
+_SHARE = (0.0, 1.0)
 _REPEAT, _CLAMP, _MIRROR, _NEAREST = 10497, 33071, 33648, 9728
 _WRAPS = {_REPEAT: "repeat", _CLAMP: "clamp", _MIRROR: "mirror"}
+_NO_NUMBERS = "values of materials that are no finite numbers replaced by their defaults"
+_OUTSIDE = "values of materials outside their range clipped to it"
 
 Color = tuple[float, float, float]
 Varying = Color | dict[str, Any]
@@ -124,13 +127,16 @@ class Library:
         material, where = self._document.item("materials", number), f"materials[{number}]"
         self._count_what_is_left_out(material, where)
         gloss = extension(material, SPECULAR_GLOSSINESS)
-        metal = material.get("pbrMetallicRoughness")
-        metal = metal if isinstance(metal, dict) else {}
+        metal = material.get("pbrMetallicRoughness", {})
+        if not isinstance(metal, dict):
+            self._count("parts of materials that are no objects left out", f"{where}.pbrMetallicRoughness")
+            metal = {}
 
         # Emission.
-        strength = _number(extension(material, "KHR_materials_emissive_strength"), "emissiveStrength", 1.0)
+        said = extension(material, "KHR_materials_emissive_strength")
+        strength = self._number(number, said, "emissiveStrength", 1.0, (0.0, math.inf))
         emission = _scaled(
-            self._color(number, material, ("emissiveFactor", "emissiveTexture"), BLACK), max(strength, 0.0)
+            self._color(number, material, ("emissiveFactor", "emissiveTexture"), BLACK), strength
         )
 
         # The base colour, times COLOR_0; then the workflow: unlit, specular-glossiness, metallic-roughness.
@@ -141,11 +147,11 @@ class Library:
         if "KHR_materials_unlit" in extensions(material):
             return {"model": "lambert", "diffuse": BLACK, "ambient": BLACK, "emission": base}
         if gloss:
-            return self._specular_glossiness(gloss, base, emission)
+            return self._specular_glossiness(number, gloss, base, emission)
         keys = {"model": "metallic_roughness", "base_color": base, "emission": emission}
         keys |= self._metal_and_roughness(number, metal)
-        ior = _number(extension(material, "KHR_materials_ior"), "ior", 1.5)
-        return keys if ior == 1.5 else keys | {"ior": _index(ior)}
+        ior = self._index(number, extension(material, "KHR_materials_ior"))
+        return keys if ior == 1.5 else keys | {"ior": ior}
 
     def _count_what_is_left_out(self, material: dict[str, Any], where: str) -> None:
         count = self._count
@@ -153,16 +159,21 @@ class Library:
             count("textures of specular and glossiness left out", where)
         if "normalTexture" in material:
             count("normal textures left out", where)
-        if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+        mode = material.get("alphaMode", "OPAQUE")
+        if mode in ("MASK", "BLEND"):
             count("transparent materials made opaque", where)
+        elif mode != "OPAQUE":
+            count(f"unknown alphaMode {printable(mode)} of materials taken as OPAQUE", where)
         for name in extensions(material):
             if name not in _USED:
                 count(f"extension {printable(name)} of materials left out", where)
 
-    def _specular_glossiness(self, gloss: dict[str, Any], base: Varying, emission: Varying) -> dict[str, Any]:
+    def _specular_glossiness(
+        self, number: int, gloss: dict[str, Any], base: Varying, emission: Varying
+    ) -> dict[str, Any]:
         textured = "specularGlossinessTexture" in gloss
-        f0 = _factor(gloss, "specularFactor", WHITE, 1.0)
-        glossiness = min(max(_number(gloss, "glossinessFactor", 1.0), 0.0), 1.0)
+        f0 = self._factor(number, gloss, "specularFactor", WHITE)
+        glossiness = self._number(number, gloss, "glossinessFactor", 1.0)
         if (
             textured
         ):  # the factors are the largest values that the texture leads to, no good guess at the rest
@@ -175,7 +186,7 @@ class Library:
     def _metal_and_roughness(self, number: int, metal: dict[str, Any]) -> dict[str, Any]:
         """`metallic` and `roughness`: factors times channels of one texture."""
         metallic, roughness = (
-            min(max(_number(metal, key, 1.0), 0.0), 1.0) for key in ("metallicFactor", "roughnessFactor")
+            self._number(number, metal, key, 1.0) for key in ("metallicFactor", "roughnessFactor")
         )
         info = metal.get("metallicRoughnessTexture")
         if info is None or not (metallic or roughness):
@@ -191,7 +202,7 @@ class Library:
 
     def _color(self, number: int, entry: dict[str, Any], names: tuple[str, str], default: Color) -> Varying:
         """factor * texture of a material; the factor alone if there is no usable texture."""
-        factor = _factor(entry, names[0], default, 1.0)
+        factor = self._factor(number, entry, names[0], default)
         info = entry.get(names[1])
         if info is None or not any(factor):
             return factor
@@ -208,7 +219,43 @@ class Library:
         texture = self._usable_texture(number, info, "occlusionTexture", "occlusion textures")
         if texture is None:
             return {}
-        return {**texture, "strength": min(max(_number(info, "strength", 1.0), 0.0), 1.0)}
+        return {**texture, "strength": self._number(number, info, "strength", 1.0)}
+
+    def _index(self, number: int, entry: dict[str, Any]) -> float:
+        """The index of KHR_materials_ior, where 0 stands for one without a limit."""
+        value = entry.get("ior", 1.5)
+        if is_finite(value) and value == 0:
+            return LARGEST_INDEX
+        return min(self._number(number, entry, "ior", 1.5, (1.0, math.inf)), LARGEST_INDEX)
+
+    def _factor(self, number: int, entry: dict[str, Any], key: str, default: Color) -> Color:
+        """Three numbers clipped to 0..1; `default`, and counted, if they are none."""
+        values, where = entry.get(key, list(default)), f"materials[{number}].{key}"
+        if not isinstance(values, list) or len(values) < 3 or not all(map(is_finite, values[:3])):
+            self._count(_NO_NUMBERS, where)
+            return default
+        r, g, b = (min(max(float(each), 0.0), 1.0) for each in values[:3])
+        if [r, g, b] != values[:3]:
+            self._count(_OUTSIDE, where)
+        return r, g, b
+
+    def _number(
+        self,
+        number: int,
+        entry: dict[str, Any],
+        key: str,
+        default: float,
+        limits: tuple[float, float] = _SHARE,
+    ) -> float:
+        """A number clipped to its range; `default`, and counted, if it is none."""
+        value, where = entry.get(key, default), f"materials[{number}].{key}"
+        if not is_finite(value):
+            self._count(_NO_NUMBERS, where)
+            return default
+        clipped = min(max(float(value), limits[0]), limits[1])
+        if clipped != value:
+            self._count(_OUTSIDE, where)
+        return clipped
 
     def _usable_texture(
         self, number: int, info: Any, key: str, kind: str = "textures"
@@ -228,7 +275,9 @@ class Library:
         document = self._document
         if not isinstance(info, dict):
             raise document.wrong("no texture")
-        texture = document.item("textures", info.get("index"))
+        if info.get("index") is None:
+            raise document.wrong("names no texture")
+        texture = document.item("textures", info["index"])
         keys = {"texture": self._image(texture)}
 
         # Its texture coordinates and wrapping.
@@ -259,6 +308,8 @@ class Library:
         document = self._document
         sources = [texture, *extensions(texture).values()]
         number = next((each["source"] for each in sources if "source" in each), None)
+        if number is None:
+            raise document.wrong("names no image")
         image = document.item("images", number)
         uri = image.get("uri")
         if str(image.get("mimeType")).startswith("image/ktx") or str(uri).lower().endswith((".ktx", ".ktx2")):
@@ -299,11 +350,6 @@ def _substitutes(keys: dict[str, Any], first: str, prefix: str = "") -> Iterator
             yield from _substitutes(value, first, f"{prefix}{key}.")
 
 
-def _index(ior: float) -> float:
-    """The index of KHR_materials_ior, where 0 stands for one without a limit."""
-    return min(max(ior, 1.0), LARGEST_INDEX) if ior != 0 else LARGEST_INDEX
-
-
 def _times(texture: dict[str, Any], factor: float) -> float | dict[str, Any]:
     """A texture of a number times a factor."""
     return 0.0 if factor == 0 else texture if factor == 1 else {**texture, "factor": (factor,) * 3}
@@ -334,20 +380,6 @@ def _scaled(color: Varying, factor: float) -> Varying:
     return r, g, b
 
 
-def _factor(entry: dict[str, Any], key: str, default: Color, most: float) -> Color:
-    """Three numbers clamped to 0..`most`; `default` if there are none."""
-    values = entry.get(key)
-    if not isinstance(values, list) or len(values) < 3 or not all(map(is_finite, values[:3])):
-        return default
-    r, g, b = (min(max(float(each), 0.0), most) for each in values[:3])
-    return r, g, b
-
-
-def _number(entry: dict[str, Any], key: str, default: float) -> float:
-    value = entry.get(key, default)
-    return float(value) if is_finite(value) else default
-
-
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -359,7 +391,9 @@ def _transform(document: Document, transform: dict[str, Any]) -> tuple[float, ..
     """
     x, y = document.numbers(transform, "offset", "KHR_texture_transform", (0.0, 0.0))
     width, height = document.numbers(transform, "scale", "KHR_texture_transform", (1.0, 1.0))
-    angle = _number(transform, "rotation", 0.0)
+    angle = transform.get("rotation", 0.0)
+    if not is_finite(angle):
+        raise document.wrong("KHR_texture_transform.rotation must be a finite number")
     cosine, sine = math.cos(angle), math.sin(angle)
     return tuple(map(float, (cosine * width, sine * height, x, -sine * width, cosine * height, y)))
 

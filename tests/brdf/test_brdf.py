@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import sys
 
 import numpy as np
@@ -184,7 +185,7 @@ def test_what_a_model_needs_is_said():
 
 def test_the_table_holds_the_slices_to_the_last_digit(tmp_path):
     path = tmp_path / "slices.csv"
-    assert draw_brdfs(["lambert", "phong"], table=path, plot=Plot(angles=(20.0, 60.0))) == ([path], [])
+    assert draw_brdfs(["lambert", "phong"], table=path, plot=Plot(angles=(20.0, 60.0))) == ([path], [], [])
     with path.open() as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["model", "incidence", "view", "f.R", "f.G", "f.B"]
@@ -210,7 +211,7 @@ def test_an_svg_holds_every_view(tmp_path):
     assert text.startswith("<?xml")
     assert text.count("<image") == 2  # sphere and plane
     first = path.read_bytes()
-    assert draw_brdfs(["blinn_phong"], output=path, plot=Plot(VIEWS)) == ([path], [path])
+    assert draw_brdfs(["blinn_phong"], output=path, plot=Plot(VIEWS)) == ([path], [path], [])
     assert path.read_bytes() == first
 
 
@@ -239,6 +240,20 @@ def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
         draw_brdfs(["lambert"], output=tmp_path / "x.png", table=tmp_path / "x.csv")
     assert list(tmp_path.iterdir()) == []
     draw_brdfs(["lambert"], table=tmp_path / "x.csv")
+
+
+def test_values_that_are_drawn_as_0_are_told(illum, tmp_path):
+    faulty = ["formula", "lambert", "-D", "formula.response=n_l - n_v"]
+    for output in ("--csv=x.csv", "-ox.svg"):
+        done = illum("brdf", *faulty, "--view", "polar", "--angle", "60", output)
+        assert re.fullmatch(
+            r"formula: \d+ values were negative or not finite, and are 0; see illum verify .*\n", done.stderr
+        )
+    # At 60 degrees n_v is the greater one from -60 to 60 degrees: as many angles, times R, G and B.
+    angles = slice_angles(60)
+    negative = 3 * np.count_nonzero(np.cos(np.radians(angles)) > np.cos(np.radians(60)))
+    assert abs(int(done.stderr.split()[1]) - negative) <= 6
+    assert "and are 0" in write_merl(["formula"], ["response=n_l - n_v"], tmp_path / "x.binary")[1][-1]
 
 
 def test_the_command_prints_its_files_and_needs_no_pyplot(illum, tmp_path):

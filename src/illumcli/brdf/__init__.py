@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from illumcli.brdf import views
 from illumcli.brdf.outputs import write_files
 from illumcli.brdf.plot import DEFAULT_VIEWS, PLOT, VIEWS, Plot
+from illumcli.brdf.views import Counted, Look
 from illumcli.errors import InputError
 from illumcli.files.outputs import refuse_suffix, refuse_unwritable
 from illumcli.images.drawings import read_numbers
@@ -36,8 +38,8 @@ def draw_brdfs(
     table: Path | None = None,
     plot: Plot = PLOT,
     force: bool = False,
-) -> tuple[list[Path], list[Path]]:
-    """Draw the models `names` side by side. Returns the paths of all files, and those that were kept.
+) -> tuple[list[Path], list[Path], list[str]]:
+    """Draw the models `names` side by side.
 
     Parameters
     ----------
@@ -47,6 +49,15 @@ def draw_brdfs(
         A picture, .png, .svg or .pdf.
     table : Path, optional
         The polar slices as CSV.
+
+    Returns
+    -------
+    paths : list of Path
+        All files.
+    kept : list of Path
+        Those that have the same bytes already.
+    notes : list of str
+        What is drawn as 0 because it is negative or not finite.
 
     Raises
     ------
@@ -64,7 +75,7 @@ def draw_brdfs(
         if path is not None:
             refuse_unwritable(path)
 
-    models = _labelled(_prepared(described(names, overrides)), plot.labels)
+    models = _counted(_labelled(_prepared(described(names, overrides)), plot.labels))
     files: dict[Path, bytes] = {}
     if table is not None:
         files[table] = slices_table(models, plot).encode()
@@ -72,7 +83,7 @@ def draw_brdfs(
         from illumcli.brdf.figure import figure_file
 
         files[output] = figure_file(models, plot, output.suffix.lower().removeprefix("."))
-    return list(files), write_files(files, force)
+    return list(files), write_files(files, force), _notes(models)
 
 
 def _prepared(models: Mapping[str, IlluminationModel]) -> dict[str, IlluminationModel]:
@@ -91,6 +102,21 @@ def _labelled(models: Mapping[str, IlluminationModel], labels: Sequence[str]) ->
     return dict(zip(labels, models.values(), strict=True))
 
 
+def _counted(models: Mapping[str, IlluminationModel]) -> dict[str, Counted]:
+    """The models with counts of 0."""
+    return {title: Counted(model, Counter()) for title, model in models.items()}
+
+
+def _notes(models: Mapping[str, Counted]) -> list[str]:
+    """A line for each model of which something is drawn as 0."""
+    return [
+        f"{title}: {each.mended.total()} values were negative or not finite, and are 0; "
+        "see illum verify SCENE, with the model in a scene"
+        for title, each in models.items()
+        if each.mended
+    ]
+
+
 def write_merl(
     names: Sequence[str], overrides: Sequence[str], path: Path, force: bool = False
 ) -> tuple[list[Path], list[str]]:
@@ -101,7 +127,7 @@ def write_merl(
     kept : list of Path
         The file, if it has the same bytes already.
     notes : list of str
-        What the table cannot hold.
+        What the table cannot hold, and what is 0 in it because it is negative or not finite.
 
     Raises
     ------
@@ -124,10 +150,11 @@ def write_merl(
             f"{path}: {title} is anisotropic with these parameters, and a MERL table is isotropic; "
             "choose parameters without a grain, or another model"
         )
-    table = merl_table(model)
+    counted = _counted(models)
+    table = merl_table(counted[title])
     kept = write_files({path: merl.encode(table.values)}, force)
     fact = f"{title} changes if light and eye are exchanged; {path} holds the mean of both"
-    return kept, [] if table.is_reciprocal else [fact]
+    return kept, [*([] if table.is_reciprocal else [fact]), *_notes(counted)]
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
@@ -213,7 +240,7 @@ def _described(
         return None, facts
 
 
-def slices_table(models: Mapping[str, IlluminationModel], plot: Plot) -> str:
+def slices_table(models: Mapping[str, Look], plot: Plot) -> str:
     """The polar slices as CSV: model, both angles [degrees], values; the light is at negative angles."""
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")

@@ -9,8 +9,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from illumcli.arrays import column_major
-from illumcli.brdf.views import seen_from
-from illumcli.models._base import IlluminationModel
+from illumcli.brdf.views import Look, seen_from
 
 Doubles = NDArray[np.float64]
 
@@ -33,7 +32,7 @@ class AlbedoCurve(NamedTuple):
     """The largest relative difference that is left; at most TOLERANCE unless the quadrature ended before."""
 
 
-def albedo_curve(model: IlluminationModel) -> AlbedoCurve:
+def albedo_curve(model: Look) -> AlbedoCurve:
     """The albedo of a model over the angle of incidence, in the plane of its grain."""
     found = [albedo(model, angle) for angle in ANGLES]
     return AlbedoCurve(
@@ -41,7 +40,7 @@ def albedo_curve(model: IlluminationModel) -> AlbedoCurve:
     )
 
 
-def albedo(model: IlluminationModel, incidence: float) -> tuple[Doubles, float]:
+def albedo(model: Look, incidence: float) -> tuple[Doubles, float]:
     """(3,) the integral of f_r cos(theta_v) over all directions, and its relative error.
 
     The number of directions is multiplied by four until the integral no longer changes.
@@ -61,7 +60,7 @@ def albedo(model: IlluminationModel, incidence: float) -> tuple[Doubles, float]:
     return values, error
 
 
-def _quadrature(model: IlluminationModel, incidence: float, steps: int) -> Doubles:
+def _quadrature(model: Look, incidence: float, steps: int) -> Doubles:
     """(3,) the integral over `steps` times `2 steps` directions, in polar coordinates about the mirror
     direction.
 

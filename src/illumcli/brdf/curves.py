@@ -12,9 +12,8 @@ from illumcli.brdf.albedo import TOLERANCE, albedo_curve
 from illumcli.brdf.plot import Plot
 from illumcli.brdf.scales import DECADES, STEEPEST, radius, scale
 from illumcli.brdf.style import Style, style
-from illumcli.brdf.views import Doubles
+from illumcli.brdf.views import Doubles, Look
 from illumcli.color import luminance
-from illumcli.models._base import IlluminationModel
 
 if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
@@ -42,7 +41,7 @@ class Panel(NamedTuple):
     """What is to be said about their accuracy."""
 
 
-def panels(view: str, titled: Sequence[tuple[str, IlluminationModel]], plot: Plot) -> list[Panel]:
+def panels(view: str, titled: Sequence[tuple[str, Look]], plot: Plot) -> list[Panel]:
     """The axes of a view: one for each model, or one for all.
 
     Parameters
@@ -61,7 +60,7 @@ def panels(view: str, titled: Sequence[tuple[str, IlluminationModel]], plot: Plo
     return found
 
 
-def _panel(view: str, model: IlluminationModel, plot: Plot, series: tuple[int, str]) -> Panel:
+def _panel(view: str, model: Look, plot: Plot, series: tuple[int, str]) -> Panel:
     """The curves of one model; `series` is the number and name by which an overlay tells it apart."""
     if view == "albedo":
         angles, values, error = albedo_curve(model)

@@ -11,8 +11,8 @@ from illumcli.brdf.curves import draw_curves, legend, panels
 from illumcli.brdf.pictures import draw_pictures
 from illumcli.brdf.plot import COLUMN, CURVES, Plot
 from illumcli.brdf.style import SETTINGS, Style
+from illumcli.brdf.views import Look
 from illumcli.errors import InputError
-from illumcli.models._base import IlluminationModel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ METADATA: dict[str, dict[str, Any]] = {
 """Without date and version, so that equal drawings are equal files."""
 
 
-def figure_file(models: Mapping[str, IlluminationModel], plot: Plot, kind: str) -> bytes:
+def figure_file(models: Mapping[str, Look], plot: Plot, kind: str) -> bytes:
     """The picture as a PNG, SVG or PDF file.
 
     Parameters
@@ -115,7 +115,7 @@ def _rows(plot: Plot, models: int, width: float) -> list[list[str]]:
 
 
 def _draw_row(
-    axes: Sequence[Any], row: Sequence[str], models: Mapping[str, IlluminationModel], plot: Plot
+    axes: Sequence[Any], row: Sequence[str], models: Mapping[str, Look], plot: Plot
 ) -> dict[str, Style]:
     """Draw the axes of a row; the styles of its curves by name."""
     if row[0] not in CURVES:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import column_major
-from illumcli.brdf.views import values
+from illumcli.brdf.views import Look, values
 from illumcli.measured_files import merl
-from illumcli.models._base import IlluminationModel
 
 RECIPROCAL = 1e-6
 """Largest difference of light and eye exchanged that is rounding, relative to the value."""
@@ -25,7 +24,7 @@ class MerlTable(NamedTuple):
     """False if the values are means of light and eye exchanged, which differ."""
 
 
-def merl_table(model: IlluminationModel) -> MerlTable:
+def merl_table(model: Look) -> MerlTable:
     """The table of a model whose look has no grain.
 
     A cell holds both orders of light and eye, so its value is the mean of both.

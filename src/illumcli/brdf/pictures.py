@@ -11,9 +11,8 @@ from illumcli.brdf import views
 from illumcli.brdf.curves import quantity
 from illumcli.brdf.plot import Plot
 from illumcli.brdf.scales import STEEPEST, radius, scale
-from illumcli.brdf.views import Doubles
+from illumcli.brdf.views import Doubles, Look
 from illumcli.color import luminance, to_srgb
-from illumcli.models._base import IlluminationModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +21,7 @@ PIXELS = 160
 """Of a picture, for each inch of its column."""
 
 
-def draw_pictures(view: str, axes: Sequence[Any], models: Sequence[IlluminationModel], plot: Plot) -> None:
+def draw_pictures(view: str, axes: Sequence[Any], models: Sequence[Look], plot: Plot) -> None:
     """Draw a view of every model."""
     if view == "lobe":
         _draw_lobes(axes, models, plot)
@@ -41,7 +40,7 @@ def _draw_picture(axes: Axes, picture: Doubles) -> None:
     axes.set_axis_off()
 
 
-def _draw_lobes(axes: Sequence[Any], models: Sequence[IlluminationModel], plot: Plot) -> None:
+def _draw_lobes(axes: Sequence[Any], models: Sequence[Look], plot: Plot) -> None:
     """The lobe of every model, on one scale."""
     lobes = [views.lobe(model, plot.lobe_angle, plot.times_cos) for model in models]
     is_visible = np.cos(np.radians(STEEPEST))

@@ -8,13 +8,15 @@ BRDF that gives the same image; it grows without bound as the light approaches t
 
 from __future__ import annotations
 
-from typing import Any
+from collections import Counter
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Vectors, column_major, cross, dot, unit
 from illumcli.models._base import IlluminationModel
+from illumcli.records import Record
 from illumcli.shading.terms import evaluate, given_terms
 
 Doubles = NDArray[np.float64]
@@ -26,13 +28,24 @@ LAMP = (0.0, 3.0, 0.8)
 EYE = (0.0, -4.0, 1.5)
 
 
-def values(
-    model: IlluminationModel, n: Vectors, l: Vectors, v: Vectors, t: Vectors, times_cos: bool = True
-) -> Doubles:
+class Counted(Record):
+    """A model that counts what is drawn of it as 0 because it is negative or not finite."""
+
+    model: IlluminationModel
+    mended: Counter[str]
+    """The number of such values of each lobe."""
+
+
+Look: TypeAlias = IlluminationModel | Counted
+"""What is drawn."""
+
+
+def values(model: Look, n: Vectors, l: Vectors, v: Vectors, t: Vectors, times_cos: bool = True) -> Doubles:
     """(N, 3) the response, or f_r, of N directions; 0 where light or eye is at or below the horizon."""
     out = np.zeros(l.shape, order="F")
     n_l = dot(n, l)
     lit = np.flatnonzero((n_l > 0) & (dot(n, v) > 0))
+    model, mended = (model.model, model.mended) if isinstance(model, Counted) else (model, None)
     lobes = model.lobes()
     if not (lit.size and lobes):
         return out
@@ -42,13 +55,13 @@ def values(
     }
     if "light" in given_terms(lobes):
         given["light"] = np.ones(3)
-    out[lit] = sum(evaluate(lobes, given).values())
+    out[lit] = sum(evaluate(lobes, given, mended).values())
     if not times_cos:
         out[lit] /= n_l[lit][:, None]
     return out
 
 
-def seen_from(model: IlluminationModel, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
+def seen_from(model: Look, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
     """(N, 3) values of the flat surface lit from `incidence` degrees, seen from unit vectors `v`."""
 
     def everywhere(vector: tuple[float, float, float]) -> Vectors:
@@ -70,9 +83,7 @@ def slice_angles(incidence: float) -> Doubles:
     return np.unique(angles[np.abs(angles) < 90])
 
 
-def polar_slice(
-    model: IlluminationModel, incidence: float, times_cos: bool = False
-) -> tuple[Doubles, Doubles]:
+def polar_slice(model: Look, incidence: float, times_cos: bool = False) -> tuple[Doubles, Doubles]:
     """(K,) angles of view in degrees and (K, 3) values in the plane of incidence.
 
     Parameters
@@ -86,9 +97,7 @@ def polar_slice(
     return angles, seen_from(model, incidence, v, times_cos)
 
 
-def across_slice(
-    model: IlluminationModel, incidence: float, times_cos: bool = False
-) -> tuple[Doubles, Doubles]:
+def across_slice(model: Look, incidence: float, times_cos: bool = False) -> tuple[Doubles, Doubles]:
     """(K,) angles from the mirror direction in degrees and (K, 3) values, at right angles to the plane of
     incidence.
 
@@ -104,9 +113,7 @@ def across_slice(
     return angles, seen_from(model, incidence, column_major(v), times_cos)
 
 
-def lobe(
-    model: IlluminationModel, incidence: float, times_cos: bool = False, steps: int = 90
-) -> tuple[Doubles, Doubles]:
+def lobe(model: Look, incidence: float, times_cos: bool = False, steps: int = 90) -> tuple[Doubles, Doubles]:
     """(S + 1, 2 S + 1, 3) unit directions over the hemisphere, and (S + 1, 2 S + 1, 3) values there.
 
     The columns run from the mirror direction to the horizon, crowded at their beginning: a narrow highlight
@@ -125,13 +132,14 @@ def lobe(
     return v, np.reshape(values, v.shape)
 
 
-def irradiance(model: IlluminationModel) -> float:
+def irradiance(model: Look) -> float:
     """Irradiance of the light in pictures: pi for a BRDF, so that white Lambert is white, 1 for the intensity
     models."""
+    model = model.model if isinstance(model, Counted) else model
     return np.pi if model.physical or getattr(model, "normalised", False) else 1.0
 
 
-def lit_sphere(model: IlluminationModel, size: int = 256) -> Doubles:
+def lit_sphere(model: Look, size: int = 256) -> Doubles:
     """(size, size, 4) linear R, G, B and coverage of a ball under one light; its grain runs around y."""
     x, y, inside = _disc(2 * size)
     n = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1).reshape(-1, 3)
@@ -141,7 +149,7 @@ def lit_sphere(model: IlluminationModel, size: int = 256) -> Doubles:
     return _halved(values(model, n, column_major(l), column_major(v), t) * irradiance(model), inside)
 
 
-def lit_plane(model: IlluminationModel, size: int = 256) -> Doubles:
+def lit_plane(model: Look, size: int = 256) -> Doubles:
     """(size / 2, size, 4) linear R, G, B and coverage of a floor seen low, against its lamp.
 
     Its grain runs from left to right. The light does not fall off with distance.

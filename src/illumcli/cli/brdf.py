@@ -115,13 +115,13 @@ def brdf(
 
     if output is None and table is None and merl is None:
         output = Path("brdf.png")
-    paths, kept = draw_brdfs(models, overrides, output, table, plot, force)
+    paths, kept, notes = draw_brdfs(models, overrides, output, table, plot, force)
     print_paths(paths)
-    notes: list[str] = []
     if merl is not None:
-        kept_table, notes = write_merl(models, overrides, merl, force)
+        kept_table, notes_table = write_merl(models, overrides, merl, force)
         print_paths([merl])
         kept += kept_table
+        notes += notes_table
     if not quiet:
         say_kept(kept)
         for note in notes:

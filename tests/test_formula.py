@@ -140,12 +140,23 @@ def test_outside_the_domain_is_nan_without_a_warning():
         ("(x", "not a formula"),
         ("x" * (MAX_LENGTH + 1), "at most 1000"),
         ("-" * 900 + "x", "deep"),
-        ("(" * 150 + "x" + ")" * 150 + "+" + "+".join("x" * 150), "deep"),
+        ("(" * 250 + "x" + ")" * 250, "deep|not a formula"),
+        ("x**" * 150 + "x", "position 301: nested more than 100 deep"),
     ],
 )
 def test_anything_else_is_refused_with_its_position(text, message):
     with pytest.raises(ValueError, match=message):
         parse(text, XYZ)
+
+
+def test_many_terms_and_factors_are_not_nested():
+    x = np.array([0.5, 2.0])
+    np.testing.assert_allclose(parse("+".join("x" * 500), ("x",)).value(x), 500 * x)
+    value, (slope,) = parse("-x*2" + "-x*2+x" * 150, ("x",)).gradient(x)
+    np.testing.assert_allclose([value, slope], [-152 * x, [-152.0, -152.0]])
+    np.testing.assert_allclose(parse("(" * 110 + "x" + "/2)*3" * 110, ("x",)).value(x), x * 1.5**110)
+    with pytest.raises(ValueError, match="position 999: unknown name 'w'"):
+        parse("x+" * 499 + "w", ("x",))
 
 
 def test_towers_of_powers_are_doubles():

@@ -168,14 +168,27 @@ def _advice(name: str, known: tuple[str, ...]) -> str:
     return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
 
 
+def _chain(node: ast.expr) -> tuple[ast.expr, list[ast.BinOp]]:
+    """The first operand of `a + b * c - d`, here a, and the operations on it in order, + and -.
+
+    A sum of N terms is a tree N deep, though nothing in it is nested.
+    """
+    operations = []
+    while isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        operations.append(node)
+        node = node.left
+    return node, operations[::-1]
+
+
 def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) -> None:
     """Raise ValueError if `node`, or anything below it, is not on the list of accepted nodes."""
-    # Limit the depth of the tree.
+    # Limit the depth of nesting.
+    node, operations = _chain(node)
     place = node.col_offset + indent
     if depth > MAX_DEPTH:
         raise _refusal(place, f"nested more than {MAX_DEPTH} deep")
 
-    # Check the node by its type: a number, a name, an operator or a function.
+    # Check the node by its type: a number, a name, a sign or a function.
     parts: list[ast.expr]
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
@@ -189,8 +202,6 @@ def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) 
             parts = []
         case ast.UnaryOp() if type(node.op) in _UNARY:
             parts = [node.operand]
-        case ast.BinOp() if type(node.op) in _BINARY:
-            parts = [node.left, node.right]
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
             if name not in FUNCTIONS:
                 raise _refusal(place, f"unknown function '{name}'; there are: {', '.join(FUNCTIONS)}")
@@ -201,12 +212,21 @@ def _check(node: ast.expr, variables: tuple[str, ...], indent: int, depth: int) 
         case _:
             raise _refusal(place, f"not part of a formula; there are {ALLOWED} {', '.join(FUNCTIONS)}")
 
-    # Check its operands or arguments.
-    for part in parts:
+    # Check its operand or arguments, and what it is combined with.
+    for part in (*parts, *(each.right for each in operations)):
         _check(part, variables, indent, depth + 1)
 
 
 def _evaluate(node: ast.expr, scope: Mapping[str, Dual]) -> Dual:
+    first, operations = _chain(node)
+    result = _operand(first, scope)
+    for each in operations:
+        result = _apply(_BINARY[type(each.op)], [result, _evaluate(each.right, scope)])
+    return result
+
+
+def _operand(node: ast.expr, scope: Mapping[str, Dual]) -> Dual:
+    """The value of a node that is no operation on two."""
     match node:
         case ast.Constant(value=number):
             return Dual(np.asarray(number, np.float64), {})
@@ -214,8 +234,6 @@ def _evaluate(node: ast.expr, scope: Mapping[str, Dual]) -> Dual:
             return scope[name] if name in scope else Dual(np.asarray(CONSTANTS[name]), {})
         case ast.UnaryOp():
             parts, arguments = _UNARY[type(node.op)], [node.operand]
-        case ast.BinOp():
-            parts, arguments = _BINARY[type(node.op)], [node.left, node.right]
         case ast.Call(func=ast.Name(id=name)):
             parts, arguments = FUNCTIONS[name], node.args
         case _:

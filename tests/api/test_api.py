@@ -133,11 +133,16 @@ def test_meshes_are_arrays(like):
         (BOX | {"vertices": np.zeros((4, 3), complex)}, "N x 3 numbers, is complex128"),
         (BOX | {"vertices": [["a", "b", "c"]] * 4}, "N x 3 numbers, is <U1"),
         (BOX | {"vertices": [[0, 0], [1]]}, "has rows of several lengths"),
+        (BOX | {"vertices": np.full((4, 3), np.nan)}, "^mesh: 4 of 4 vertices are not finite"),
+        (BOX | {"colour": 1}, "mesh: unknown key 'colour'; there are: vertices, faces, normals, uv"),
+        (BOX | {"normal": 1}, "mesh: unknown key 'normal'; did you mean 'normals'?"),
     ],
 )
 def test_faulty_meshes_are_refused(mesh, fact):
     with pytest.raises(illumcli.IllumError, match=fact):
         illumcli.bake(mesh)
+    with pytest.raises(illumcli.IllumError, match=fact):
+        illumcli.render(SCENE | {"objects": [{"mesh": mesh}]})
 
 
 def test_errors_name_the_scene_and_all_faults():
@@ -149,6 +154,28 @@ def test_errors_name_the_scene_and_all_faults():
     ]
     with pytest.raises(illumcli.IllumError, match=r"scene: film\.width: a scene holds no object"):
         illumcli.render(SCENE | {"film": {"width": object()}})
+
+
+@pytest.mark.parametrize("scene", [3, None, [SCENE], b"scene.yaml"])
+def test_what_is_no_scene_is_refused(scene):
+    for function in (illumcli.render, illumcli.load, illumcli.bake):
+        with pytest.raises(illumcli.IllumError, match=r"scene: must be the path of .*, is of type"):
+            function(scene)
+
+
+@pytest.mark.parametrize(
+    ("value", "fact"),
+    [
+        (float("nan"), "must be a finite number, is nan"),
+        (np.float32("inf"), "must be a finite number, is inf"),
+        (np.array([0.1, np.nan]), "must be finite numbers"),
+    ],
+)
+def test_numbers_are_finite(value, fact):
+    with pytest.raises(illumcli.IllumError, match=f"scene: materials.clay.sigma: {fact}"):
+        illumcli.render(SCENE, {"materials.clay.sigma": value})
+    with pytest.raises(illumcli.IllumError, match=f"scene: materials.clay.sigma: {fact}"):
+        illumcli.load(SCENE | {"materials": {"clay": {"model": "oren_nayar", "sigma": value}}})
 
 
 def test_one_text_is_one_override_and_one_layer(scene_file):

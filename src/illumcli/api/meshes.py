@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.errors import InputError
+from illumcli.schema.messages import suggestion
 
-PARTS = {"vertices", "faces", "normals", "uv"}
+PARTS = ("vertices", "faces", "normals", "uv")
 PROPERTIES = {"vertices": ("x", "y", "z"), "normals": ("nx", "ny", "nz"), "uv": ("u", "v")}
 
 
 def is_mesh(value: Any) -> bool:
     """True for a mapping with arrays `vertices` and `faces`, or an object with both, such as trimesh's."""
     if isinstance(value, Mapping):
-        return {"vertices", "faces"} <= set(value) <= PARTS and "shape" not in value
+        return {"vertices", "faces"} <= set(value) and "shape" not in value
     return hasattr(value, "vertices") and hasattr(value, "faces") and not isinstance(value, type)
 
 
@@ -35,9 +36,11 @@ def write_mesh(value: Any, folder: Path) -> Path:
     Raises
     ------
     InputError
-        Arrays of other shapes, or numbers of vertices that there are not.
+        Arrays of other shapes, other keys, or numbers of vertices that there are not.
     """
     parts = value if isinstance(value, Mapping) else {"vertices": value.vertices, "faces": value.faces}
+    if unknown := [str(name) for name in parts if name not in PARTS]:
+        raise InputError(f"mesh: unknown key '{unknown[0]}'; {suggestion(unknown[0], PARTS)}")
     columns = {name: _array(name, parts[name], len(PROPERTIES[name])) for name in PROPERTIES if name in parts}
     count = len(columns["vertices"])
     for name, array in columns.items():

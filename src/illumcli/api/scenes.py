@@ -41,9 +41,18 @@ def written(scene: Mapping[str, Any] | Scene, folder: Path) -> Path:
 
 
 def file_of(scene: AnyScene, folder: Path) -> Path:
-    """The file of a scene; a mapping or description is written to `folder`."""
+    """The file of a scene; a mapping or description is written to `folder`.
+
+    Raises
+    ------
+    InputError
+        Something else, or a value that no scene can have.
+    """
     if isinstance(scene, Mapping | Scene):
         return written(scene, folder)
+    if not isinstance(scene, str | os.PathLike):
+        kinds = "the path of a scene or mesh file, a mapping with the keys of a scene, or an illumcli.Scene"
+        raise InputError(f"scene: must be {kinds}, is of type {type(scene).__name__}")
     return Path(os.fspath(scene))
 
 
@@ -65,11 +74,16 @@ def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
     """A value as the YAML of a scene has it: meshes as files, arrays as lists, paths from the root folder."""
     if is_mesh(value):
         return {"file": str(write_mesh(value, folder))}
+    place = ".".join(map(str, path))
     match value:
         case Description():
             return _plain(value.model_dump(mode="json", exclude_unset=True), path, folder)
         case Mapping():
             return {str(key): _plain(part, (*path, str(key)), folder) for key, part in value.items()}
+        case float() | np.floating() if not np.isfinite(value):
+            raise InputError(f"scene: {place}: must be a finite number, is {value}")
+        case np.ndarray() if value.dtype.kind == "f" and not np.isfinite(value).all():
+            raise InputError(f"scene: {place}: must be finite numbers, and some are not")
         case np.ndarray() | np.generic():
             return value.tolist()
         case list() | tuple():
@@ -80,15 +94,16 @@ def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
             return os.path.abspath(value)
         case str() | bool() | int() | float() | None:
             return value
-    place = ".".join(map(str, path))
     raise InputError(f"scene: {place}: a scene holds no {type(value).__name__}; give numbers, text or lists")
 
 
 @contextmanager
 def named_scene(folder: Path) -> Iterator[None]:
-    """Call the scene file of a temporary folder `scene` in errors."""
+    """Call the scene file of a temporary folder `scene` in errors, and its mesh files `mesh`."""
     try:
         yield
     except InputError as error:
         own = re.compile(rf"{re.escape(str(folder / NAME))}(:\d+:\d+)?")
-        raise InputError([own.sub("scene", problem) for problem in error.problems]) from None
+        mesh = re.compile(rf"{re.escape(str(folder))}/mesh-[0-9a-f]+\.ply")
+        problems = [mesh.sub("mesh", own.sub("scene", problem)) for problem in error.problems]
+        raise InputError(problems) from None

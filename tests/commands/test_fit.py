@@ -44,6 +44,15 @@ def test_stdout_is_a_material_of_a_scene(illum, table, tmp_path):
     assert read_image(tmp_path / "clay.png")
 
 
+def test_one_pair_leaves_most_undetermined(illum, tmp_path):
+    (tmp_path / "one.csv").write_text("lx,ly,lz,vx,vy,vz,R,G,B\n0.3,0,0.9,0.1,0.2,0.9,0.2,0.1,0.3\n")
+    done = illum("fit", "one.csv", "--model", "phong")
+    assert done.returncode == 0, done.stderr
+    assert "Warning" not in done.stderr
+    assert "# not determined by the measurement: specular.R, specular.B, exponent\n" in done.stdout
+    assert yaml.safe_load(done.stdout)["materials"]["one"]["diffuse"] == [0.2, 0.1, 0.3]
+
+
 def test_json_and_several_models(illum, table):
     done = illum(
         "fit", table.name, "--model", "oren_nayar", "--model", "lambert", "--json", "--metric", "log"

@@ -81,7 +81,7 @@ def fit(
 
     from illumcli.commands import fit as job
     from illumcli.fitting.material import materials_text
-    from illumcli.fitting.report import data, notes, ranking, report
+    from illumcli.fitting.report import data, notes, ranking, report, undetermined
 
     if output is not None:
         job.refuse_picture(output, force)
@@ -104,7 +104,9 @@ def fit(
         listed = [data(each, fits.measurement, file, title) for title, each in fits.by_name.items()]
         click.echo(json.dumps(listed, indent=1))
     else:
-        click.echo(materials_text({title: each.material for title, each in fits.by_name.items()}))
+        materials = {title: each.material for title, each in fits.by_name.items()}
+        unknown = {title: undetermined(each) for title, each in fits.by_name.items()}
+        click.echo(materials_text(materials, unknown))
     if output is not None:
         job.write_picture(output, file, every, fits.measurement)
         say(str(output))

@@ -43,7 +43,9 @@ def directions_of(problem: Problem, x: Doubles, free: NDArray[np.intp]) -> Direc
     """The singular vectors at coordinates `x`, of which those of numbers `free` are free."""
     unit = _units(problem, x)[free]
     J = problem.jacobian(x)[:, free] * unit
-    _, values, axes = np.linalg.svd(J, full_matrices=False)
+    # with fewer residuals than coordinates, rows of zeros give the axes that no residual changes with
+    padded = np.pad(J, ((0, max(J.shape[1] - len(J), 0)), (0, 0)))
+    _, values, axes = np.linalg.svd(padded, full_matrices=False)
     return Directions(J, unit, values, axes, values <= NONE * values.max(initial=0.0))
 
 

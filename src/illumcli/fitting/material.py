@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,11 +64,15 @@ def _keys(part: Description, values: Mapping[str, Any], prefix: str = "") -> dic
     return out
 
 
-def materials_text(materials: Mapping[str, Mapping[str, Any]]) -> str:
-    """The `materials:` of a scene."""
+def materials_text(
+    materials: Mapping[str, Mapping[str, Any]], undetermined: Mapping[str, Sequence[str]]
+) -> str:
+    """The `materials:` of a scene, with a comment on the parameters of each that are not determined."""
     lines = ["materials:"]
     for name, material in materials.items():
         lines.append(f"  {name}:")
+        if undetermined[name]:
+            lines.append(f"    # not determined by the measurement: {', '.join(undetermined[name])}")
         lines += [f"    {key}: {_flow(value)}" for key, value in material.items()]
     return "\n".join(lines)
 

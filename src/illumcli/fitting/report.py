@@ -62,6 +62,11 @@ def notes(fit: Fit) -> list[str]:
     return out
 
 
+def undetermined(fit: Fit) -> list[str]:
+    """Names of the parameters that are not determined, or only in combination with others."""
+    return [label for label, _, error, _ in _values(fit) if math.isinf(error)]
+
+
 def data(fit: Fit, measurement: Measurement, path: Path, name: str) -> dict[str, Any]:
     """A fit for JSON."""
     return {

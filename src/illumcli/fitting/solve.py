@@ -150,15 +150,17 @@ def _descended(problem: Problem, x: Doubles, held: NDArray[np.bool_], steps: Ste
         return out
 
     low, high = (limit[free] for limit in problem.parameters.limits())
-    found = least_squares(
-        lambda part: problem.residuals(whole(part)),
-        x[free],
-        lambda part: problem.jacobian(whole(part))[:, free],
-        bounds=(low, high),
-        x_scale="jac",
-        ftol=steps.tolerance,
-        xtol=steps.tolerance,
-        gtol=None,
-        max_nfev=steps.most,
-    )
+    # where a fit is exact, scipy divides by a gradient of 0; it rejects the step and keeps the coordinates
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = least_squares(
+            lambda part: problem.residuals(whole(part)),
+            x[free],
+            lambda part: problem.jacobian(whole(part))[:, free],
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=steps.tolerance,
+            xtol=steps.tolerance,
+            gtol=None,
+            max_nfev=steps.most,
+        )
     return whole(np.clip(found.x, low, high))

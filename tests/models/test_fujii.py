@@ -8,6 +8,7 @@ import pytest
 from illumcli.models.fujii import Fujii
 from illumcli.models.lambert import Lambert
 from illumcli.models.oren_nayar import OrenNayar
+from illumcli.verification.claims import claims_of
 from quadrature import albedo, all_pairs
 
 SLANTED = {"n": [0, 0, 1], "l": [3, 1, 1], "v": [1, 2, 0.4]}
@@ -16,6 +17,15 @@ STEEP = np.radians(80)
 
 def grey(Model, rho, **more):
     return Model(diffuse=(rho,) * 3, **more)
+
+
+def test_it_claims_to_conserve_energy_without_sigma_alone():
+    assert "conserving" in Fujii().claimed()
+    assert claims_of("white", grey(Fujii, 1.0), is_fixed=True)[-1].claim == "conserving"
+    results = claims_of("white", grey(Fujii, 1.0, sigma=0.25), is_fixed=True)
+    assert {each.claim: each.passed for each in results} == dict.fromkeys(
+        ["light", "reciprocal", "isotropic"], True
+    )
 
 
 @pytest.mark.parametrize("keys", [{"roughness": 0.0}, {"sigma": 0.0}])

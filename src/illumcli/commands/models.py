@@ -40,7 +40,8 @@ def page(tag: str) -> str:
     lines = [inspect.cleandoc(sys.modules[Model.__module__].__doc__ or ""), "", "Parameters", "----------"]
     schema = schema_of(Model)
     lines += _parameters(schema, schema.get("$defs", {}))
-    lines += ["", "Claims", "------"]
+    title = "Claims, with each choice and optional parameter at its default"
+    lines += ["", title, "-" * len(title)]
     lines += [
         f"{'yes' if getattr(Model, claim) else 'no':4}{claim}: {text}" for claim, text in CLAIMS.items()
     ]

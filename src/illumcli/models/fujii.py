@@ -51,6 +51,10 @@ class Fujii(IlluminationModel):
     conserving: ClassVar[bool] = True
     physical: ClassVar[bool] = True
 
+    def claimed(self) -> frozenset[str]:
+        """The claims of the class; with `sigma`, white surfaces do not conserve energy."""
+        return super().claimed() - (set() if self.sigma is None else {"conserving"})
+
     def diffuse_lobe(self, n_l: Floats, n_v: Floats, l_v: Floats) -> Vectors:
         """(N, 3) n_l * rho * (A + B s / t)."""
         ratio = flattening(n_l, n_v, l_v)

@@ -6,6 +6,7 @@ import gzip
 import json
 import lzma
 import os
+import shlex
 import signal
 import sys
 
@@ -291,3 +292,34 @@ def test_float32_arithmetic_itself_loses_next_to_nothing():
     own = [loss for row in rows for loss in row.losses if loss.cause == "arithmetic"]
     assert len(own) <= 5
     assert max(loss.outcome.error for loss in own) < 3e-5
+
+
+def test_values_drawn_as_0_name_the_command_that_checks_them(illum, tmp_path):
+    (tmp_path / "my own").mkdir()
+    (tmp_path / "my own" / "dark.py").write_text(
+        '''"""Dark."""
+
+from typing import Literal
+
+from illumcli.models._base import IlluminationModel
+from illumcli.models._lobes import tint
+
+
+class Dark(IlluminationModel):
+    model: Literal["dark"] = "dark"
+
+    def diffuse_lobe(self, n_l):
+        return tint((1.0, 1.0, 1.0), n_l - 2)
+'''
+    )
+    (tmp_path / "s.yaml").write_text(
+        "version: 1\nobjects: [{mesh: {shape: sphere}, material: {model: dark}}]\n"
+        "lights: [{light: directional, direction: [-1, -1, -2], irradiance: 3}]\n"
+        "film: {width: 8, height: 8}\n"
+    )
+    done = illum("render", "s.yaml", "--models", "my own", "--no-cache", "-o", "x.png")
+    assert done.returncode == 0, done.stderr
+    said, command = done.stderr.rstrip("\n").split("; see ")
+    assert "were negative or not finite, and are 0" in said
+    assert command == "illum verify s.yaml --models 'my own'"
+    assert illum(*shlex.split(command)[1:]).returncode == 3

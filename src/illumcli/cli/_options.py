@@ -94,9 +94,20 @@ allow_option = click.option(
 )
 
 
+_MODELS = f"{__name__}.models"
+"""Where a context keeps the folders of `--models`."""
+
+
 def _models(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> None:
     if folders:
         _add_to("ILLUM_MODELS", map(os.path.abspath, folders))
+        ctx.meta[_MODELS] = folders
+
+
+def models_words() -> list[str]:
+    """The `--models` of the running command, as words for another one."""
+    folders = click.get_current_context().meta.get(_MODELS, ())
+    return [word for folder in folders for word in ("--models", folder)]
 
 
 models_option = click.option(

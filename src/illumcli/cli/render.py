@@ -18,6 +18,7 @@ from illumcli.cli._options import (
     html_option,
     json_results_option,
     keep_going_option,
+    models_words,
     no_cache_option,
     only_option,
     overrides_option,
@@ -152,6 +153,8 @@ def _say_films(films: Mapping[Path, Sequence[Rendered]]) -> None:
 
 def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[str], None]) -> None:
     """Print the report of a scene or frame."""
+    import shlex
+
     from illumcli.render_graph.repairs import repair_lines
 
     report = done.report
@@ -161,7 +164,8 @@ def _say_report(done: Rendered, quiet: bool, verbose: bool, say_once: Callable[[
             say_once(f"{done.scene}: {line}")
         for name, count in report.mended.items():
             fact = f"{count} values of its model were negative or not finite, and are 0"
-            say_once(f"{done.scene}: material {name}: {fact}; see illum verify {done.scene}")
+            check = shlex.join(["illum", "verify", str(done.scene), *models_words()])
+            say_once(f"{done.scene}: material {name}: {fact}; see {check}")
         for camera, error in report.audited_error.items():
             interval = f"(95 %: {error['low']:.3g} to {error['high']:.3g})"
             say(f"{done.scene}: RMSE of {error['layer']} of {camera}: {error['rmse']:.3g} {interval}")

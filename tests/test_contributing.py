@@ -68,8 +68,8 @@ def copy(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("contributing")
     for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/visibility/test_samplers.py",
                  "tests/geometry/shapes/test_all_shapes.py",
-                 "tests/test_layers.py", "tests/render_graph/test_polygons.py", "tests/planned.py", "scenes",
-                 "pyproject.toml"):  # fmt: skip
+                 "tests/test_layers.py", "tests/render_graph/test_polygons.py", "tests/planned.py",
+                 "tests/quadrature.py", "tests/rgl_files.py", "scenes", "pyproject.toml"):  # fmt: skip
         place = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         place(ROOT / name, folder / name)

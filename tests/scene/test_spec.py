@@ -130,7 +130,13 @@ def test_a_description_notes_the_fields_of_its_bases():
 
 REAL = st.floats(allow_nan=False, allow_infinity=False)
 WORDS = st.sampled_from(["key", "fill", "a_b", "x-1", "Name"])
-FREE = {"f": "x*x + y*y + z*z - 1", "x": "cos(u)", "y": "sin(v)", "z": "u*v"}  # texts that must be formulas
+FREE = {
+    "f": "x*x + y*y + z*z - 1",
+    "x": "cos(u)",
+    "y": "sin(v)",
+    "z": "u*v",
+    "formulas": "2*frame",
+}  # texts that must be formulas
 
 
 def values(part: dict[str, Any], name: str = "") -> st.SearchStrategy[Any]:

@@ -136,9 +136,9 @@ def render(path: Path, skip: Skip, layers: tuple[str, ...]) -> tuple[dict[str, n
         counts["responses"] += len(lit.index)
         return response(materials, lit, *rest)
 
-    def counted_lobes(lobes, given):
+    def counted_lobes(lobes, given, *rest):
         counts["lobes"] += len(lobes) * len(given["n"])
-        return evaluate(lobes, given)
+        return evaluate(lobes, given, *rest)
 
     loaded = load(path, skip.overrides)
     run, outputs = Run(RenderStats()), outputs_of(loaded.scene, layers)

@@ -79,9 +79,9 @@ def test_the_gallery_hangs_on_a_real_mesh(picture, real_mesh, monkeypatch):
     path = real_mesh("spot.obj")
     monkeypatch.setenv("ILLUM_ALLOW", str(path.parent))
     layers = picture(
-        "gallery", overrides=[f"meshes.pot={{file: {path}}}", "film.width=332", "film.height=200"]
+        "gallery", overrides=[f"meshes.pot={{file: {path}}}", "film.width=415", "film.height=200"]
     )
-    assert set(np.unique(layers["object_id"])) == set(range(41))
+    assert set(np.unique(layers["object_id"])) == set(range(51))
     assert np.isfinite(layers["beauty"]).all()
-    for number in range(1, 41):
+    for number in range(1, 51):
         assert layers["beauty"][layers["object_id"][..., 0] == number].max() > 0.05

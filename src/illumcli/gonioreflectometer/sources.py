@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 
 import numpy as np
 
 from illumcli.color import luminance
 from illumcli.errors import InputError, LimitError
-from illumcli.formula import Formula, parse
+from illumcli.formula import parse
 from illumcli.geometry.triangulate import triangulate
 from illumcli.gonioreflectometer.settings import SurfaceSource
 from illumcli.gonioreflectometer.surface import Surface, height_field, refuse_gaps
@@ -66,9 +65,9 @@ def _of_formula(source: SurfaceSource) -> Surface:
 
     # Sample one tile, the longer side in `grid` steps; coarsely along what it does not vary with.
     columns, rows = (max(2, round(source.grid * side / max(period))) for side in period)
-    if "y" not in _names(formula):
+    if "y" not in formula.names:
         rows = max(2, rows // SLENDER)
-    if "x" not in _names(formula):
+    if "x" not in formula.names:
         columns = max(2, columns // SLENDER)
     x, y = np.arange(columns) * (period[0] / columns), np.arange(rows) * (period[1] / rows)
     z = formula.value(x[None, :], y[:, None])
@@ -90,11 +89,6 @@ def _of_formula(source: SurfaceSource) -> Surface:
                 "give the --period after which it repeats"
             )
     return height_field(z, period)
-
-
-def _names(formula: Formula) -> set[str]:
-    """The names in a formula."""
-    return {node.id for node in ast.walk(formula.tree) if isinstance(node, ast.Name)}
 
 
 def _of_picture(path: Path, source: SurfaceSource) -> tuple[Surface, list[str]]:

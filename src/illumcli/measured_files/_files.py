@@ -1,4 +1,4 @@
-"""What readers of measurements share: the facts by which a file is known to be the same as before."""
+"""What readers of files share: the facts by which a file is known to be the same as before."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from illumcli.errors import InputError
 
 
-def identity(path: str) -> tuple[str, int, int]:
+def identity(path: str, fault: str = "cannot read the measurement") -> tuple[str, int, int]:
     """Path, time of the last change [ns] and size [bytes].
 
     Raises
@@ -18,5 +18,5 @@ def identity(path: str) -> tuple[str, int, int]:
     try:
         facts = os.stat(path)
     except OSError as error:
-        raise InputError(f"{path}: cannot read the measurement: {error.strerror}") from None
+        raise InputError(f"{path}: {fault}: {error.strerror}") from None
     return path, facts.st_mtime_ns, facts.st_size

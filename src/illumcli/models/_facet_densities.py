@@ -6,7 +6,6 @@ h has components along the grain (t), across it (b) and along the surface's norm
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
@@ -17,6 +16,7 @@ from illumcli.errors import InputError, LimitError
 from illumcli.formula import Formula, parse
 from illumcli.measured_files.angle_tables import AngleTable
 from illumcli.models._facet_quadrature import Array, Facets, disc_nodes, square_nodes
+from illumcli.models._warp import between
 from illumcli.records import Record
 
 Pixels: TypeAlias = NDArray[np.float32]
@@ -54,11 +54,10 @@ class FormulaDensity(Record):
     """p by a formula."""
 
     formula: Formula
-    names: frozenset[str]
 
     @property
     def is_round(self) -> bool:
-        return self.names.issubset(ROUND)
+        return self.formula.names.issubset(ROUND)
 
     def raw(self, h: Array) -> Array:
         """The formula itself."""
@@ -75,7 +74,7 @@ class FormulaDensity(Record):
             "hb": lambda: b,
             "hn": lambda: n,
         }
-        used = [variables[name]() if name in self.names else 0.0 for name in VARIABLES]
+        used = [variables[name]() if name in self.formula.names else 0.0 for name in VARIABLES]
         return np.broadcast_to(self.formula.value(*used), n.shape)
 
     def value(self, h: Array) -> Array:
@@ -94,9 +93,7 @@ def formula_density(text: str) -> FormulaDensity:
     ValueError
         Text that is no formula, see `formula.parse`.
     """
-    formula = parse(text, VARIABLES)
-    names = {node.id for node in ast.walk(formula.tree) if isinstance(node, ast.Name)}
-    return FormulaDensity(formula, frozenset(names.intersection(VARIABLES)))
+    return FormulaDensity(parse(text, VARIABLES))
 
 
 class TableDensity(Record):
@@ -112,25 +109,19 @@ class TableDensity(Record):
 
     def value(self, h: Array) -> Array:
         theta = np.arctan2(np.hypot(h[0], h[1]), h[2])
-        row, up = _between(self.theta, theta)
-        inside = theta <= self.theta[-1]
+        row = between(self.theta, theta)
         if self.is_round:
-            p = self.values[row, 0] * (1 - up) + self.values[row + 1, 0] * up
-            return np.where(inside, p, 0)
-        column, on = _between(self.phi, np.arctan2(h[1], h[0]) % (2 * np.pi))
-        low, high = (
-            self.values[at, column] * (1 - on) + self.values[at, column + 1] * on for at in (row, row + 1)
-        )
-        return np.where(inside, low * (1 - up) + high * up, 0)
+            low, high = self.values[row.low, 0], self.values[row.high, 0]
+        else:
+            column = between(self.phi, np.arctan2(h[1], h[0]) % (2 * np.pi))
+            low, high = (
+                column.blend(self.values[at, column.low], self.values[at, column.high])
+                for at in (row.low, row.high)
+            )
+        return np.where(theta <= self.theta[-1], row.blend(low, high), 0)
 
     def colors(self, h: NDArray[np.floating]) -> NDArray[np.floating]:
         return self.value(h.astype(np.float64))
-
-
-def _between(nodes: Array, x: Array) -> tuple[NDArray[np.int64], Array]:
-    """The node at or below each x, and the place between it and the next one, 0..1; clamped at the ends."""
-    below = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
-    return below, np.clip((x - nodes[below]) / (nodes[below + 1] - nodes[below]), 0, 1)
 
 
 def table_density(table: AngleTable) -> TableDensity:

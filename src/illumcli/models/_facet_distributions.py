@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -12,6 +11,7 @@ from pydantic import AfterValidator, Discriminator, Field
 from illumcli.arrays import Floats, Vectors
 from illumcli.errors import InputError
 from illumcli.formula import MAX_LENGTH
+from illumcli.measured_files._files import identity
 from illumcli.measured_files.angle_tables import read_angle_table
 from illumcli.models._facet_densities import (
     Density,
@@ -31,10 +31,10 @@ WORST = 0.02
 """Largest estimated error of the projected area that is not reported."""
 ROUNDING = 1e-12
 """Values of a formula that are this much below 0, by its largest one, count as 0."""
-
-
 HIGHEST = 1e30
 """Value of D that stays finite in single precision."""
+UNREADABLE = "cannot be read"
+"""What is wrong with a file that there is not, or that may not be read."""
 
 
 class Microsurface(Record):
@@ -137,7 +137,7 @@ class ByProfile(Description):
 
     def microsurface(self, read: ReadPixels | None) -> Microsurface:
         """The surface of the file, computed once while it does not change."""
-        return _of_table(*_facts(self.file), False)
+        return _of_table(*identity(self.file, UNREADABLE), False)
 
 
 class ByTable(Description):
@@ -155,7 +155,7 @@ class ByTable(Description):
 
     def microsurface(self, read: ReadPixels | None) -> Microsurface:
         """The surface of the file, computed once while it does not change."""
-        return _of_table(*_facts(self.file), True)
+        return _of_table(*identity(self.file, UNREADABLE), True)
 
 
 class BySlopes(Description):
@@ -220,15 +220,6 @@ def _of_formula(text: str) -> Microsurface:
     return _microsurface(density, value)
 
 
-def _facts(path: str) -> tuple[str, int, int]:
-    """The path, date and size of a file."""
-    try:
-        facts = os.stat(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    return path, facts.st_mtime_ns, facts.st_size
-
-
 @lru_cache(maxsize=64)
 def _of_table(path: str, modified: int, size: int, has_phi: bool) -> Microsurface:
     table = read_angle_table(path)
@@ -244,7 +235,7 @@ def _of_table(path: str, modified: int, size: int, has_phi: bool) -> Microsurfac
 def _drawn(path: str, span: tuple[float, float] | None, read: ReadPixels | None) -> Microsurface:
     if read is None:
         raise InputError(f"{path}: nothing here reads images; use a table")
-    return _of_image(*_facts(path), span, read)
+    return _of_image(*identity(path, UNREADABLE), span, read)
 
 
 @lru_cache(maxsize=16)

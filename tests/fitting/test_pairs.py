@@ -10,7 +10,7 @@ from illumcli.errors import InputError
 from illumcli.fitting.measurement import STEEPEST, read_measurement
 from illumcli.fitting.merl_pairs import drawn_strata
 from illumcli.measured_files import merl
-from illumcli.models.merl import merl_index, rusinkiewicz
+from illumcli.models.merl import rusinkiewicz
 
 CAP = np.cos(np.radians(STEEPEST))
 
@@ -19,7 +19,7 @@ def test_directions_lie_in_their_cells():
     strata = drawn_strata()
     s, n = strata.l + strata.v, np.broadcast_to([0.0, 0.0, 1.0], strata.l.shape)
     angles = rusinkiewicz(cross(n, s), s[:, 2], n, strata.l - strata.v, dot(s, s))
-    np.testing.assert_array_equal(merl_index(*angles)[3], strata.cell)
+    np.testing.assert_array_equal(merl.cell_numbers(*angles)[3], strata.cell)
     np.testing.assert_allclose(dot(strata.l, strata.l), 1)
 
 

@@ -9,7 +9,7 @@ from illumcli.arrays import dot
 from illumcli.errors import InputError
 from illumcli.files.atomic import write_bytes
 from illumcli.measured_files import merl
-from illumcli.models.merl import Merl, merl_index, rusinkiewicz
+from illumcli.models.merl import Merl, rusinkiewicz
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_the_directions_of_cells_lie_in_their_cells(row):
     np.testing.assert_allclose(dot(v, v), 1)
     given = terms(l, v)
     angles = rusinkiewicz(given["nxs"], given["n_s"], given["n"], given["d"], given["s_s"])
-    np.testing.assert_array_equal(merl_index(*angles)[3], row * 90 * 180 + np.arange(90 * 180))
+    np.testing.assert_array_equal(merl.cell_numbers(*angles)[3], row * 90 * 180 + np.arange(90 * 180))
     for x in merl.coordinates(*angles):
         np.testing.assert_allclose(x % 1, 0.5, atol=1e-9)
 

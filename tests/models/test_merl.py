@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.measured_files.merl import CELLS, SCALE, SHAPE, coordinates
-from illumcli.models.merl import Merl, merl_index, rusinkiewicz
+from illumcli.measured_files.merl import CELLS, SCALE, SHAPE, cell_numbers, coordinates
+from illumcli.models.merl import Merl, rusinkiewicz
 
 SLANTED = {"n": [0, 0, 1], "l": [1, 0.3, 1], "v": [-0.2, -0.6, 1]}
 
@@ -49,11 +49,11 @@ def test_published_angles(cases, frame, term, agree):
 def test_published_indices(cases, agree):
     for case in cases("merl_index"):
         i = case["inputs"]
-        agree([int(each) for each in merl_index(i["theta_h"], i["theta_d"], i["phi_d"])], case)
+        agree([int(each) for each in cell_numbers(i["theta_h"], i["theta_d"], i["phi_d"])], case)
 
 
 def test_nearest_takes_the_cell_itself(smooth, respond, brdf, frame, term):
-    i, j, k, _ = (int(each[0]) for each in merl_index(*angles(frame(SLANTED), term)))
+    i, j, k, _ = (int(each[0]) for each in cell_numbers(*angles(frame(SLANTED), term)))
     expected = 100 + i + 0.5 + 2 * (j + 0.5) + 10 * np.cos(2 * np.pi * (k + 0.5) / 180)
     np.testing.assert_allclose(brdf(Merl(file=smooth, lookup="nearest"), SLANTED), expected, rtol=1e-12)
 

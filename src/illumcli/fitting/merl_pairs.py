@@ -2,7 +2,7 @@
 
 The strata are rows of theta_h, which the format crowds near the highlight, times `THETA_D` by `PHI_D`
 blocks of the other two angles; each gives one of its cells, drawn by random numbers of a fixed seed. A
-cell stands for the pairs of directions of its whole stratum. With h and d the half and the difference
+cell represents the pairs of directions of its whole stratum. With h and d the half and the difference
 vector
 
     d omega_l d omega_v = 4 cos(theta_d) d omega_h d omega_d
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import Vectors, column_major
 from illumcli.errors import InputError
 from illumcli.fitting.measurement import STEEPEST, Measurement, below_steepest
+from illumcli.gonioreflectometer.directions import turned
 from illumcli.measured_files import merl
 from illumcli.measured_files.merl import CELLS, SCALE, SHAPE
 from illumcli.records import Record
@@ -85,33 +86,9 @@ def drawn_strata(seed: int = 0) -> Strata:
 
     # The directions at the centre of the cell, and the measure of the stratum.
     theta_h, theta_d = ((i + 0.5) / 90) ** 2 * (np.pi / 2), np.radians(j + 0.5)
-    l, v = directions(theta_h, theta_d, phi_d, turn)
+    l, v = (turned(each, turn) for each in merl.directions(theta_h, theta_d, phi_d))
     edges = np.cos((np.arange(91) / 90) ** 2 * (np.pi / 2))
     weight = (edges[i] - edges[i + 1]) * np.sin(2 * theta_d)
     kept = np.flatnonzero(below_steepest(l, v))
     flat = (i * SHAPE[1] + j) * SHAPE[2] + k
     return Strata(flat[kept], l[kept], v[kept], weight[kept])
-
-
-def directions(
-    theta_h: NDArray[np.float64],
-    theta_d: NDArray[np.float64],
-    phi_d: NDArray[np.float64],
-    phi_h: NDArray[np.float64],
-) -> tuple[Vectors, Vectors]:
-    """(N, 3) unit vectors to light and eye, from the angles of half and difference vector [radians].
-
-    The light's azimuth phi_d about h is counted from where theta_h grows; the eye is the light turned about h
-    by half a turn.
-    """
-    # In the half vector's frame the two are mirrored at its axis; turn that axis from z to h about y.
-    x, y, z = np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d), np.cos(theta_d)
-    cos, sin = np.cos(theta_h), np.sin(theta_h)
-    both = []
-    for sign in (1, -1):
-        across, up = cos * sign * x + sin * z, cos * z - sin * sign * x
-        # Then turn everything about the normal.
-        along = across * np.cos(phi_h) - sign * y * np.sin(phi_h)
-        aside = across * np.sin(phi_h) + sign * y * np.cos(phi_h)
-        both.append(np.stack([along, aside, up], axis=1))
-    return both[0], both[1]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, dot
-from illumcli.gonioreflectometer.directions import half_angles, mirrored
+from illumcli.arrays import Floats, dot, mirror
+from illumcli.gonioreflectometer.directions import half_angles
 from illumcli.gonioreflectometer.table import Table
-from illumcli.measured_files.merl import SHAPE, coordinates
+from illumcli.measured_files.merl import SHAPE, cell_numbers
 from illumcli.records import Record
 
 AROUND = 180
@@ -66,21 +65,13 @@ def _of_merl(table: Table) -> Albedos:
     values, errors = np.zeros((2, 3, len(INCIDENCE)))
     for i, incidence in enumerate(np.radians(INCIDENCE)):
         l = np.broadcast_to([np.sin(incidence), 0.0, np.cos(incidence)], h.shape)
-        v = mirrored(l, h)
-        weights = np.maximum(v[:, 2], 0) * 4 * np.maximum(dot(l, h), 0) * solid_angle
+        l_h = dot(l, h)
+        v = mirror(l, h, l_h)
+        weights = np.maximum(v[:, 2], 0) * 4 * np.maximum(l_h, 0) * solid_angle
         seen = np.flatnonzero(weights > 0)
-        cell = _cells(l[seen], v[seen])
+        cell = cell_numbers(*half_angles(l[seen], v[seen]))[3]
         values[:, i] = f[:, cell].astype(np.float64) @ weights[seen]
         # Errors of one cell come together, those of others do not.
         of_cell = np.bincount(cell, weights[seen], f.shape[1])
         errors[:, i] = np.sqrt(np.square(e, dtype=np.float64) @ of_cell**2)
     return Albedos(INCIDENCE, np.zeros(len(INCIDENCE)), values, errors)
-
-
-def _cells(l: Floats, v: Floats) -> NDArray[np.int64]:
-    """(N,) the cells of a MERL table that pairs of directions lie in."""
-    i, j, k = (
-        np.clip(each.astype(np.int64), 0, size - 1)
-        for each, size in zip(coordinates(*half_angles(l, v)), SHAPE, strict=True)
-    )
-    return (i * SHAPE[1] + j) * SHAPE[2] + k

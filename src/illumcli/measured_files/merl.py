@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ from numpy.typing import NDArray
 from illumcli.arrays import Floats, Vectors, column_major
 from illumcli.errors import InputError
 from illumcli.measured_files._files import identity
+
+Cells: TypeAlias = NDArray[np.int64]
+Angles: TypeAlias = "Floats | float"
 
 SHAPE = (90, 90, 180)  # theta_h, theta_d, phi_d
 CELLS = 90 * 90 * 180
@@ -36,6 +40,31 @@ def coordinates(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats
         theta_d * (2 / np.pi) * 90,
         phi_d * (180 / np.pi) % 180,
     )
+
+
+def cell_numbers(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Cells, Cells, Cells, Cells]:
+    """Numbers of the cells that angles lie in: along theta_h, theta_d and phi_d, and in the flat table."""
+    i, j, k = (
+        np.clip(np.asarray(x, np.int64), 0, count - 1)
+        for x, count in zip(coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
+    )
+    return i, j, k, (i * SHAPE[1] + j) * SHAPE[2] + k
+
+
+def directions(theta_h: Angles, theta_d: Floats, phi_d: Floats) -> tuple[Vectors, Vectors]:
+    """(N, 3) unit vectors to light and eye about the normal z, the half vector in the plane of x and z.
+
+    phi_d is counted from where theta_h grows; the eye is the light turned about the half vector by half a
+    turn.
+    """
+    # In the half vector's frame the two are mirrored at its axis; turn that axis from z to h about y.
+    x, y, z = np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d), np.cos(theta_d)
+    cos, sin = np.cos(theta_h), np.sin(theta_h)
+    l, v = (
+        column_major(np.stack([cos * sign * x + sin * z, sign * y, cos * z - sin * sign * x], axis=1))
+        for sign in (1, -1)
+    )
+    return l, v
 
 
 def cell_directions(row: int) -> tuple[Vectors, Vectors]:
@@ -56,15 +85,7 @@ def cell_directions(row: int) -> tuple[Vectors, Vectors]:
     theta_h = ((row + 0.5) / 90) ** 2 * (np.pi / 2)
     theta_d = np.repeat((np.arange(90) + 0.5) / 90 * (np.pi / 2), 180)
     phi_d = np.tile(np.radians(np.arange(180) + 0.5), 90)
-
-    # In the half vector's frame l and v are mirrored at its axis; turn that axis from z to h about y.
-    x, y, z = np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d), np.cos(theta_d)
-    cos, sin = np.cos(theta_h), np.sin(theta_h)
-    l, v = (
-        column_major(np.stack([cos * sign * x + sin * z, sign * y, cos * z - sin * sign * x], axis=1))
-        for sign in (1, -1)
-    )
-    return l, v
+    return directions(theta_h, theta_d, phi_d)
 
 
 def read(path: str | os.PathLike[str]) -> NDArray[np.float64]:

@@ -18,16 +18,14 @@ Rusinkiewicz, S. (1998). A new change of variables for efficient BRDF representa
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats, Vectors, dot
-from illumcli.measured_files.merl import SCALE, SHAPE, coordinates, mapped, values
+from illumcli.measured_files.merl import SCALE, cell_numbers, coordinates, mapped, values
 from illumcli.models._base import IlluminationModel, Lobe
-
-Cells: TypeAlias = NDArray[np.int64]
 
 
 def rusinkiewicz(
@@ -42,15 +40,6 @@ def rusinkiewicz(
     theta_h = np.arctan2(np.sqrt(dot(nxs, nxs)), n_s)
     theta_d = np.arctan2(np.sqrt(dot(d, d)), size)
     return theta_h, theta_d, np.arctan2(dot(nxs, d), -dot(n, d) * size)
-
-
-def merl_index(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Cells, Cells, Cells, Cells]:
-    """Cell numbers along theta_h, theta_d, phi_d, and in the flat table."""
-    i, j, k = (
-        np.clip(np.asarray(x, np.int64), 0, count - 1)
-        for x, count in zip(coordinates(theta_h, theta_d, phi_d), SHAPE, strict=True)
-    )
-    return i, j, k, (i * SHAPE[1] + j) * SHAPE[2] + k
 
 
 class Merl(IlluminationModel):
@@ -81,7 +70,7 @@ class Merl(IlluminationModel):
 
 def _nearest(table: NDArray[np.uint32], *angles: Floats) -> Floats:
     """(3, N) values of the cells that contain the angles; 0 without measurement."""
-    flat = merl_index(*angles)[3]
+    flat = cell_numbers(*angles)[3]
     return _scaled(np.fmax(values(table, flat), 0), angles[0].dtype)
 
 

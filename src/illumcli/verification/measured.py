@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import Floats
+from illumcli.measured_files.merl import cell_numbers
 from illumcli.models import merl
 from illumcli.verification.inputs import Inputs
 from illumcli.verification.lobes import computed_terms
@@ -32,7 +33,7 @@ def angles(inputs: Inputs) -> tuple[Floats, Floats, Floats]:
 
 def merl_index(inputs: Inputs) -> NDArray[Any]:
     """Cell numbers along theta_h, theta_d, phi_d, and in the whole table."""
-    return np.concatenate(merl.merl_index(*(inputs.scalars(key) for key in ("theta_h", "theta_d", "phi_d"))))
+    return np.concatenate(cell_numbers(*(inputs.scalars(key) for key in ("theta_h", "theta_d", "phi_d"))))
 
 
 CASES = {f.__name__: f for f in (rusinkiewicz, rusinkiewicz_theta, merl_index)}

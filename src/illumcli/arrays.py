@@ -94,6 +94,20 @@ def mirror(l: Vectors, n: Vectors, n_l: Floats) -> Vectors:
     return (2 * n_l)[:, None] * n - l
 
 
+def perpendicular(n: Vectors) -> tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]:
+    """The components of two unit vectors that are at right angles to each other and to unit vectors, (N, 3).
+
+    References
+    ----------
+    Duff, T. et al. (2017). Building an orthonormal basis, revisited. JCGT 6(1).
+    """
+    x, y, z = n[:, 0], n[:, 1], n[:, 2]
+    sign = np.copysign(z.dtype.type(1), z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return (1 + sign * x * x * a, sign * b, -sign * x), (b, sign + y * y * a, -y)
+
+
 def as_dtype_of(values: NDArray[Any], *parameters: object) -> list[NDArray[Any]]:
     """The parameters as arrays in the precision of `values`, (N,).
 

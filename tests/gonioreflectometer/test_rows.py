@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.arrays import dot, mirror
 from illumcli.gonioreflectometer.bench import Bench
 from illumcli.gonioreflectometer.directions import (
     LEAST_COSINE,
     AngleGrid,
     around_half_vector,
     half_angles,
-    mirrored,
 )
 from illumcli.gonioreflectometer.mirrors import Ring, above_horizon
 from illumcli.gonioreflectometer.mirrors_again import of_cells
@@ -129,7 +129,7 @@ def test_what_is_mirrored_twice_is_what_rays_count():
     l = l[l[:, 2] > LEAST_COSINE]
     bench = Bench(measured.surface)
     hits = bench.first_points(l, random.random((len(l), 2)))
-    once = bench.leaving(hits, mirrored(l, hits.normal))
+    once = bench.leaving(hits, mirror(l, hits.normal, dot(l, hits.normal)))
     assert abs(share / np.mean(once.is_hit) - 1) < 0.03
 
 

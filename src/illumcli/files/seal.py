@@ -10,6 +10,7 @@ forgery.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import struct
 import zlib
@@ -38,6 +39,20 @@ def seal(path: Path) -> None:
         place, _, body = mark
         file.seek(place)
         file.write(body)
+
+
+def seal_archive(path: Path) -> None:
+    """Seal a ZIP archive without a comment; its hash becomes the comment.
+
+    Raises
+    ------
+    OSError
+    """
+    with path.open("r+b") as file:
+        # The archive ends in the length of its comment.
+        file.seek(-2, os.SEEK_END)
+        file.write(struct.pack("<H", len(BLANK)) + BLANK.encode())
+    seal(path)
 
 
 def is_sealed(path: Path) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from illumcli.fitting.linear import linear_places, with_best_linear
 from illumcli.fitting.problem import Doubles, Problem
 from illumcli.progress import Progress, no_progress
+from illumcli.rays.sampling import kronecker
 
 POINTS = 192
 """Of the grid."""
@@ -52,12 +53,7 @@ def _grid(problem: Problem, linear: NDArray[np.intp]) -> Doubles:
     others = [place for _, place in slices if place.start not in linear]
     out = np.full((POINTS if others else 1, problem.parameters.count), 0.5)
     if others:
-        # The positive root of x^(d + 1) = x + 1, whose powers are the steps of the recurrence.
-        root = 2.0
-        for _ in range(64):
-            root = (1 + root) ** (1 / (len(others) + 1))
-        steps = root ** -np.arange(1.0, len(others) + 1)
-        grid = (0.5 + steps * np.arange(POINTS)[:, None]) % 1
+        grid = kronecker(np.full(len(others), 0.5), POINTS)
         for dimension, place in enumerate(others):
             out[:, place] = grid[:, [dimension]]
     return out

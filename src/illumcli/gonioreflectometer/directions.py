@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, Vectors, dot, unit
+from illumcli.arrays import Floats, Vectors, dot, perpendicular, unit
 
 LOWEST = np.radians(1.0)
 """Elevation of light and eye below which nothing is measured [rad]."""
@@ -21,18 +21,8 @@ def turned(d: Vectors, angle: Floats) -> Vectors:
 
 
 def about(axis: Vectors, local: Vectors) -> Vectors:
-    """(N, 3) directions that are `local` to a frame with the unit vectors `axis` as z.
-
-    References
-    ----------
-    Duff, T. et al. (2017). Building an orthonormal basis, revisited. JCGT 6(1).
-    """
-    x, y, z = axis.T
-    sign = np.copysign(1.0, z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x])
-    second = np.stack([b, sign + y * y * a, -y])
+    """(N, 3) directions that are `local` to a frame with the unit vectors `axis` as z."""
+    first, second = (np.stack(each) for each in perpendicular(axis))
     out: Vectors = (first * local[:, 0] + second * local[:, 1] + axis.T * local[:, 2]).T
     return out
 
@@ -64,11 +54,6 @@ def half_angles(l: Vectors, v: Vectors) -> tuple[Floats, Floats, Floats]:
     y = np.stack([-h[:, 1], h[:, 0], np.zeros(len(h))], axis=1)
     phi_d = np.arctan2(dot(l, y), dot(l, x))
     return np.arccos(np.clip(h[:, 2], -1, 1)), np.arccos(np.clip(dot(l, h), -1, 1)), phi_d
-
-
-def mirrored(d: Vectors, normal: Vectors) -> Vectors:
-    """(N, 3) where light that arrives from `d` goes."""
-    return (2 * dot(d, normal))[:, None] * normal - d
 
 
 class AngleGrid:

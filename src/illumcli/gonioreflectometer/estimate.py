@@ -76,18 +76,3 @@ def to_target(
         found = Estimate(found.values, found.errors, found.samples, found.rays + rays)
         attempt += 1
     return found
-
-
-def kronecker(shifts: Floats, count: int) -> Floats:
-    """(..., count, D) points of the unit cube: the additive sequence of Roberts, shifted by (..., D) shifts.
-
-    References
-    ----------
-    Roberts, M. (2018). The unreasonable effectiveness of quasirandom sequences.
-    """
-    dimensions = shifts.shape[-1]
-    root = 1.5
-    for _ in range(60):  # the root above 1 of x^(D + 1) = x + 1
-        root = (1 + root) ** (1 / (dimensions + 1))
-    steps = root ** -np.arange(1.0, dimensions + 1)
-    return (shifts[..., None, :] + np.arange(count)[:, None] * steps) % 1.0

@@ -7,7 +7,8 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, column_major, dot
 from illumcli.gonioreflectometer.bench import Bench
 from illumcli.gonioreflectometer.directions import about, turned
-from illumcli.gonioreflectometer.estimate import REPLICATES, kronecker
+from illumcli.gonioreflectometer.estimate import REPLICATES
+from illumcli.rays.sampling import kronecker
 from illumcli.records import Value
 
 CHUNK = 1 << 17

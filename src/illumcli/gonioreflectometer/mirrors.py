@@ -8,16 +8,16 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, column_major, dot, take_rows
+from illumcli.arrays import Floats, column_major, dot, mirror, take_rows
 from illumcli.gonioreflectometer.bench import Bench
 from illumcli.gonioreflectometer.directions import (
     LEAST_COSINE,
     AngleGrid,
     around_half_vector,
-    mirrored,
 )
-from illumcli.gonioreflectometer.estimate import REPLICATES, kronecker
+from illumcli.gonioreflectometer.estimate import REPLICATES
 from illumcli.gonioreflectometer.surface import Surface
+from illumcli.rays.sampling import kronecker
 from illumcli.records import Record
 
 CHUNK = 1 << 17
@@ -153,8 +153,9 @@ def mirrored_to(
             for _ in range(bounces):
                 # Mirror those that arrive; the others have left.
                 d, share, hits = d[hits.is_hit], share[:, hits.is_hit], hits.take(np.flatnonzero(hits.is_hit))
-                share = share * fresnel(np.clip(dot(d, hits.normal), 0, 1))
-                d = mirrored(d, hits.normal)
+                cosine = dot(d, hits.normal)
+                share = share * fresnel(np.clip(cosine, 0, 1))
+                d = mirror(d, hits.normal, cosine)
                 following = bench.leaving(hits, d)
                 gone = np.flatnonzero(~following.is_hit & (d[:, 2] > LEAST_COSINE))
                 cell = grid.cells_of(d[gone])

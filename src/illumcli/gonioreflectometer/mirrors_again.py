@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import Floats, column_major, dot
+from illumcli.arrays import Floats, column_major, dot, mirror
 from illumcli.gonioreflectometer.bench import Bench
-from illumcli.gonioreflectometer.directions import LEAST_COSINE, half_angles, mirrored, turned
+from illumcli.gonioreflectometer.directions import LEAST_COSINE, half_angles, turned
 from illumcli.gonioreflectometer.estimate import REPLICATES
 from illumcli.gonioreflectometer.mirrors import CHUNK, Fresnel
 from illumcli.measured_files.merl import SHAPE, cell_directions, coordinates
@@ -45,8 +45,9 @@ def mirrored_again(bench: Bench, light: tuple[Fresnel, int], draw: tuple[int, tu
         for bounce in range(bounces):
             arrived = np.flatnonzero(hits.is_hit)
             d, share, left, hits = d[arrived], share[:, arrived], left[arrived], hits.take(arrived)
-            share = share * fresnel(np.clip(dot(d, hits.normal), 0, 1))
-            d = mirrored(d, hits.normal)
+            cosine = dot(d, hits.normal)
+            share = share * fresnel(np.clip(cosine, 0, 1))
+            d = mirror(d, hits.normal, cosine)
             following = bench.leaving(hits, d)
             if bounce:
                 gone = np.flatnonzero(~following.is_hit & (d[:, 2] > LEAST_COSINE))

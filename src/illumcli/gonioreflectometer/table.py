@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ from illumcli.cache.fingerprint import file_digest
 from illumcli.errors import InputError
 from illumcli.files.atomic import AtomicFile, write_bytes
 from illumcli.files.outputs import is_kept, refuse_suffix
-from illumcli.files.seal import BLANK, seal
+from illumcli.files.seal import seal_archive
 from illumcli.gonioreflectometer.directions import AngleGrid
 from illumcli.gonioreflectometer.estimate import Estimate, of_replicates, relative_error
 from illumcli.gonioreflectometer.mirrors_again import BLOCK_COUNT, of_cells
@@ -123,10 +121,7 @@ def write_table(files: Sequence[Path], table: Table) -> None:
     with AtomicFile(last) as part:
         with part.path.open("wb") as file:
             np.savez_compressed(file, **arrays, about=np.array(json.dumps(about)))
-            # The archive ends in the length of its comment: append an empty seal as the comment.
-            file.seek(-2, os.SEEK_END)
-            file.write(struct.pack("<H", len(BLANK)) + BLANK.encode())
-        seal(part.path)
+        seal_archive(part.path)
 
 
 def read_table(path: Path) -> Table:

@@ -41,6 +41,21 @@ def unit_interval(bits: NDArray[np.uint32]) -> NDArray[np.float64]:
     return np.multiply(bits, 2.0**-32, dtype=np.float64)
 
 
+def kronecker(shifts: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """(..., count, D) points of the unit cube: the additive sequence of Roberts, shifted by (..., D) shifts.
+
+    References
+    ----------
+    Roberts, M. (2018). The unreasonable effectiveness of quasirandom sequences.
+    """
+    dimensions = shifts.shape[-1]
+    root = 1.5
+    for _ in range(60):  # the root above 1 of x^(D + 1) = x + 1
+        root = (1 + root) ** (1 / (dimensions + 1))
+    steps = root ** -np.arange(1.0, dimensions + 1)
+    return (shifts[..., None, :] + np.arange(count)[:, None] * steps) % 1.0
+
+
 @lru_cache(maxsize=32)
 def sobol(count: int) -> NDArray[np.uint32]:
     """(2, count) uint32 the first points of Sobol's (0, 2)-sequence, bit-reversed for `owen`."""

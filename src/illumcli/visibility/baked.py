@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import struct
 import zipfile
 from collections.abc import Mapping
 from dataclasses import field
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError, LimitError
 from illumcli.files.atomic import AtomicFile
-from illumcli.files.seal import BLANK, seal
+from illumcli.files.seal import seal_archive
 from illumcli.memory import in_words, refuse_beyond
 from illumcli.records import Record
 from illumcli.visibility.channels import CHANNELS, Arrays
@@ -93,10 +91,7 @@ def write_npz(path: Path, baked: Baked) -> None:
     with AtomicFile(path) as part:
         with part.path.open("wb") as file:
             np.savez(file, **arrays, about=np.array(json.dumps(baked.about)))
-            # The archive ends in the length of its comment: append an empty seal as the comment.
-            file.seek(-2, os.SEEK_END)
-            file.write(struct.pack("<H", len(BLANK)) + BLANK.encode())
-        seal(part.path)
+        seal_archive(part.path)
 
 
 def refuse_unpacked(path: Path) -> None:

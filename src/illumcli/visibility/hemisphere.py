@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Vectors, dot, repeat_rows, take_rows
+from illumcli.arrays import F, Vectors, dot, perpendicular, repeat_rows, take_rows
 from illumcli.rays.interaction import SurfaceInteraction
 from illumcli.rays.pattern_rays import PatternRays
 from illumcli.records import Record
@@ -87,21 +87,8 @@ def sample_frames(n: Vectors, draws: NDArray[np.float64], sampler: str) -> NDArr
 
 
 def turned_frame(n: Vectors, angle: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(M, 3, 3) rows tangent, bitangent, normal; the tangent turned about `n` by `angle` [rad].
-
-    References
-    ----------
-    Duff, T. et al. (2017). Building an orthonormal basis, revisited. JCGT 6(1).
-    """
-    # Tangent t and bitangent u of the unturned frame.
-    x, y, z = n[:, 0], n[:, 1], n[:, 2]
-    sign = np.copysign(F(1), z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    t = (1 + sign * x * x * a, sign * b, -sign * x)
-    u = (b, sign + y * y * a, -y)
-
-    # Turn both.
+    """(M, 3, 3) rows tangent, bitangent, normal; the tangent turned about `n` by `angle` [rad]."""
+    t, u = perpendicular(n)
     c, s = np.cos(angle), np.sin(angle)
     frame = np.empty((len(n), 3, 3), F)
     for k in range(3):

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from illumcli.api.pictures import Rendering
 from illumcli.api.render import LoadedScene, Options
 from illumcli.api.scenes import AnyScene
+from illumcli.commands.sweep_measures import MEASURES
 from illumcli.errors import InputError
 from illumcli.film.metrics import difference
-
-MEASURES = ("rmse", "relative_mse", "mae", "psnr", "largest")
 
 
 class Sweep(Sequence[dict[str, Any]]):

@@ -1,15 +1,15 @@
-"""How curves of a figure look: fonts of a paper, colours and dashes that are told apart in print."""
+"""How curves of a figure look: fonts of a paper, colours and dashes that differ in print."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 COLORS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-"""Told apart without red or green (Okabe and Ito 2008, Color universal design), yellow left out."""
+"""Distinguishable without red or green (Okabe and Ito 2008, Color universal design), yellow left out."""
 CHANNEL_COLORS = ("#D55E00", "#009E73", "#0072B2")
 """Of R, G, B, from the same palette."""
 DASHES = ((), (4, 1.5), (1.2, 1.2), (6, 1.5, 1.2, 1.5), (9, 2))
-"""Lengths of dashes and gaps [line widths]: curves are told apart without colour, too."""
+"""Lengths of dashes and gaps [line widths]: curves differ without colour, too."""
 
 SETTINGS: Any = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: equal files on all machines

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Discriminator
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
-from illumcli.models._lobes import channels
+from illumcli.models._lobes import channels, fifth
 from illumcli.models._parameters import ExtinctionColor, Index, IndexColor, Varying
 from illumcli.schema.description import Description
 from illumcli.schema.fields import Albedo
@@ -77,9 +77,7 @@ def conductor(c: Array, eta: Array, k: Array) -> Array:
 
 def schlick(c: Array, f0: Array) -> Array:
     """Schlick's approximation f0 + (1 - f0) (1 - c)^5; exact at c = 1 and c = 0."""
-    x = 1 - c
-    x2 = x * x
-    return f0 + (1 - f0) * (x2 * x2 * x)
+    return f0 + (1 - f0) * fifth(1 - c)
 
 
 def f0_from_eta(eta: Array, k: Array | float = 0.0) -> Array:

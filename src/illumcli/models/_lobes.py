@@ -36,6 +36,12 @@ def flattening(n_l: Floats, n_v: Floats, l_v: Floats) -> Floats:
     return np.where(s > 0, s / np.maximum(n_l, n_v), s)
 
 
+def fifth(x: Floats) -> Floats:
+    """(N,) x^5, as Schlick's curve has it."""
+    square = x * x
+    return square * square * x
+
+
 def channels(like: Floats, color: object) -> Floats:
     """A colour in the precision of `like`, (N,), with the channels first: (3, 1), or (3, N) if it varies.
 
@@ -56,6 +62,13 @@ def weighted(color: object, weight: object) -> Any:
         return color
     product = np.asarray(color) * np.asarray(weight)[..., None]
     return tuple(product.tolist()) if product.ndim == 1 else product
+
+
+def or_rest(share: Any, other: Any) -> Any:
+    """A share; if it is None, what another leaves of 1, or the other itself if that is still a texture."""
+    if share is not None:
+        return share
+    return other if isinstance(other, Description) else 1 - np.asarray(other)
 
 
 @cache

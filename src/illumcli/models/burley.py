@@ -20,7 +20,7 @@ import numpy as np
 
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel
-from illumcli.models._lobes import tint
+from illumcli.models._lobes import fifth, tint
 from illumcli.models._parameters import Varying
 from illumcli.schema.fields import Albedo, Share
 
@@ -39,10 +39,5 @@ class Burley(IlluminationModel):
         """(N, 3) n_l * rho / pi times both factors, with (l.h)^2 = |l + v|^2 / 4."""
         (r,) = as_dtype_of(n_l, self.roughness)
         edge = 0.5 + r * s_s / 2
-        fall = (1 + (edge - 1) * _fifth(1 - n_l)) * (1 + (edge - 1) * _fifth(1 - n_v))
+        fall = (1 + (edge - 1) * fifth(1 - n_l)) * (1 + (edge - 1) * fifth(1 - n_v))
         return tint(self.diffuse, fall * n_l / np.pi)
-
-
-def _fifth(x: Floats) -> Floats:
-    square = x * x
-    return square * square * x

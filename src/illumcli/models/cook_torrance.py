@@ -43,12 +43,12 @@ from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._distributions import GGX, Beckmann, Distribution, slopes_with_grain
 from illumcli.models._fresnel import Fresnel, Shifted
-from illumcli.models._lobes import tint, weighted
+from illumcli.models._lobes import or_rest, tint, weighted
 from illumcli.models._masking import correlated_over_4ab, separable_over_4ab
 from illumcli.models._microfacet import vgroove_over_4ab
 from illumcli.models._parameters import Varying
 from illumcli.models._terms import Angle, Components
-from illumcli.schema.description import Description, default_of
+from illumcli.schema.description import default_of
 from illumcli.schema.fields import Albedo, Share
 
 WHITE = (1.0, 1.0, 1.0)
@@ -165,7 +165,4 @@ class CookTorrance(IlluminationModel):
         return self.convention == "printed"
 
     def _diffuse_weight(self) -> Any:
-        if self.diffuse_weight is not None:
-            return self.diffuse_weight
-        ks = self.specular_weight
-        return ks if isinstance(ks, Description) else 1 - np.asarray(ks)
+        return or_rest(self.diffuse_weight, self.specular_weight)

@@ -37,10 +37,10 @@ from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._facet_densities import ReadPixels
 from illumcli.models._facet_distributions import WORST, FacetDistribution
 from illumcli.models._fresnel import Fresnel, Shifted
-from illumcli.models._lobes import tint, weighted
+from illumcli.models._lobes import or_rest, tint, weighted
 from illumcli.models._parameters import Varying
 from illumcli.models._terms import Angle, Components
-from illumcli.schema.description import Description, default_of
+from illumcli.schema.description import default_of
 from illumcli.schema.fields import Albedo, Share
 
 WHITE = (1.0, 1.0, 1.0)
@@ -147,10 +147,7 @@ class Generated(IlluminationModel):
         return tint(WHITE, product) if product.ndim == 1 else product.T
 
     def _diffuse_weight(self) -> Any:
-        if self.diffuse_weight is not None:
-            return self.diffuse_weight
-        ks = self.specular_weight
-        return ks if isinstance(ks, Description) else 1 - np.asarray(ks)
+        return or_rest(self.diffuse_weight, self.specular_weight)
 
 
 def above(s: Components) -> Vectors:

@@ -37,7 +37,7 @@ import numpy as np
 from illumcli.arrays import Floats, Vectors, as_dtype_of
 from illumcli.models._base import IlluminationModel, Lobe
 from illumcli.models._fresnel import Array, schlick
-from illumcli.models._lobes import channels
+from illumcli.models._lobes import channels, fifth
 from illumcli.models._masking import anisotropic_spread2, ggx_area, separable_over_4ab
 from illumcli.models._microfacet import anisotropic_ggx, squared_unit
 from illumcli.models._parameters import Varying
@@ -101,12 +101,12 @@ class Principled(IlluminationModel):
             n_l, self.metallic, self.roughness, self.subsurface, self.sheen, self.sheen_tint
         )
         c, rest = channels(n_l, self.base_color), (1 - metallic) * n_l
-        F_l, F_v = _fifth(1 - n_l), _fifth(1 - n_v)
+        F_l, F_v = fifth(1 - n_l), fifth(1 - n_v)
         b = roughness * np.square(v_h)
         plain = (1 + (2 * b - 0.5) * F_l) * (1 + (2 * b - 0.5) * F_v)
         flat = 1.25 * ((1 + (b - 1) * F_l) * (1 + (b - 1) * F_v) * (1 / (n_l + n_v) - 0.5) + 0.5)
         shape = rest * ((1 - subsurface) * plain + subsurface * flat) / np.pi
-        return (c * shape + _tinted(c, sheen_tint) * (sheen * _fifth(1 - v_h) * rest)).T
+        return (c * shape + _tinted(c, sheen_tint) * (sheen * fifth(1 - v_h) * rest)).T
 
     def specular_lobe(
         self, v_h: Floats, s_local: Components, l_local: Components, v_local: Components
@@ -131,11 +131,6 @@ class Principled(IlluminationModel):
         coat = _gtr1(h, 0.1 - v_h.dtype.type(0.099) * gloss) * _masking(l_local, v_local, width, width)
         coat *= clearcoat / 4 * schlick(v_h, np.asarray(COAT_F0, v_h.dtype))
         return ((schlick(v_h, f0) * base + coat) * l_local.n).T
-
-
-def _fifth(x: Floats) -> Floats:
-    square = x * x
-    return square * square * x
 
 
 def _tinted(c: Array, share: Array) -> Array:

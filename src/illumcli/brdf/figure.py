@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from illumcli.brdf.curves import draw_curves, legend, panels
+from illumcli.brdf.files import figure_bytes
 from illumcli.brdf.pictures import draw_pictures
 from illumcli.brdf.plot import COLUMN, CURVES, Plot
 from illumcli.brdf.style import SETTINGS, Style
@@ -22,12 +22,6 @@ SHAPES = {"polar": 0.66, **dict.fromkeys(CURVES[1:], 0.62), "sphere": 0.77, "pla
 LEGEND_LINE = 0.17
 """Height of a line of the legend [inches]."""
 PROJECTIONS = {"polar": "polar", "lobe": "3d"}
-METADATA: dict[str, dict[str, Any]] = {
-    "png": {"Software": None},
-    "svg": {"Date": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-"""Without date and version, so that equal drawings are equal files."""
 
 
 def figure_file(models: Mapping[str, Look], plot: Plot, kind: str) -> bytes:
@@ -73,26 +67,7 @@ def figure_file(models: Mapping[str, Look], plot: Plot, kind: str) -> bytes:
                     one.set_title(title)
         lines = _draw_legend(figure, named, width)
         figure.set_size_inches(width, sum(heights) + LEGEND_LINE * lines)
-        _fix_layout(figure)
-        file = io.BytesIO()
-        figure.savefig(file, format=kind, metadata=METADATA[kind])
-    return _with_numbered_clips(file.getvalue()) if kind == "svg" else file.getvalue()
-
-
-def _fix_layout(figure: Figure) -> None:
-    """Lay out the figure; last digits of matplotlib's solver vary from run to run, and are rounded off."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    for axes in figure.axes:
-        left, bottom, width, height = (round(each, 6) for each in axes.get_position(original=True).bounds)
-        axes.set_position((left, bottom, width, height))
-
-
-def _with_numbered_clips(svg: bytes) -> bytes:
-    """An SVG whose clip paths are named by number; matplotlib names them after places in memory."""
-    numbers: dict[bytes, int] = {}
-    named = rb'(?<=clipPath id="p)[0-9a-f]+|(?<=url\(#p)[0-9a-f]+(?=\))'
-    return re.sub(named, lambda name: b"%d" % numbers.setdefault(name[0], len(numbers)), svg)
+        return figure_bytes(figure, kind)
 
 
 def _refuse_faulty_math(label: str) -> None:

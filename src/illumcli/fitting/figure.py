@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from illumcli.brdf import views
+from illumcli.brdf.files import figure_bytes
 from illumcli.color import luminance, to_srgb
 from illumcli.errors import InputError
 from illumcli.fitting.fit import Fit
@@ -64,10 +64,7 @@ def figure_file(source: Path, fits: Mapping[str, Fit], measurement: Measurement,
             _draw_slices(above, measured, models)
         spheres = models if measured is None else {"measured": measured, **models}
         _draw_spheres(below, spheres)
-        file = io.BytesIO()
-        metadata = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
-        figure.savefig(file, format=kind, metadata=metadata)
-    return file.getvalue()
+        return figure_bytes(figure, kind)
 
 
 def _as_model(source: Path) -> IlluminationModel | None:

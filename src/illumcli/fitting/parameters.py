@@ -17,7 +17,7 @@ from illumcli.models._base import IlluminationModel
 from illumcli.models._parameters import Texture, VertexValues
 from illumcli.records import Record, Value
 from illumcli.schema.annotations import field_annotation, number_range
-from illumcli.schema.description import Description
+from illumcli.schema.description import Description, owner_of
 from illumcli.schema.families import tag_of
 
 Doubles = NDArray[np.float64]
@@ -153,11 +153,9 @@ def parameters_of(model: IlluminationModel, is_isotropic: bool) -> Parameters:
     return Parameters(kept, equal)
 
 
-def value_at(part: Any, path: str) -> Any:
+def value_at(model: IlluminationModel, path: str) -> Any:
     """The value of a parameter by its path."""
-    for step in path.split("."):
-        part = part[int(step)] if isinstance(part, tuple) else getattr(part, step)
-    return part
+    return getattr(*owner_of(model, path))
 
 
 def _free(part: Description, prefix: str = "") -> Iterator[Parameter]:

@@ -26,7 +26,7 @@ import pytest
 from illumcli.errors import LimitError, known
 from illumcli.images.exr import ExrFile
 from illumcli.images.format import WriteError
-from illumcli.schema.families import modules
+from illumcli.schema.modules import modules
 
 SHIM = """
 #define _GNU_SOURCE

@@ -71,7 +71,7 @@ def test_a_second_signal_ends_at_once_and_leaves_no_file(tmp_path):
         for expected in ("open\n", "unwinding\n"):
             assert run.stdout.readline() == expected
             run.send_signal(signal.SIGINT)
-        assert run.wait(timeout=30) == -signal.SIGINT
+        assert run.wait(timeout=120) == -signal.SIGINT
         assert run.stderr.read() == ""
     assert list(tmp_path.iterdir()) == []
 
@@ -100,7 +100,7 @@ def test_a_signal_during_an_import_ends_by_itself(tmp_path, number, halves):
     ) as run:
         assert run.stdout.readline() == "loading\n"
         run.send_signal(number)
-        assert run.wait(timeout=30) == -number
+        assert run.wait(timeout=120) == -number
         assert run.stderr.read() == ""
 
 

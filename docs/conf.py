@@ -1,0 +1,17 @@
+"""Settings of Sphinx for the site; `docs/make_site.py` builds it."""
+
+from illumcli import __version__
+
+project = "illum"
+release = version = __version__
+root_doc = "index"
+extensions = ["myst_parser", "sphinx_copybutton", "sphinx_design"]
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+copybutton_exclude = ".linenos, .gp, .go"
+html_theme = "furo"
+html_title = f"illum {version}"
+html_show_copyright = False
+html_show_sphinx = False
+html_copy_source = False
+html_show_sourcelink = False

@@ -1,0 +1,78 @@
+"""The folder that Sphinx reads: pages of `docs` and of the repository, with links that hold on the site."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+MOVED = {
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "benchmarks/README.md": "benchmarks.md",
+}
+"""File of the repository outside of `docs` -> its page on the site."""
+COPIES = "files/"
+"""Folder of the site for other files that pages link to."""
+PICTURES = ("*.png", "*.svg")
+
+LINK = re.compile(r"\[((?:[^][]|\[[^]]*\])*)\]\(([^)#\s]+)((?:#[^)\s]*)?)\)")
+"""Text, file and anchor of a link or picture."""
+
+
+def hand_written() -> dict[str, str]:
+    """Name -> text of the pages that people write."""
+    pages = {path.relative_to(DOCS).as_posix(): path for path in sorted(DOCS.glob("*.md"))}
+    pages |= {page: ROOT / file for file, page in MOVED.items()}
+    return {page: with_links(path.read_text(), path) for page, path in pages.items()}
+
+
+def with_links(text: str, path: Path) -> str:
+    """The text of a file, with links that hold on the site."""
+
+    def link(match: re.Match[str]) -> str:
+        words, file, anchor = match.groups()
+        target = (path.parent / file).resolve()
+        if ":" in file or not target.is_relative_to(ROOT):
+            return match[0]
+        if target.is_dir():
+            return words
+        return f"[{words}]({place(target.relative_to(ROOT).as_posix())}{anchor})"
+
+    return LINK.sub(link, text)
+
+
+def place(file: str) -> str:
+    """Where a file of the repository is on the site: a page, a picture, or a copy to look at."""
+    if file.startswith("docs/"):
+        return file.removeprefix("docs/")
+    return MOVED.get(file, COPIES + file)
+
+
+def pictures() -> dict[str, bytes]:
+    """Name -> content of the pictures below `docs`."""
+    found = sorted(path for pattern in PICTURES for path in DOCS.rglob(pattern))
+    return {path.relative_to(DOCS).as_posix(): path.read_bytes() for path in found}
+
+
+def linked_files(pages: Mapping[str, str]) -> dict[str, bytes]:
+    """The files of the repository that pages link to."""
+    linked = {match[2] for text in pages.values() for match in LINK.finditer(text)}
+    files = sorted(name.removeprefix(COPIES) for name in linked if name.startswith(COPIES))
+    return {COPIES + name: (ROOT / name).read_bytes() for name in files}
+
+
+def write(folder: Path, pages: Mapping[str, str | bytes]) -> None:
+    """Make a folder hold exactly these files; those that are equal are not touched."""
+    for old in sorted(folder.rglob("*")):
+        if old.is_file() and old.relative_to(folder).as_posix() not in pages:
+            old.unlink()
+    for name, content in pages.items():
+        path = folder / name
+        data = content.encode() if isinstance(content, str) else content
+        if not path.exists() or path.read_bytes() != data:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)

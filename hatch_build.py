@@ -4,7 +4,8 @@ A wheel with the library is tagged py3-none-PLATFORM, as it does not depend on a
 without it is tagged py3-none-any and traces single rays by embreex, with the same bits. An editable
 installation gets the library into `src`.
 
-    python hatch_build.py       compiles it into src, for a checkout on the path
+    python hatch_build.py                   compiles it into src, for a checkout on the path
+    ILLUM_PACKETS=0 python -m build         makes a wheel without it, for every platform
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ REQUIRED = "ILLUM_REQUIRE_PACKETS"
 
 
 def compiled() -> bool:
-    """Compile the source; whether the library is there, made from the source as it is."""
+    """Compile the source unless ILLUM_PACKETS is 0; whether the library is made from the source as it is."""
+    if os.environ.get("ILLUM_PACKETS") == "0":
+        print("packets.c is not compiled, embreex will trace single rays: ILLUM_PACKETS=0", file=sys.stderr)
+        return False
     made = LIBRARY.with_name(f"{LIBRARY.stem}-{os.getpid()}{LIBRARY.suffix}")
     try:
         (_with_msvc if os.name == "nt" else _with_cc)(made)

@@ -1,23 +1,26 @@
-"""Wheels with and without a C compiler: each has the right tag."""
+"""Wheels with and without a C compiler, the archive of the source, and what they say of themselves."""
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import zipfile
-from importlib.util import find_spec
+from email import message_from_bytes
+from pathlib import Path
 
 import pytest
+import yaml
 
+import illumcli
 from conftest import ROOT
 
 COMPILERS = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name and shutil.which(name)]
-pytestmark = pytest.mark.skipif(
-    not (ROOT / "hatch_build.py").exists() or find_spec("hatchling") is None, reason="needs hatchling"
-)
+WITH_COMPILER = pytest.mark.skipif(os.name == "nt" or not COMPILERS, reason="needs a C compiler")
 
 
 @pytest.fixture
@@ -27,13 +30,13 @@ def project(tmp_path):
     (package / "rays").mkdir(parents=True)
     for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE", ".gitignore"):
         shutil.copy(ROOT / name, tmp_path)
-    shutil.copy(ROOT / "src" / "illumcli" / "rays" / "packets.c", package / "rays")
-    (package / "__init__.py").write_text("")
+    for name in ("__init__.py", "rays/packets.c"):
+        shutil.copy(ROOT / "src" / "illumcli" / name, package / name)
     return tmp_path
 
 
-def build(project, **environment):
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel"]
+def build(project, *words, **environment):
+    command = [sys.executable, "-m", "hatchling", "build", *(words or ("-t", "wheel"))]
     return subprocess.run(
         command, cwd=project, env={**os.environ, **environment}, capture_output=True, text=True, check=False
     )
@@ -45,19 +48,26 @@ def only_wheel(project):
         return path.name, {os.path.basename(name) for name in wheel.namelist()}
 
 
-def test_without_a_compiler_the_wheel_is_pure(project):
+# ------------------------------------------------------------------ with and without the loop
+
+
+@pytest.mark.parametrize(
+    ("environment", "reason"), [({"CC": "/none/cc"}, "/none/cc"), ({"ILLUM_PACKETS": "0"}, "ILLUM_PACKETS=0")]
+)
+def test_without_a_compiler_or_by_request_the_wheel_is_pure(project, environment, reason):
     # a library of an earlier build is not taken for that of this source
     (project / "src" / "illumcli" / "rays" / "_packets.so").write_text("old")
-    done = build(project, CC=str(project / "none"), ILLUM_REQUIRE_PACKETS="0")
+    done = build(project, **{"ILLUM_REQUIRE_PACKETS": "0"} | environment)
     assert done.returncode == 0, done.stderr
     assert "single rays" in done.stderr
+    assert reason in done.stderr
     name, files = only_wheel(project)
     assert name.endswith("-py3-none-any.whl")
     assert "packets.c" in files
     assert "_packets.so" not in files
 
 
-@pytest.mark.skipif(os.name == "nt" or not COMPILERS, reason="needs a C compiler")
+@WITH_COMPILER
 def test_with_a_compiler_the_wheel_is_of_its_platform(project):
     done = build(project, CC=COMPILERS[0])
     assert done.returncode == 0, done.stderr
@@ -69,3 +79,65 @@ def test_with_a_compiler_the_wheel_is_of_its_platform(project):
 
 def test_a_required_loop_that_cannot_be_compiled_stops_the_build(project):
     assert build(project, CC=str(project / "none"), ILLUM_REQUIRE_PACKETS="1").returncode != 0
+
+
+# ------------------------------------------------------------------ what is published
+
+
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    """Folder with the archive of this source, and the wheel that is built from the unpacked archive."""
+    folder = tmp_path_factory.mktemp("published")
+    done = build(ROOT, "-t", "sdist", "-d", str(folder))
+    assert done.returncode == 0, done.stderr
+    (archive,) = folder.glob("*.tar.gz")
+    with tarfile.open(archive) as files:
+        files.extractall(folder, filter="data")
+    source = folder / archive.name.removesuffix(".tar.gz")
+    done = build(source, "-t", "wheel", "-d", str(folder))
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_the_source_archive_holds_all_that_is_tracked(published):
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    if not listed:
+        pytest.skip("needs git and its folder")
+    (archive,) = published.glob("*.tar.gz")
+    with tarfile.open(archive) as files:
+        held = {name.partition("/")[2] for name in files.getnames()}
+    assert set(listed.splitlines()) - held == set()
+
+
+def test_a_second_build_elsewhere_has_the_same_bytes(published, tmp_path):
+    (first,) = published.glob("*.whl")
+    (source,) = (path for path in published.iterdir() if path.is_dir())
+    elsewhere = shutil.copytree(source, tmp_path / "elsewhere", copy_function=shutil.copy)
+    build(elsewhere, "-t", "wheel", "-d", str(tmp_path))
+    assert (tmp_path / first.name).read_bytes() == first.read_bytes()
+
+
+def test_the_wheel_holds_the_package_and_says_what_it_is(published):
+    (path,) = published.glob("*.whl")
+    with zipfile.ZipFile(path) as wheel:
+        held = set(wheel.namelist())
+        (about,) = (name for name in held if name.endswith(".dist-info/METADATA"))
+        metadata = message_from_bytes(wheel.read(about))
+    package = ROOT / "src"
+    wanted = {
+        str(each.relative_to(package))
+        for each in package.rglob("*")
+        if each.is_file() and "__pycache__" not in each.parts and each.suffix not in (".pyc", ".so", ".dll")
+    }
+    assert wanted - held == set()
+    assert {name.split("/")[0] for name in held} == {"illumcli", Path(about).parts[0]}
+    assert metadata["Version"] == illumcli.__version__
+    assert metadata["License-Expression"] == "MIT"
+    assert about.replace("METADATA", "licenses/LICENSE") in held
+
+
+def test_citation_and_changelog_name_the_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["version"] == illumcli.__version__
+    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), flags=re.M)
+    assert newest[1] == illumcli.__version__

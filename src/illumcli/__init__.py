@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from illumcli.scene.spec import Scene
 
 __all__ = ["IllumError", "Scene", "__version__", "bake", "compare", "load", "render", "sweep"]
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _PLACES = {
     "IllumError": "errors.IllumError",

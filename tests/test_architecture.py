@@ -15,7 +15,7 @@ MODULES = sorted(SOURCE.rglob("*.py"))
 FOLDERS = (
     "cli",
     "stress",
-    "cluster",
+    "cluster viewer",
     "api",
     "commands",
     "fitting",
@@ -52,6 +52,7 @@ HOMES = {
     "distributed": ("cluster/",),
     "dask": ("cluster/",),
     "jinja2": ("html_report/",),
+    "websockets": ("viewer/server.py",),
     "matplotlib": ("brdf/", "accuracy/", "fitting/figure.py", "images/sheet_drawing.py"),
     "scipy": ("fitting/",),
 }

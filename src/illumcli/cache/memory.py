@@ -56,8 +56,8 @@ class MemoryCache:
         self._complete |= keys & self._tiles.keys()
 
     def retire(self) -> None:
-        """Drop everything that is not wanted."""
-        for key in self._tiles.keys() - self.wanted:
+        """Drop everything that is not wanted, and what lacks tiles since a run was abandoned."""
+        for key in self._tiles.keys() - (self.wanted & self._complete):
             self._drop(key)
             self._complete.discard(key)
         self.once = {key: value for key, value in self.once.items() if key in self.wanted}

@@ -27,6 +27,7 @@ COMMANDS = {
     "sweep": "Render the variants of a scene; share what they have in common.",
     "ao-bake": "Bake obscurance at the vertices of a mesh or scene.",
     "merge": "Merge the shards of a command: pictures, tables, sheets, reports.",
+    "view": "Explore a scene live in a browser.",
     "plan": "Show what will run for a scene, what is skipped and why.",
     "check": "Validate scenes; report all problems at once.",
     "compare": "Measure the difference between two images.",

@@ -128,10 +128,11 @@ def rendered(
 
 def wanted_by(following: Work | None, work: Work, graph: Graph, run: Run) -> frozenset[str]:
     """Keys of the buffers of a graph that the next variant reads; or that any variant might, if whoever holds
-    the images may ask for more."""
-    if work.images.held:
-        return lasting_keys(graph, work.outputs)
+    the images may ask for more, of this work and of the `following`."""
+    lasting = lasting_keys(graph, work.outputs) if work.images.held else frozenset()
     if following is None:
-        return frozenset()
+        return lasting
     other = without_objects(place_cameras(following.graph, run), graph.culled)
+    if work.images.held:
+        return lasting | lasting_keys(other, following.outputs)
     return shared_keys(graph, other, following.outputs)

@@ -130,8 +130,10 @@ class Worker:
         from illumcli.commands.render import rendered
 
         memory = self._scenes[work.job.scene].memory
-        report = rendered(work, Cache(store, memory, self._speeds), progress, following)
-        memory.retire()
+        try:
+            report = rendered(work, Cache(store, memory, self._speeds), progress, following)
+        finally:
+            memory.retire()
         return [target.path for target in work.targets], report
 
     def finish(self) -> tuple[str, ...]:

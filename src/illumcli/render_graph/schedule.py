@@ -294,11 +294,16 @@ def lasting_keys(graph: Graph, outputs: Sequence[Layer]) -> frozenset[str]:
         for part in (plan, plan.all_samples):
             if part is not None:
                 key = Keys(graph.nodes, part.view, code())
-                names = [node.output for node in part.tile if codec_of(node.output) is not None]
+                names = [node.output for node in part.tile if _lasts(node.output)]
                 lasting |= {
                     key(name) for name in ("implied_widths", *(node.output for node in part.once), *names)
                 }
     return frozenset(lasting)
+
+
+def _lasts(name: str) -> bool:
+    """True if a buffer of tiles takes longer to compute than to keep; fitted obscurance is kept whole."""
+    return name == FITTED or codec_of(name) is not None
 
 
 def shared_keys(graph: Graph, following: Graph, outputs: Sequence[Layer]) -> frozenset[str]:

@@ -17,14 +17,55 @@ if TYPE_CHECKING:
     from illumcli.api.render import load, render
     from illumcli.api.sweeping import sweep
     from illumcli.errors import IllumError
-    from illumcli.scene.spec import Scene
+    from illumcli.scene.frames import Frames
+    from illumcli.scene.spec import (
+        Adaptive,
+        Ambient,
+        DepthCue,
+        Film,
+        Filter,
+        Grain,
+        MeshFile,
+        Normals,
+        Object,
+        Obscurance,
+        Orthographic,
+        Outputs,
+        Perspective,
+        Scene,
+        Transform,
+    )
 
-__all__ = ["IllumError", "Scene", "__version__", "bake", "compare", "load", "render", "sweep"]
+__all__ = [
+    "Adaptive",
+    "Ambient",
+    "DepthCue",
+    "Film",
+    "Filter",
+    "Frames",
+    "Grain",
+    "IllumError",
+    "MeshFile",
+    "Normals",
+    "Object",
+    "Obscurance",
+    "Orthographic",
+    "Outputs",
+    "Perspective",
+    "Scene",
+    "Transform",
+    "__version__",
+    "bake",
+    "compare",
+    "load",
+    "render",
+    "sweep",
+]
 __version__ = "0.3.0"
 
 _PLACES = {
+    "Frames": "scene.frames.Frames",
     "IllumError": "errors.IllumError",
-    "Scene": "scene.spec.Scene",
     "bake": "api.baking.bake",
     "compare": "api.comparing.compare",
     "load": "api.render.load",
@@ -35,9 +76,10 @@ _PLACES = {
 
 def __getattr__(name: str) -> Any:
     """A function or class of the interface, imported when it is first used."""
-    if name not in _PLACES:
+    place = _PLACES.get(name) or (name in __all__ and f"scene.spec.{name}")
+    if not place:
         raise AttributeError(f"module 'illumcli' has no attribute '{name}'")
-    module, _, inside = _PLACES[name].rpartition(".")
+    module, _, inside = place.rpartition(".")
     return getattr(import_module(f"illumcli.{module}"), inside)
 
 

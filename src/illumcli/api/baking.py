@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.api.meshes import is_mesh, write_mesh
-from illumcli.api.scenes import AnyScene, file_of, named_scene
+from illumcli.api.scenes import AnyScene, file_of, named_scene, without_folder
 from illumcli.progress import Progress, no_progress
 from illumcli.records import Record
 from illumcli.visibility.baked import read_npz
@@ -52,6 +52,10 @@ class Baking(Record):
     """What `--report` of ``illum ao-bake`` writes."""
     files: tuple[Path, ...]
     """The outputs that were asked for."""
+
+    def __repr__(self) -> str:
+        shapes = ", ".join(f"{name} {each.shape}" for name, each in self.channels.items())
+        return f"<baking of {self.report['vertices']:,} vertices: {shapes}>"
 
     @property
     def obscurance(self) -> NDArray[Any]:
@@ -119,6 +123,6 @@ def bake(
         with named_scene(own):
             _, report = bake_mesh(path, (values, *files), settings, BakeOptions(force=force), progress)
         baked = read_npz(values)
-    facts = report.as_data()
-    facts["written"] = [name for name in facts["written"] if name != str(values)]
+    written = [name for name in report.as_data()["written"] if name != str(values)]
+    facts = without_folder({**report.as_data(), "written": written}, own)
     return Baking(baked.channels, baked.corner_channels, facts, files)

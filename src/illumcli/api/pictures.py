@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.commands.file_metadata import metadata
 from illumcli.commands.held_images import HeldImage
 from illumcli.commands.image_store import ImageFiles
-from illumcli.commands.report import Report
 from illumcli.commands.targets import image_set
 from illumcli.film.develop import Target
 from illumcli.records import Record
 from illumcli.schema.messages import suggestion
+
+if TYPE_CHECKING:
+    from illumcli.commands.work import Work
+
+NO_PIXELS = np.zeros((0, 0, 0), np.float32)
 
 
 class Picture(Mapping[str, NDArray[Any]]):
@@ -28,8 +33,10 @@ class Picture(Mapping[str, NDArray[Any]]):
     """
 
     def __init__(self, image: HeldImage) -> None:
-        self._image = image
         self._layers = image.layers()
+        # Not the pixels, which are the layers once more, nor those of other renders.
+        work = replace(image.work, images=ImageFiles())
+        self._image = replace(image, work=work, pixels=NO_PIXELS)
 
     def __getitem__(self, layer: str) -> NDArray[Any]:
         if layer not in self._layers:
@@ -44,7 +51,12 @@ class Picture(Mapping[str, NDArray[Any]]):
 
     def __repr__(self) -> str:
         view = self._image.target.view
-        return f"<picture {view.name}, {view.width} x {view.height}: {', '.join(self)}>"
+        return f"<picture of {view.name}, {view.width} x {view.height}: {', '.join(self)}>"
+
+    @property
+    def work(self) -> Work:
+        """What it was rendered from."""
+        return self._image.work
 
     @property
     def camera(self) -> str:
@@ -88,14 +100,18 @@ class Rendering(Record):
     report: dict[str, Any]
     """What `--report` of ``illum render`` writes."""
     frame: int | None
-    _images: tuple[HeldImage, ...]
+    """The frame of an animation."""
 
     @classmethod
-    def of(cls, images: tuple[HeldImage, ...], report: Report) -> Rendering:
+    def of(cls, images: Sequence[HeldImage], report: dict[str, Any]) -> Rendering:
         """The rendering of some images."""
         pictures = {image.target.view.name: Picture(image) for image in images}
-        facts = replace(report, written=(), kept=()).as_data()
-        return cls(pictures, facts, images[0].work.job.frame, images)
+        return cls(pictures, report, images[0].work.job.frame)
+
+    def __repr__(self) -> str:
+        seconds, rays = self.report["total_seconds"], sum(self.report["rays"].values())
+        shown = " ".join(map(repr, self.pictures.values()))
+        return f"<rendering in {seconds:.3g} s with {rays:,} rays: {shown}>"
 
     @property
     def picture(self) -> Picture:
@@ -123,7 +139,7 @@ class Rendering(Record):
         OutputError
             A different file exists, or a file cannot be written.
         """
-        work = self._images[0].work
+        work = self.picture.work
         job = replace(work.job, options=replace(work.job.options, pattern=os.fspath(pattern)))
         targets = image_set(job, work.loaded, work.graph, work.outputs)
         for target in ImageFiles().due(targets, force):

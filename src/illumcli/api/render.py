@@ -12,7 +12,7 @@ from threading import Lock
 from typing import Any, TypedDict, Unpack, overload
 
 from illumcli.api.pictures import Rendering
-from illumcli.api.scenes import AnyScene, Overrides, file_of, named_scene, override_texts
+from illumcli.api.scenes import AnyScene, Overrides, file_of, named_scene, override_texts, without_folder
 from illumcli.commands.held_images import HeldImages
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.unit import Worker
@@ -82,7 +82,8 @@ class LoadedScene:
             self._images.images.clear()
             _, report = self._worker.run(work, progress)
             report = replace(report, warnings=(*report.warnings, *unused_keys(work), *self._worker.finish()))
-            return Rendering.of(tuple(self._images.images), report)
+            facts = without_folder(replace(report, written=(), kept=()).as_data(), self._folder)
+            return Rendering.of(self._images.images, facts)
 
 
 def load(scene: AnyScene) -> LoadedScene:

@@ -16,6 +16,7 @@ from illumcli.api.meshes import is_mesh, write_mesh
 from illumcli.errors import InputError
 from illumcli.scene.access import is_path
 from illumcli.scene.spec import Scene
+from illumcli.schema.annotations import is_tag
 from illumcli.schema.description import Description
 
 AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene"
@@ -34,9 +35,8 @@ def written(scene: Mapping[str, Any] | Scene, folder: Path) -> Path:
     InputError
         A value that no scene can have, such as an object of an unknown class.
     """
-    plain = scene.model_dump(mode="json", exclude_unset=True) if isinstance(scene, Scene) else scene
     path = folder / NAME
-    path.write_text(_yaml(_plain(plain, (), folder)), encoding="utf-8")
+    path.write_text(_yaml(_plain(scene, (), folder)), encoding="utf-8")
     return path
 
 
@@ -65,6 +65,12 @@ def override_texts(overrides: Overrides, folder: Path) -> tuple[str, ...]:
     )
 
 
+def _keys(part: Description) -> dict[str, Any]:
+    """The keys of a description that were given, and its tag."""
+    cls = type(part)
+    return {name: value for name, value in part if name in part.model_fields_set or is_tag(cls, name)}
+
+
 def _yaml(value: Any) -> str:
     """A value as JSON, which YAML reads."""
     return json.dumps(value, ensure_ascii=False)
@@ -72,12 +78,12 @@ def _yaml(value: Any) -> str:
 
 def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
     """A value as the YAML of a scene has it: meshes as files, arrays as lists, paths from the root folder."""
-    if is_mesh(value):
+    if not isinstance(value, Description) and is_mesh(value):
         return {"file": str(write_mesh(value, folder))}
     place = ".".join(map(str, path))
     match value:
         case Description():
-            return _plain(value.model_dump(mode="json", exclude_unset=True), path, folder)
+            return _plain(_keys(value), path, folder)
         case Mapping():
             return {str(key): _plain(part, (*path, str(key)), folder) for key, part in value.items()}
         case float() | np.floating() if not np.isfinite(value):
@@ -107,3 +113,15 @@ def named_scene(folder: Path) -> Iterator[None]:
         mesh = re.compile(rf"{re.escape(str(folder))}/mesh-[0-9a-f]+\.ply")
         problems = [mesh.sub("mesh", own.sub("scene", problem)) for problem in error.problems]
         raise InputError(problems) from None
+
+
+def without_folder(value: Any, folder: Path) -> Any:
+    """A report, whose texts name the files of a temporary folder without it."""
+    match value:
+        case str():
+            return value.replace(f"{folder}{os.sep}", "")
+        case Mapping():
+            return {without_folder(key, folder): without_folder(each, folder) for key, each in value.items()}
+        case tuple() | list():
+            return type(value)(without_folder(each, folder) for each in value)
+    return value

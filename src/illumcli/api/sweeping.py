@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Any, Unpack
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,14 @@ class Sweep(Sequence[dict[str, Any]]):
         self.renderings = renderings
         """The pictures of each variant."""
 
-    def __getitem__(self, index: Any) -> Any:
+    def __repr__(self) -> str:
+        return f"<sweep of {len(self)} variants: {', '.join(self._records[0]) if self else ''}>"
+
+    @overload
+    def __getitem__(self, index: int) -> dict[str, Any]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[dict[str, Any]]: ...
+    def __getitem__(self, index: int | slice) -> dict[str, Any] | list[dict[str, Any]]:
         return self._records[index]
 
     def __len__(self) -> int:

@@ -57,7 +57,7 @@ def band_of(whole: Target, rows: tuple[int, int]) -> Target:
     return replace(whole, path=path, content=content, rows=rows, picture=whole.content)
 
 
-def file_patterns(job: RenderJob, loaded: SceneFile, scene: Scene) -> tuple[str, ...]:
+def file_patterns(job: RenderJob, loaded: SceneFile, scene: Scene) -> Sequence[str]:
     """Name patterns of the scene; those that its author did not choose have the number of the frame, if there
     are frames."""
     frames = [

@@ -11,7 +11,7 @@ import numpy as np
 
 from illumcli.fitting.parameters import Doubles, Parameters
 from illumcli.models._base import IlluminationModel
-from illumcli.schema.annotations import choices, field_annotation
+from illumcli.schema.annotations import is_tag
 from illumcli.schema.description import Description
 from illumcli.schema.fields import NAME
 
@@ -59,7 +59,7 @@ def _keys(part: Description, values: Mapping[str, Any], prefix: str = "") -> dic
                 out[name] = below
         elif isinstance(value, tuple) and value and isinstance(value[0], Description):
             out[name] = [_keys(each, values, f"{path}.{place}.") for place, each in enumerate(value)]
-        elif name in part.model_fields_set or len(list(choices(field_annotation(type(part), name)))) == 1:
+        elif name in part.model_fields_set or is_tag(type(part), name):
             out[name] = value
     return out
 

@@ -25,7 +25,7 @@ class NoLaw(Description):
 class Polynomial(Description):
     """f(d) = 1 / (c1 + c2 d + c3 d^2), the empirical law of the texts, d in scene units."""
 
-    law: Literal["polynomial"]
+    law: Literal["polynomial"] = "polynomial"
     c1: NonNegative = 1.0
     """Constant part of the divisor."""
     c2: NonNegative = 0.0
@@ -47,7 +47,7 @@ class Polynomial(Description):
 class InverseSquare(Description):
     """f(d) = 1 / d^2: radiant intensity [W/sr] becomes irradiance [W/m^2] (Lambert 1760)."""
 
-    law: Literal["inverse_square"]
+    law: Literal["inverse_square"] = "inverse_square"
 
     def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / d^2."""
@@ -57,7 +57,7 @@ class InverseSquare(Description):
 class InverseSquareFlux(Description):
     """f(d) = 1 / (4 pi d^2): the flux [W] of an isotropic source becomes irradiance [W/m^2]."""
 
-    law: Literal["inverse_square_flux"]
+    law: Literal["inverse_square_flux"] = "inverse_square_flux"
 
     def factor(self, distance: Floats) -> Floats:
         """(N,) 1 / (4 pi d^2)."""
@@ -70,7 +70,7 @@ class Windowed(Description):
     The window of glTF's KHR_lights_punctual, squared as in Karis (2013), Real shading in Unreal Engine 4.
     """
 
-    law: Literal["windowed"]
+    law: Literal["windowed"] = "windowed"
     range: Positive
     """Distance from which nothing arrives [scene units]."""
 

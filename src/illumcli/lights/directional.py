@@ -13,7 +13,7 @@ from illumcli.schema.fields import Color, Direction
 
 
 class Directional(Light):
-    light: Literal["directional"]
+    light: Literal["directional"] = "directional"
     direction: Direction
     """Where the light goes; any length."""
     irradiance: Color = (1.0, 1.0, 1.0)

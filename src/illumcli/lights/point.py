@@ -15,7 +15,7 @@ from illumcli.schema.fields import Color, Vector
 
 
 class Point(Light):
-    light: Literal["point"]
+    light: Literal["point"] = "point"
     position: Vector
     """Where it is [scene units]."""
     intensity: Color = (1.0, 1.0, 1.0)

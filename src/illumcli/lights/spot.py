@@ -17,7 +17,7 @@ from illumcli.schema.fields import Color, Share, Vector
 
 
 class Spot(Light):
-    light: Literal["spot"]
+    light: Literal["spot"] = "spot"
     position: Vector
     """Where it is [scene units]."""
     target: Vector = (0.0, 0.0, 0.0)

@@ -97,6 +97,11 @@ def choices(annotation: Any) -> Iterator[tuple[Any, Any]]:
         yield tag, part
 
 
+def is_tag(cls: type[Description], name: str) -> bool:
+    """True if a field has one possible value, which tells the class from others."""
+    return len(list(choices(field_annotation(cls, name)))) == 1
+
+
 def number_range(annotation: Any) -> Range:
     """The range of a number or colour; for a parameter that may vary over the surface, of a constant value.
 

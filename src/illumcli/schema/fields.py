@@ -6,9 +6,9 @@ Ranges are pydantic's (`Field(ge=0)`); their messages are in `messages`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, Strict
 
@@ -17,7 +17,10 @@ from illumcli.schema.messages import describe, short
 LARGEST = 1e18  # squares and products of three such numbers stay finite in float32's exponent range
 
 T = TypeVar("T")
-ListOf: TypeAlias = Annotated[tuple[T, ...], Strict(False)]
+if TYPE_CHECKING:
+    ListOf: TypeAlias = Sequence[T]  # an editor takes a list, too
+else:
+    ListOf: TypeAlias = Annotated[tuple[T, ...], Strict(False)]
 """A list of any length."""
 
 Number: TypeAlias = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]

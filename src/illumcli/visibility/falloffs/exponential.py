@@ -18,7 +18,7 @@ from illumcli.visibility.falloffs._base import Falloff
 
 
 class Exponential(Falloff):
-    falloff: Literal["exponential"]
+    falloff: Literal["exponential"] = "exponential"
     tau: Positive = 1.0
     """Decay per scene unit, or per radius of the scene when `relative`."""
     relative: bool = False

@@ -11,7 +11,7 @@ from illumcli.visibility.falloffs._base import Distance, Falloff
 
 
 class Linear(Falloff):
-    falloff: Literal["linear"]
+    falloff: Literal["linear"] = "linear"
     max_distance: Distance
     """d_max, scene units or `0.5r`."""
 

@@ -12,7 +12,7 @@ from illumcli.visibility.falloffs._base import Distance, Falloff
 
 
 class Power(Falloff):
-    falloff: Literal["power"]
+    falloff: Literal["power"] = "power"
     max_distance: Distance
     """d_max, scene units or `0.5r`."""
     exponent: Positive = 0.5

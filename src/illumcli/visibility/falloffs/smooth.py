@@ -11,7 +11,7 @@ from illumcli.visibility.falloffs._base import Distance, Falloff
 
 
 class Smooth(Falloff):
-    falloff: Literal["smooth"]
+    falloff: Literal["smooth"] = "smooth"
     max_distance: Distance
     """d_max, scene units or `0.5r`."""
 

@@ -31,6 +31,7 @@ CLOSED = {
         "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
     },
     "parametric sphere": {"shape": "parametric", **SPHERE},
+    "raised text": {"shape": "text", "text": "A&8 %i", "depth": 0.2},
     "implicit sphere": {"shape": "implicit", "f": "x**2 + y**2 + z**2 - 0.7", "resolution": 20},
 }
 OPEN = {  # and the edges of their rims
@@ -192,7 +193,7 @@ def test_textures_are_not_mirrored(scene):
 
 
 @pytest.mark.parametrize(
-    "tag", [tag for tag in tags(PACKAGE) if tag not in ("polygons", "parametric", "implicit")]
+    "tag", [tag for tag in tags(PACKAGE) if tag not in ("polygons", "parametric", "implicit", "text")]
 )
 def test_by_default_a_shape_fills_the_cube_from_minus_1_to_1(tag):
     points = made({"shape": tag}).vertices

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from chromium import chromium as chromium
+
 # No test asserts a time: a machine may be slow. A run repeats the examples of the one before, so that a
 # change is judged by what it changed; `--hypothesis-profile explore` draws new ones.
 settings.register_profile("explore", settings.default, deadline=None)

@@ -9,6 +9,7 @@ import threading
 import numpy as np
 import pytest
 
+from chromium import Page
 from illumcli.color import from_srgb, to_srgb
 from illumcli.html_report.entries import Contents, Entry, Picture
 from illumcli.html_report.folder import write_report
@@ -16,38 +17,10 @@ from illumcli.images.reader import read_image
 from painted import painted, write_picture
 
 keys = pytest.importorskip("selenium.webdriver.common.keys", reason="needs selenium").Keys
-wait_module = pytest.importorskip("selenium.webdriver.support.ui")
 
 
-class Page:
+class ReportPage(Page):
     """The page of a report in the browser."""
-
-    def __init__(self, browser):
-        self.browser = browser
-
-    def __call__(self, script, *arguments):
-        """The value of an expression of JavaScript."""
-        return self.browser.execute_script(f"return ({script})", *arguments)
-
-    def one(self, selector):
-        return self.browser.find_element("css selector", selector)
-
-    def all(self, selector):
-        return self.browser.find_elements("css selector", selector)
-
-    def wait(self, script):
-        """Waits until an expression is true, and returns its value."""
-        return wait_module.WebDriverWait(self.browser, 20, 0.02).until(lambda _: self(script), script)
-
-    def settle(self):
-        """Waits until the browser has laid out and drawn what has changed."""
-        twice = "requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done)))"
-        self.browser.execute_async_script(f"const done = arguments[0]; {twice}")
-
-    def press(self, *names):
-        """Presses keys where the focus is."""
-        for name in names:
-            self.browser.switch_to.active_element.send_keys(name)
 
     def choose(self, name, value):
         """Chooses one of several radio buttons."""
@@ -55,15 +28,6 @@ class Page:
             "document.querySelector(`input[name=${arguments[0]}][value=${arguments[1]}]`).click()",
             name,
             value,
-        )
-
-    def set(self, selector, value):
-        """Gives a control a value, as its user does."""
-        self.browser.execute_script(
-            "const field = document.querySelector(arguments[0]); field.value = arguments[1];"
-            "for (const kind of ['input', 'change']) field.dispatchEvent(new Event(kind, {bubbles: true}))",
-            selector,
-            str(value),
         )
 
     def shown(self):
@@ -87,7 +51,7 @@ def page(chromium, report):
     """The report, opened from disk; the console must have stayed empty."""
     chromium.set_window_size(1300, 900)
     chromium.get((report / "index.html").as_uri())
-    page = Page(chromium)
+    page = ReportPage(chromium)
     page.wait("document.querySelectorAll('button.open').length > 10")
     yield page
     assert [entry for entry in chromium.get_log("browser") if entry["source"] != "rendering"] == []
@@ -405,7 +369,7 @@ def test_two_thousand_variants_make_few_nodes(chromium, tmp_path):
     )
     write_report(tmp_path / "report", Contents("many", entries, 1.0, 9 / 16))
     chromium.get((tmp_path / "report" / "index.html").as_uri())
-    page = Page(chromium)
+    page = ReportPage(chromium)
     page.wait("document.querySelectorAll('button.open').length > 10")
     for view in ("gallery", "grid", "table"):
         page.choose("view", view)
@@ -423,7 +387,7 @@ def test_from_a_web_server_it_is_the_same(chromium, report):
         thread.start()
         try:
             chromium.get(f"http://127.0.0.1:{server.server_port}/")
-            page = Page(chromium)
+            page = ReportPage(chromium)
             page.wait("document.querySelectorAll('button.open').length > 10")
             page.compare(3, 20)
             assert pixel(page, "b", 4, 5) == painted(20)[5, 4].tolist()
@@ -460,7 +424,7 @@ def test_light_beyond_white_and_missing_values_are_told(chromium, tmp_path):
     folder = tmp_path / "report"
     write_report(folder, Contents("light", entries, 1.0, 4 / 6))
     chromium.get((folder / "index.html").as_uri())
-    page = Page(chromium)
+    page = ReportPage(chromium)
     page.wait("document.querySelectorAll('button.open').length === 2")
     page.compare(0, 1)
     page.browser.execute_script("compareStage.goTo(2, 1)")
@@ -490,7 +454,7 @@ def test_the_picture_to_show_is_chosen_among_layers_and_cameras(chromium, tmp_pa
         entries.append(Entry("", {}, f"{number:032x}", "rendered", "illum", pictures=pictures))
     write_report(tmp_path / "report", Contents("layers", tuple(entries), 1.0, 9 / 16))
     chromium.get((tmp_path / "report" / "index.html").as_uri())
-    page = Page(chromium)
+    page = ReportPage(chromium)
     page.wait("document.querySelectorAll('button.open').length === 2")
     assert page.all("input[value=grid]") == []  # nothing varies
     page.set("#picture", "1")

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from illumcli.api.baking import bake
+    from illumcli.api.brdfs import brdf
     from illumcli.api.comparing import compare
+    from illumcli.api.model_records import models
     from illumcli.api.render import load, render
     from illumcli.api.sweeping import sweep
     from illumcli.errors import IllumError
@@ -56,8 +58,10 @@ __all__ = [
     "Transform",
     "__version__",
     "bake",
+    "brdf",
     "compare",
     "load",
+    "models",
     "render",
     "sweep",
 ]
@@ -72,10 +76,14 @@ _PLACES = {
     "render": "api.render.render",
     "sweep": "api.sweeping.sweep",
 }
+_PACKAGES = ("brdf", "models")
+"""Functions that are packages, too."""
 
 
 def __getattr__(name: str) -> Any:
     """A function or class of the interface, imported when it is first used."""
+    if name in _PACKAGES:
+        return import_module(f"illumcli.{name}")
     place = _PLACES.get(name) or (name in __all__ and f"scene.spec.{name}")
     if not place:
         raise AttributeError(f"module 'illumcli' has no attribute '{name}'")

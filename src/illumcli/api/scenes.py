@@ -65,7 +65,7 @@ def override_texts(overrides: Overrides, folder: Path) -> tuple[str, ...]:
     )
 
 
-def _keys(part: Description) -> dict[str, Any]:
+def given_keys(part: Description) -> dict[str, Any]:
     """The keys of a description that were given, and its tag."""
     cls = type(part)
     return {name: value for name, value in part if name in part.model_fields_set or is_tag(cls, name)}
@@ -83,7 +83,7 @@ def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
     place = ".".join(map(str, path))
     match value:
         case Description():
-            return _plain(_keys(value), path, folder)
+            return _plain(given_keys(value), path, folder)
         case Mapping():
             return {str(key): _plain(part, (*path, str(key)), folder) for key, part in value.items()}
         case float() | np.floating() if not np.isfinite(value):

@@ -1,4 +1,7 @@
-"""Draw BRDFs: slices, albedo, a lit sphere, a lit plane, the lobe in space; and tables of them."""
+"""Draw BRDFs: slices, albedo, a lit sphere, a lit plane, the lobe in space; and tables of them.
+
+Called, the package is the function of the interface: ``illumcli.brdf("ward")``.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from illumcli.brdf import views
 from illumcli.brdf.outputs import write_files
 from illumcli.brdf.plot import DEFAULT_VIEWS, PLOT, VIEWS, Plot
 from illumcli.brdf.views import Counted, Look
+from illumcli.callable_package import make_callable
 from illumcli.errors import InputError
 from illumcli.files.outputs import refuse_suffix, refuse_unwritable
 from illumcli.images.drawings import read_numbers
@@ -29,6 +33,7 @@ from illumcli.schema.messages import suggestion
 __all__ = ["DEFAULT_VIEWS", "PLOT", "VIEWS", "Plot", "described", "draw_brdfs", "slices_table", "write_merl"]
 
 PACKAGE = "illumcli.models"
+make_callable(__name__, "illumcli.api.brdfs")
 
 
 def draw_brdfs(
@@ -66,16 +71,29 @@ def draw_brdfs(
     OutputError
         A different file exists and `force` is not given.
     """
-    # Refuse outputs that cannot be written before anything is computed.
-    if output is not None:
-        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg", ".pdf")
-    if table is not None:
-        refuse_suffix(table, "a table", ".csv")
-    for path in (table, output):
-        if path is not None:
-            refuse_unwritable(path)
+    _refuse_outputs(output, table)
+    models = looks(names, overrides, plot.labels)
+    return (*draw_looks(models, output, table, plot, force), notes(models))
 
-    models = _counted(_labelled(_prepared(described(names, overrides)), plot.labels))
+
+def looks(
+    names: Sequence[str], overrides: Sequence[str] = (), labels: Sequence[str] = ()
+) -> dict[str, Counted]:
+    """The models `names` by their titles, ready to be evaluated.
+
+    Raises
+    ------
+    InputError
+        As `draw_brdfs`.
+    """
+    return _counted(_labelled(_prepared(described(names, overrides)), labels))
+
+
+def draw_looks(
+    models: Mapping[str, Counted], output: Path | None, table: Path | None, plot: Plot, force: bool
+) -> tuple[list[Path], list[Path]]:
+    """Draw models side by side: the files, and those that are kept, as `draw_brdfs`."""
+    _refuse_outputs(output, table)
     files: dict[Path, bytes] = {}
     if table is not None:
         files[table] = slices_table(models, plot).encode()
@@ -83,7 +101,18 @@ def draw_brdfs(
         from illumcli.brdf.figure import figure_file
 
         files[output] = figure_file(models, plot, output.suffix.lower().removeprefix("."))
-    return list(files), write_files(files, force), _notes(models)
+    return list(files), write_files(files, force)
+
+
+def _refuse_outputs(output: Path | None, table: Path | None) -> None:
+    """Refuse outputs that cannot be written before anything is computed."""
+    if output is not None:
+        refuse_suffix(output, "a picture of BRDFs", ".png", ".svg", ".pdf")
+    if table is not None:
+        refuse_suffix(table, "a table", ".csv")
+    for path in (table, output):
+        if path is not None:
+            refuse_unwritable(path)
 
 
 def _prepared(models: Mapping[str, IlluminationModel]) -> dict[str, IlluminationModel]:
@@ -107,7 +136,7 @@ def _counted(models: Mapping[str, IlluminationModel]) -> dict[str, Counted]:
     return {title: Counted(model, Counter()) for title, model in models.items()}
 
 
-def _notes(models: Mapping[str, Counted]) -> list[str]:
+def notes(models: Mapping[str, Counted]) -> list[str]:
     """A line for each model of which something is drawn as 0."""
     return [
         f"{title}: {each.mended.total()} values were negative or not finite, and are 0; "
@@ -136,25 +165,35 @@ def write_merl(
     OutputError
         A different file exists and `force` is not given.
     """
+    _refuse_table(path)
+    return write_merl_of(looks(names, overrides), path, force)
+
+
+def _refuse_table(path: Path) -> None:
+    refuse_suffix(path, "a MERL table", ".binary")
+    refuse_unwritable(path)
+
+
+def write_merl_of(
+    models: Mapping[str, Counted], path: Path, force: bool = False
+) -> tuple[list[Path], list[str]]:
+    """Write one model as a MERL table, as `write_merl`."""
     from illumcli.brdf.merl_table import merl_table
     from illumcli.measured_files import merl
 
-    refuse_suffix(path, "a MERL table", ".binary")
-    refuse_unwritable(path)
-    models = _prepared(described(names, overrides))
+    _refuse_table(path)
     if len(models) != 1:
         raise InputError(f"{path}: a MERL table holds one model, and {len(models)} are named; name one")
-    ((title, model),) = models.items()
-    if model.has_grain():
+    ((title, look),) = models.items()
+    if look.model.has_grain():
         raise InputError(
             f"{path}: {title} is anisotropic with these parameters, and a MERL table is isotropic; "
             "choose parameters without a grain, or another model"
         )
-    counted = _counted(models)
-    table = merl_table(counted[title])
+    table = merl_table(look)
     kept = write_files({path: merl.encode(table.values)}, force)
     fact = f"{title} changes if light and eye are exchanged; {path} holds the mean of both"
-    return kept, [*([] if table.is_reciprocal else [fact]), *_notes(counted)]
+    return kept, [*([] if table.is_reciprocal else [fact]), *notes(models)]
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:

@@ -16,6 +16,11 @@ PER_MODEL = 3.1
 """Width of a model's column where none is given [inches]."""
 
 
+def in_order(views: Sequence[str]) -> tuple[str, ...]:
+    """The views from the top of a drawing; `all` is every one."""
+    return tuple(view for view in VIEWS if view in views or "all" in views)
+
+
 class Plot(Value):
     """The views of a drawing, the quantities on their axes, and its size."""
 

@@ -25,10 +25,9 @@ Examples:
 
 
 def _plot(options: dict[str, Any]) -> Plot:
-    from illumcli.brdf import VIEWS, Plot
+    from illumcli.brdf.plot import Plot, in_order
 
-    chosen = options["views"]
-    options["views"] = [view for view in VIEWS if view in chosen or "all" in chosen]
+    options["views"] = in_order(options["views"])
     return taken(Plot, options)
 
 

@@ -159,7 +159,7 @@ def test_errors_name_the_scene_and_all_faults():
 @pytest.mark.parametrize("scene", [3, None, [SCENE], b"scene.yaml"])
 def test_what_is_no_scene_is_refused(scene):
     for function in (illumcli.render, illumcli.load, illumcli.bake):
-        with pytest.raises(illumcli.IllumError, match=r"scene: must be the path of .*, is of type"):
+        with pytest.raises(illumcli.IllumError, match=r"scene: must be a path, .*, is of type"):
             function(scene)
 
 

@@ -96,8 +96,8 @@ def test_models_are_names_mappings_and_descriptions():
 def test_saved_figures_and_tables_are_those_of_the_command(illum, tmp_path):
     import illumcli
 
-    drawn = illumcli.brdf(["lambert", "ward"], {"alpha_x": 0.2}, views=["sphere", "polar"], angles=[30])
-    words = ["brdf", "lambert", "ward", "-D", "alpha_x=0.2", "--view", "polar", "--view", "sphere"]
+    drawn = illumcli.brdf(["lambert", "ward"], {"alpha_x": 0.2}, views=["cartesian", "polar"], angles=[30])
+    words = ["brdf", "lambert", "ward", "-D", "alpha_x=0.2", "--view", "polar", "--view", "cartesian"]
     assert illum(*words, "--angle", 30, "-o", "cli.png", "--csv", "cli.csv").returncode == 0
     for suffix in ("png", "csv"):
         saved = drawn.save(tmp_path / f"api.{suffix}")

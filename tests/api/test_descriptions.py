@@ -94,7 +94,7 @@ illum.Film(widht=3)
 illum.Film(width="3")
 illum.render(scene, layer="depth")
 Phong(shininess=3)
-illum.bake(3, sampels=3)
+illum.bake("m.obj", sampels=3)
 """
 TOLD = {
     11: '"int"',

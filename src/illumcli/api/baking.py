@@ -11,7 +11,6 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.api.meshes import is_mesh, write_mesh
 from illumcli.api.scenes import AnyScene, file_of, named_scene, without_folder
 from illumcli.progress import Progress, no_progress
 from illumcli.records import Record
@@ -68,15 +67,8 @@ class Baking(Record):
         return self.channels["standard_error"]
 
 
-def _file_of(mesh: Any, folder: Path) -> Path:
-    """The file of a mesh or scene; written to `folder` unless it is one."""
-    if is_mesh(mesh):
-        return write_mesh(mesh, folder)
-    return file_of(mesh, folder)
-
-
 def bake(
-    mesh: AnyScene | Any,
+    mesh: AnyScene,
     outputs: Sequence[str | os.PathLike[str]] = (),
     *,
     force: bool = False,
@@ -117,7 +109,7 @@ def bake(
     given |= {name: tuple(given[name]) for name in ("occluders", "what") if name in given}
     with tempfile.TemporaryDirectory(prefix="illum-") as folder:
         own = Path(folder)
-        path = _file_of(mesh, own)
+        path = file_of(mesh, own)
         values, files = own / "values.npz", tuple(map(Path, outputs))
         settings = BakeSettings(**given)
         with named_scene(own):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,18 @@ from illumcli.schema.messages import suggestion
 
 PARTS = ("vertices", "faces", "normals", "uv")
 PROPERTIES = {"vertices": ("x", "y", "z"), "normals": ("nx", "ny", "nz"), "uv": ("u", "v")}
+
+
+class MeshLike(Protocol):
+    """A mesh of some other library."""
+
+    @property
+    def vertices(self) -> Any:
+        """(V, 3) numbers."""
+
+    @property
+    def faces(self) -> Any:
+        """(F, K) numbers of vertices, from 0."""
 
 
 def is_mesh(value: Any) -> bool:

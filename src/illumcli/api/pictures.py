@@ -17,6 +17,7 @@ from illumcli.commands.held_images import HeldImage
 from illumcli.commands.image_store import ImageFiles
 from illumcli.commands.targets import image_set
 from illumcli.film.develop import Target
+from illumcli.images.format import RESERVED
 from illumcli.records import Record
 from illumcli.schema.messages import suggestion
 
@@ -32,7 +33,8 @@ class Picture(Mapping[str, NDArray[Any]]):
     A notebook shows its first layer.
     """
 
-    def __init__(self, image: HeldImage) -> None:
+    def __init__(self, image: HeldImage, audited: str | None) -> None:
+        self._audited = audited  # the layer whose error was measured
         self._layers = image.layers()
         # Not the pixels, which are the layers once more, nor those of other renders.
         work = replace(image.work, images=ImageFiles())
@@ -78,8 +80,12 @@ class Picture(Mapping[str, NDArray[Any]]):
     def write(self, target: Target) -> None:
         """Write the file of an image set with its pixels."""
         image = self._image
-        with ImageFiles().open(image.work, target, image.space, image.texts) as file:
+        texts = image.texts if self._audited in {layer.name for layer in target.layers} else {}
+        room = dict.fromkeys(texts, RESERVED)
+        with ImageFiles().open(image.work, target, image.space, room) as file:
             file.write_band(0, image.work.development.encoded(target, self._layers, (0, 0), image.space))
+            for name, text in texts.items():
+                file.set_text(name, text)
 
     def _repr_png_(self) -> bytes:
         layer = self._image.target.layers[0]
@@ -105,8 +111,11 @@ class Rendering(Record):
     @classmethod
     def of(cls, images: Sequence[HeldImage], report: dict[str, Any]) -> Rendering:
         """The rendering of some images."""
-        pictures = {image.target.view.name: Picture(image) for image in images}
-        return cls(pictures, report, images[0].work.job.frame)
+        names = [image.target.view.name for image in images]
+        audited = [report["audited_error"].get(name, {}).get("layer") for name in names]
+        pictures = dict(zip(names, map(Picture, images, audited), strict=True))
+        frame = images[0].work.job.frame
+        return cls(pictures, report if frame is None else {"frame": frame, **report}, frame)
 
     def __repr__(self) -> str:
         seconds, rays = self.report["total_seconds"], sum(self.report["rays"].values())

@@ -15,10 +15,15 @@ from illumcli.api.pictures import Rendering
 from illumcli.api.scenes import AnyScene, Overrides, file_of, named_scene, override_texts, without_folder
 from illumcli.commands.held_images import HeldImages
 from illumcli.commands.options import RenderJob, RenderOptions
+from illumcli.commands.render_jobs import overrides_at
 from illumcli.commands.unit import Worker
 from illumcli.commands.unused import unused_keys
+from illumcli.commands.work import Work
+from illumcli.errors import InputError
 from illumcli.progress import Progress, no_progress
-from illumcli.scene.frames import frame_numbers
+from illumcli.render_graph.limits import refuse_memory
+from illumcli.scene.frames import FRAMES_PER_SECOND, frame_numbers
+from illumcli.scene.load import read_frames
 
 
 class Options(TypedDict, total=False):
@@ -46,9 +51,10 @@ class LoadedScene:
 
     Parameters
     ----------
-    scene : path, mapping or Scene
-        A scene or mesh file; or the keys of a scene, in which a mesh may be a mapping with arrays `vertices`
-        and `faces`, or an object that has both, such as trimesh's. Its paths start in the current folder.
+    scene : path, mapping, Scene or mesh
+        A scene or mesh file; or the keys of a scene, whose paths start in the current folder. A mesh, here
+        or in a scene, is a mapping with arrays `vertices` and `faces`, or an object that has both, such as
+        trimesh's.
     """
 
     def __init__(self, scene: AnyScene) -> None:
@@ -66,24 +72,66 @@ class LoadedScene:
     ) -> Rendering:
         """The pictures of all cameras, with overrides, at a frame; by default the scene's first.
 
+        At a frame, the texts of overrides may be formulas of `frame` and `time`, as those of `-D`.
+
         Raises
         ------
         IllumError
             What ``illum render`` would say.
         """
-        given: dict[str, Any] = dict(options)
-        progress = given.pop("progress", no_progress)
+        progress = options.get("progress", no_progress)
+        with self._lock, named_scene(self._folder):
+            return self._rendered(self._prepared(overrides, frame, options), progress)
+
+    def variants(self, overrides: Sequence[Overrides], **options: Unpack[Options]) -> list[Rendering]:
+        """The pictures with each of several overrides; faults of all are found before the first ray.
+
+        Raises
+        ------
+        IllumError
+            What `render` would say of each.
+        """
+        progress = options.get("progress", no_progress)
+        with self._lock, named_scene(self._folder):
+            works: list[Work] = []
+            problems: list[str] = []
+            for each in overrides:
+                try:
+                    works.append(self._prepared(each, None, options))
+                except InputError as error:
+                    problems += error.problems
+            if problems:
+                raise InputError(dict.fromkeys(problems))
+            refuse_too_many(works)
+            return [self._rendered(work, progress) for work in works]
+
+    def _prepared(self, overrides: Overrides, frame: int | None, options: Options) -> Work:
+        """What is to be rendered; no ray is cast."""
+        given: dict[str, Any] = {name: each for name, each in options.items() if name != "progress"}
         layers = given.pop("layers", ())
         given["only"] = (layers,) if isinstance(layers, str) else tuple(layers)
-        with self._lock, named_scene(self._folder):
-            texts = override_texts(overrides, self._folder)
-            chosen = RenderOptions(overrides=texts, pattern="{camera}.exr", force=True, **given)
-            work = self._worker.prepare(RenderJob(self.path, chosen, frame))
-            self._images.images.clear()
-            _, report = self._worker.run(work, progress)
-            report = replace(report, warnings=(*report.warnings, *unused_keys(work), *self._worker.finish()))
-            facts = without_folder(replace(report, written=(), kept=()).as_data(), self._folder)
-            return Rendering.of(self._images.images, facts)
+        texts = override_texts(overrides, self._folder)
+        if frame is not None:
+            frames = read_frames(self.path, texts, self._worker.shared(self.path).text)
+            texts = overrides_at(texts, frame, frames.fps if frames else FRAMES_PER_SECOND)
+        chosen = RenderOptions(overrides=texts, pattern="{camera}.exr", force=True, **given)
+        return self._worker.prepare(RenderJob(self.path, chosen, frame))
+
+    def _rendered(self, work: Work, progress: Progress) -> Rendering:
+        self._images.images.clear()
+        _, report = self._worker.run(work, progress)
+        report = replace(report, warnings=(*report.warnings, *unused_keys(work), *self._worker.finish()))
+        facts = without_folder(replace(report, written=(), kept=()).as_data(), self._folder)
+        return Rendering.of(self._images.images, facts)
+
+
+def refuse_too_many(works: Sequence[Work]) -> None:
+    """Raise LimitError if memory cannot hold the pictures of all works at once."""
+    for work in works[:1]:
+        for target in work.targets:
+            values = len(work.development.channels(target))
+            rows = target.height * len(works)
+            refuse_memory(rows, target.view.width, values, {}, f"{len(works)} variants")
 
 
 def load(scene: AnyScene) -> LoadedScene:

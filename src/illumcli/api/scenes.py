@@ -12,15 +12,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from illumcli.api.meshes import is_mesh, write_mesh
+from illumcli.api.meshes import MeshLike, is_mesh, write_mesh
 from illumcli.errors import InputError
 from illumcli.scene.access import is_path
 from illumcli.scene.spec import Scene
 from illumcli.schema.annotations import is_tag
 from illumcli.schema.description import Description
 
-AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene"
-"""Path of a scene or mesh file, or a scene as a mapping with the keys of the YAML, or as a description."""
+AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene | MeshLike"
+"""Path of a scene or mesh file; a scene as a mapping with the keys of the YAML or a description; a mesh."""
 Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str] | str"
 """Values by path, ``{"materials.clay.sigma": 0.3}``, or `PATH=VALUE` as ``illum render -D`` takes them."""
 
@@ -41,17 +41,19 @@ def written(scene: Mapping[str, Any] | Scene, folder: Path) -> Path:
 
 
 def file_of(scene: AnyScene, folder: Path) -> Path:
-    """The file of a scene; a mapping or description is written to `folder`.
+    """The file of a scene or mesh; a mapping, description or mesh that is no file is written to `folder`.
 
     Raises
     ------
     InputError
         Something else, or a value that no scene can have.
     """
+    if not isinstance(scene, Scene) and is_mesh(scene):
+        return write_mesh(scene, folder)
     if isinstance(scene, Mapping | Scene):
         return written(scene, folder)
     if not isinstance(scene, str | os.PathLike):
-        kinds = "the path of a scene or mesh file, a mapping with the keys of a scene, or an illumcli.Scene"
+        kinds = "a path, a mapping with the keys of a scene or with a mesh's arrays, or an illumcli.Scene"
         raise InputError(f"scene: must be {kinds}, is of type {type(scene).__name__}")
     return Path(os.fspath(scene))
 

@@ -9,6 +9,7 @@ from typing import Any, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.api.html_tables import html_table
 from illumcli.api.pictures import Rendering
 from illumcli.api.render import LoadedScene, Options
 from illumcli.api.scenes import AnyScene
@@ -30,6 +31,9 @@ class Sweep(Sequence[dict[str, Any]]):
 
     def __repr__(self) -> str:
         return f"<sweep of {len(self)} variants: {', '.join(self._records[0]) if self else ''}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(self._records)
 
     @overload
     def __getitem__(self, index: int) -> dict[str, Any]: ...
@@ -78,7 +82,7 @@ def sweep(
     ------
     InputError
         Values that are no sequence, or of different lengths and to go `together`; a `reference` that there is
-        not, or of another size; a fault of the scene with some value.
+        not, or of another size; faults of the scene with any of the values, before the first ray.
     """
     values = {path: _several(path, each) for path, each in values.items()}
     lengths = {path: len(each) for path, each in values.items()}
@@ -92,7 +96,7 @@ def sweep(
 
     # Render; buffers that no value touches are computed once.
     loaded = LoadedScene(scene)
-    renderings = [loaded.render(variant, **options) for variant in variants]
+    renderings = loaded.variants(variants, **options)
 
     # Measure.
     against = _first_layer(renderings[reference]) if isinstance(reference, int) else reference

@@ -51,7 +51,7 @@ class RenderJobs:
         elif len(numbers) > MAX_FRAMES:
             raise InputError(f"{len(numbers)} frames are more than {MAX_FRAMES}; render them in parts")
         for number in numbers or ():
-            overrides = _at_frame(options.overrides, number, fps)
+            overrides = overrides_at(options.overrides, number, fps)
             yield RenderJob(scene, replace(options, overrides=overrides), number)
 
     def unit(self, number: int) -> RenderJob:
@@ -93,7 +93,7 @@ class RenderJobs:
         return self._unused.pop(scene, [])
 
 
-def _at_frame(overrides: Sequence[str], frame: int, fps: float) -> tuple[str, ...]:
+def overrides_at(overrides: Sequence[str], frame: int, fps: float) -> tuple[str, ...]:
     """Overrides with the values of their formulas of `frame` and `time`."""
     if not overrides:
         return ()

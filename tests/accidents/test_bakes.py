@@ -254,18 +254,18 @@ def ao_bake(mesh, out, *words):
 def test_killed_bakes_leave_the_whole_file_or_none_and_at_last_the_same_bytes(tmp_path, count):
     mesh, out = sheet(tmp_path / "mesh.obj", 120), tmp_path / "out.npz"
     start = time.monotonic()
-    assert ao_bake(mesh, tmp_path / "whole.npz", "--samples", "512") == (0, "")
+    assert ao_bake(mesh, tmp_path / "whole.npz", "--samples", "256") == (0, "")
     seconds = time.monotonic() - start
     expected = (tmp_path / "whole.npz").read_bytes()
     draw = random.Random(5)
     for _ in range(count):
-        command = [sys.executable, "-m", "illumcli", "ao-bake", mesh, "-o", out, "--samples", "512", "-q"]
+        command = [sys.executable, "-m", "illumcli", "ao-bake", mesh, "-o", out, "--samples", "256", "-q"]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
             time.sleep(draw.uniform(0.4, 1.05) * seconds)
             process.send_signal(signal.SIGKILL)
         if out.exists():
             assert out.read_bytes() == expected
             out.unlink()
-    assert ao_bake(mesh, out, "--samples", "512") == (0, "")
+    assert ao_bake(mesh, out, "--samples", "256") == (0, "")
     assert out.read_bytes() == expected
     assert hidden(tmp_path) == []

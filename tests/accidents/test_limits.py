@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import lzma
 import os
 import re
 import struct
-import sys
+import zlib
 from types import SimpleNamespace
 
 import pytest
@@ -25,20 +26,33 @@ TOO_LARGE = {
 
 # by way of a small process: a child begins with the memory of its parent
 MEASURED = """
-import resource, subprocess, sys
-words = [sys.argv[1], "-m", "illumcli", "render", "s.yaml"]
-done = subprocess.run(words, capture_output=True, text=True)
-print(done.returncode, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, done.stderr, sep="\\n", end="")
+import json, os, resource, subprocess, sys
+found = []
+for words in json.loads(sys.argv[1]):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "illumcli", *words],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (5 << 30,) * 2),
+    )
+    told = process.stderr.read()
+    _, status, used = os.wait4(process.pid, 0)
+    found.append((os.waitstatus_to_exitcode(status), used.ru_maxrss, told))
+print(json.dumps(found))
 """
+
+
+def measured(python, folder, commands):
+    """Exit code, peak memory [KiB] and stderr of each command, which has 5 GiB of addresses."""
+    return json.loads(python(MEASURED, json.dumps(commands), cwd=folder))
 
 
 @pytest.mark.parametrize("what", TOO_LARGE)
 def test_too_large_is_exit_4_in_one_line_with_little_memory(python, tmp_path, what):
     (tmp_path / "s.yaml").write_text(f"version: 1\n{TOO_LARGE[what]}\n")
-    code, kilobytes, *said = python(MEASURED, sys.executable, cwd=tmp_path).splitlines()
-    assert code == "4", said
-    assert len(said) == 1
-    assert int(kilobytes) < 200 * 1024
+    ((code, kilobytes, told),) = measured(python, tmp_path, [["render", "s.yaml"]])
+    assert code == 4, told
+    assert len(told.splitlines()) == 1
+    assert kilobytes < 200 * 1024
     assert os.listdir(tmp_path) == ["s.yaml"]
 
 
@@ -67,11 +81,10 @@ def test_what_the_machine_does_not_say_is_no_limit(monkeypatch):
     assert memory.in_words(1500 * 2**40) == "1.5e+03 TiB"
 
 
-def bombs(folder):
-    """Small files that need more memory than machines have, and the arguments of commands that read them."""
-    import zlib
-
-    from illumcli.memory import free_memory
+@pytest.fixture(scope="module")
+def bombs(tmp_path_factory):
+    """Folder of small files that need more memory than machines have."""
+    folder = tmp_path_factory.mktemp("bombs")
 
     # a PNG of 65,535 x 65,535 black pixels, one bit each: 64 times the same packed rows
     def chunk(kind, data):
@@ -86,7 +99,7 @@ def bombs(folder):
     parts = chunk(b"IHDR", header) + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
     (folder / "bomb.png").write_bytes(b"\x89PNG\r\n\x1a\n" + parts)
     # meshes by the count of their triangles: so many spheres as the machine cannot hold
-    count = 3 + (free_memory() or 0) // (640 * 2 * 4096 * 2048)
+    count = 3 + (memory.free_memory() or 0) // (640 * 2 * 4096 * 2048)
     sphere = "{mesh: {shape: sphere, segments: 4096, rings: 2048}}"
     start = "version: 1\nambient: 1\nfilm: {width: 8, height: 8, samples: 1}\n"
     texture = "{model: lambert, diffuse: {texture: bomb.png}}"
@@ -106,27 +119,25 @@ def bombs(folder):
     with lzma.open(folder / "bomb.json.xz", "wb") as file:
         for _ in range(257):
             file.write(b" " * (1 << 20))
-    return [
-        ["render", "texture.yaml"], ["render", "spheres.yaml"], ["render", "mesh.obj"],
-        ["check", "texture.yaml"], ["check", "spheres.yaml"], ["plan", "texture.yaml"],
-        ["check", "mesh.obj"], ["plan", "mesh.obj"],
-        ["plan", "spheres.yaml"], ["sweep", "spheres.yaml", "-D", "seed=1,2"],
-        ["ao-bake", "spheres.yaml", "-o", "x.npz"], ["compare", "bomb.png", "bomb.png"],
-        ["verify", "bomb.json.xz"], ["converge", "wide.yaml", "--width", "65536"],
-        ["converge", "texture.yaml"],
-    ]  # fmt: skip
+    return folder
 
 
-def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(python, tmp_path):
-    words = bombs(tmp_path)
-    script = MEASURED.replace('"render", "s.yaml"]', "*sys.argv[2:]]").replace(
-        "text=True)", "text=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (5 << 30,) * 2))"
-    )
-    for each in words:
-        code, kilobytes, *said = python(script, sys.executable, *each, cwd=tmp_path).splitlines()
-        assert code == "4", (each, said)
-        assert re.search("takes about|MiB of text", " ".join(said)), (each, said)
-        assert int(kilobytes) < 500 * 1024, each
+BOMBED = [
+    ["render", "texture.yaml"], ["render", "spheres.yaml"], ["render", "mesh.obj"],
+    ["check", "texture.yaml"], ["check", "spheres.yaml"], ["plan", "texture.yaml"],
+    ["check", "mesh.obj"], ["plan", "mesh.obj"],
+    ["plan", "spheres.yaml"], ["sweep", "spheres.yaml", "-D", "seed=1,2"],
+    ["ao-bake", "spheres.yaml", "-o", "x.npz"], ["compare", "bomb.png", "bomb.png"],
+    ["verify", "bomb.json.xz"], ["converge", "wide.yaml", "--width", "65536"],
+    ["converge", "texture.yaml"],
+]  # fmt: skip
+
+
+def test_small_files_that_stand_for_much_memory_are_exit_4_before_it_is_taken(python, bombs):
+    for words, (code, kilobytes, told) in zip(BOMBED, measured(python, bombs, BOMBED), strict=True):
+        assert code == 4, (words, told)
+        assert re.search("takes about|MiB of text", told), (words, told)
+        assert kilobytes < 500 * 1024, words
 
 
 def test_sheets_that_no_memory_holds_are_told_before_anything_is_rendered(tmp_path, monkeypatch):
@@ -162,15 +173,15 @@ def plan_of(path):
     return plan_table(ScenePlan(path, options=RenderOptions(cache=False)).parts())
 
 
-def test_plans_show_what_shapes_and_textures_take(tmp_path):
-    bombs(tmp_path)
-    assert "shapes " in plan_of(tmp_path / "spheres.yaml")
-    assert "textures 4,095.9 MiB" in plan_of(tmp_path / "texture.yaml")
-    assert "textures" not in plan_of(tmp_path / "unused.yaml")
+def test_plans_show_what_shapes_and_textures_take(bombs):
+    assert "shapes " in plan_of(bombs / "spheres.yaml")
+    assert "textures 4,095.9 MiB" in plan_of(bombs / "texture.yaml")
+    assert "textures" not in plan_of(bombs / "unused.yaml")
 
 
-def test_plans_show_what_images_of_mesh_files_take(tmp_path):
-    bombs(tmp_path)
+def test_plans_show_what_images_of_mesh_files_take(bombs, tmp_path):
+    for name in ("bomb.png", "bomb.mtl", "mesh.obj"):
+        (tmp_path / name).hardlink_to(bombs / name)
     (tmp_path / "mesh.gltf").write_text('{"asset": {"version": "2.0"}, "images": [{"uri": "bomb.png"}]}')
     start = "version: 1\nambient: 1\n"
     for mesh in ("mesh.obj", "mesh.gltf"):

@@ -44,6 +44,7 @@ HOMES = {
         "visibility/falloffs/",
         "commands/schema_generator.py",
         "brdf/",
+        "viewer/",
     ),
     "pydantic_core": ("nowhere: it is no dependency of ours",),
     "embreex": ("rays/",),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.scene.blame import flow
 from illumcli.scene.load import load
 
 SCENE = """version: 1
@@ -112,17 +111,3 @@ def test_a_model_that_is_like_none_hides_nothing_that_no_model_takes(faults):
     assert [line.partition(": ")[2].partition(":")[0] for line in found] == [
         "materials.clay.model", "materials.clay.specular"
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        ({"a": [1, 0.5, True, None], "b": {"c": "x y"}}, '{a: [1, 0.5, true, null], b: {c: "x y"}}'),
-        ("null", '"null"'),
-        ("plain/name.obj", "plain/name.obj"),
-        ("é", '"é"'),
-        ("3", '"3"'),
-    ],
-)
-def test_values_on_one_line(value, text):
-    assert flow(value) == text

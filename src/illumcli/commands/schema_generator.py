@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
+from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 
 from illumcli.layers import LAYERS
+from illumcli.schema.annotations import field_annotation
 from illumcli.schema.description import Description
 from illumcli.schema.docs import choices, field_docs, summary
 from illumcli.shading.rates import RATES
@@ -20,6 +23,22 @@ MAY_BE_LEFT_OUT = ("projection",)  # of the keys that tag a mapping
 def schema_of(cls: type[Description]) -> dict[str, Any]:
     """The schema of one description; its parts are under `$defs`."""
     return cls.model_json_schema(schema_generator=_Schema)
+
+
+@cache
+def schema_of_field(cls: type[Description], name: str) -> Mapping[str, Any]:
+    """The schema of one field, with its text and default, without the schemas of its class and the others.
+
+    There is no default if the field is required, or holds a description with all its defaults.
+    """
+    field = cls.model_fields[name]
+    adapter: TypeAdapter[Any] = TypeAdapter(field_annotation(cls, name))
+    part = adapter.json_schema(schema_generator=_Schema)
+    if text := field_docs(cls).get(name):
+        _describe(part, text)
+    if not field.is_required() and field.default != {}:
+        part["default"] = list(field.default) if isinstance(field.default, tuple) else field.default
+    return part
 
 
 TABLES: tuple[Mapping[str, str], ...] = (
@@ -44,8 +63,10 @@ def _inner(part: dict[str, Any]) -> list[dict[str, Any]]:
     return [part, part.get("items", {}), *part.get("anyOf", ())]
 
 
-def _describe_choices(part: dict[str, Any], text: str) -> None:
-    """Put the sentence about each choice beside the choices, where editors show it."""
+def _describe(part: dict[str, Any], text: str) -> None:
+    """Put a field's text into its schema, and the sentence about each choice beside the choices, where
+    editors show it."""
+    part["description"] = text = _with_rows(part, text)
     for inner in _inner(part):
         if "enum" in inner and (sentences := choices(text, inner["enum"])):
             inner["enumDescriptions"] = sentences
@@ -65,8 +86,7 @@ class _Schema(GenerateJsonSchema):
         properties, required = generated["properties"], set(generated.get("required", ()))
         for name, part in properties.items():
             if text := docs.get(name) or ("const" in part and summary(cls)):
-                part["description"] = text = _with_rows(part, text)
-                _describe_choices(part, text)
+                _describe(part, text)
             if part.get("default") == {}:  # a description with all its defaults
                 del part["default"]
             if isinstance(part.get("const"), str) and name not in MAY_BE_LEFT_OUT:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from illumcli.fitting.parameters import Doubles, Parameters
 from illumcli.models._base import IlluminationModel
+from illumcli.scene.yaml_text import flow
 from illumcli.schema.annotations import is_tag
 from illumcli.schema.description import Description
 from illumcli.schema.fields import NAME
@@ -73,19 +73,8 @@ def materials_text(
         lines.append(f"  {name}:")
         if undetermined[name]:
             lines.append(f"    # not determined by the measurement: {', '.join(undetermined[name])}")
-        lines += [f"    {key}: {_flow(value)}" for key, value in material.items()]
+        lines += [f"    {key}: {flow(value)}" for key, value in material.items()]
     return "\n".join(lines)
-
-
-def _flow(value: Any) -> str:
-    """A value on one line of YAML."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_flow(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_flow, value)) + "]"
-    if isinstance(value, str) and re.fullmatch(NAME, value) and value not in ("true", "false", "null"):
-        return value
-    return json.dumps(value)
 
 
 def name_of(stem: str) -> str:

@@ -11,7 +11,6 @@ from pydantic import ValidationError
 
 from illumcli.records import Value
 from illumcli.scene.access import file_inside, is_path
-from illumcli.scene.blame import flow
 from illumcli.scene.curves import CURVES
 from illumcli.scene.curves._base import Curve
 from illumcli.scene.extend import CHOICES
@@ -21,6 +20,7 @@ from illumcli.scene.problems import problem_at
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.source import Node, Problem
 from illumcli.scene.source import Path as Steps
+from illumcli.scene.yaml_text import flow
 from illumcli.schema.families import member
 from illumcli.schema.messages import short
 

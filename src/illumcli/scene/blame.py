@@ -6,16 +6,13 @@ faults, its trees before each override are validated, too.
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from illumcli.scene import source
 from illumcli.scene.override import NAMED, Override
 from illumcli.scene.source import Node, Place, Problem
-
-_PLAIN = re.compile(r"[A-Za-z_][\w./-]*")
+from illumcli.scene.yaml_text import flow
 
 
 class PlacedFault(NamedTuple):
@@ -97,14 +94,3 @@ def _unsuited_keys(change: Override, paths: Sequence[source.Path], tree: Node) -
         f"leaves {listed}, which {kept[key]} does not have; replace the whole {kind}, as "
         f"-D '{'.'.join(above)}={flow(kept)}'"
     )
-
-
-def flow(value: Any) -> str:
-    """A value as YAML on one line."""
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{name}: {flow(part)}' for name, part in value.items())}}}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(flow, value))}]"
-    if isinstance(value, str) and _PLAIN.fullmatch(value) and value.lower() not in ("true", "false", "null"):
-        return value
-    return json.dumps(value, ensure_ascii=False)

@@ -55,3 +55,12 @@ def owner_of(description: Description, path: str) -> tuple[Description, str]:
     for step in steps:
         owner = owner[int(step)] if isinstance(owner, tuple) else getattr(owner, step)
     return owner, name
+
+
+def as_json(value: Any) -> Any:
+    """A value of a description as a scene writes it: descriptions without what they leave out."""
+    if isinstance(value, Description):
+        return value.model_dump(mode="json", exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {name: as_json(part) for name, part in value.items()}
+    return [as_json(part) for part in value] if isinstance(value, tuple | list) else value

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import illumcli
+from illumcli.images.reader import read_image
 
 SCENE = """\
 version: 1
@@ -198,3 +199,32 @@ def test_an_interrupt_stops_a_render_and_leaves_nothing(folder):
     assert told.splitlines()[-1] == "stopped True"
     assert sorted(os.listdir()) == ["m.obj", "s.yaml", "tmp"]
     assert os.listdir("tmp") == []
+
+
+def test_a_comparison_has_the_pictures_of_the_command(illum, folder):
+    one, other = (illumcli.render("s.yaml", {"ambient": each}) for each in (0.1, 0.4))
+    for name, rendering in (("a", one), ("b", other)):
+        rendering.save(name + "-{camera}.exr")
+    done = illum("compare", "a-front.exr", "b-front.exr", "--layer", "beauty", "--heat", "heat.png")
+    assert done.returncode == 0, done.stderr
+    by_file = illumcli.compare("a-front.exr", "b-front.exr", "beauty")
+    channels = read_image(folder / "heat.png").channels
+    written = np.stack([channels[name] for name in "RGB"], axis=-1)
+    np.testing.assert_array_equal(np.rint(written * 255), by_file.heat())
+    assert by_file.flip_map("beauty").mean() == pytest.approx(by_file["beauty"]["flip"], rel=1e-5)
+    assert "<td>beauty</td>" in by_file._repr_html_()
+    data = illumcli.compare(one, other, ["obscurance"])
+    with pytest.raises(illumcli.IllumError, match="layer 'obscurance' has no colours"):
+        data.flip_map()
+    with pytest.raises(KeyError, match="no layer 'obscurence'; did you mean"):
+        data.heat("obscurence")
+
+
+def test_a_picture_in_8_bits_is_that_of_the_png(folder):
+    rendering = illumcli.render("s.yaml", frames=[0])[0]
+    rendering.save("{camera}.{layer}.png")
+    for layer in ("beauty", "obscurance"):
+        channels = read_image(folder / f"front.{layer}.png").channels
+        written = np.stack(list(channels.values()), axis=-1)
+        np.testing.assert_array_equal(np.rint(written * 255), rendering.display(layer))
+    np.testing.assert_array_equal(rendering.display(), rendering.display("beauty"))

@@ -18,6 +18,7 @@ from illumcli.commands.image_store import ImageFiles
 from illumcli.commands.targets import image_set
 from illumcli.film.develop import Target
 from illumcli.images.format import RESERVED
+from illumcli.layers import Layer
 from illumcli.records import Record
 from illumcli.schema.messages import suggestion
 
@@ -77,6 +78,21 @@ class Picture(Mapping[str, NDArray[Any]]):
         image = self._image
         return {**metadata(image.work, image.target, image.space), **image.texts}
 
+    def display(self, layer: str | None = None) -> NDArray[np.uint8]:
+        """(H, W, C) a layer in 8 bits, by default the first, as ``illum render`` writes it to a PNG.
+
+        Light is sRGB with the scene's exposure, data are scaled to 0..255; an alpha comes last.
+        """
+        image = self._image
+        chosen = image.target.layers[0].name if layer is None else layer
+        self[chosen]  # the error of another name
+        target = self._png(next(each for each in image.target.layers if each.name == chosen))
+        pixels: NDArray[np.uint8] = image.work.development.encoded(target, self._layers, (0, 0), image.space)
+        return pixels
+
+    def _png(self, layer: Layer, path: Path = Path("picture.png")) -> Target:
+        return replace(self._image.target, path=path, layers=(layer,))
+
     def write(self, target: Target) -> None:
         """Write the file of an image set with its pixels."""
         image = self._image
@@ -88,11 +104,10 @@ class Picture(Mapping[str, NDArray[Any]]):
                 file.set_text(name, text)
 
     def _repr_png_(self) -> bytes:
-        layer = self._image.target.layers[0]
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "picture.png"
-            self.write(replace(self._image.target, path=path, layers=(layer,)))
-            return path.read_bytes()
+            target = self._png(self._image.target.layers[0], Path(folder) / "picture.png")
+            self.write(target)
+            return target.path.read_bytes()
 
 
 class Rendering(Record):
@@ -129,6 +144,10 @@ class Rendering(Record):
 
     def __getitem__(self, layer: str) -> NDArray[Any]:
         return self.picture[layer]
+
+    def display(self, layer: str | None = None) -> NDArray[np.uint8]:
+        """(H, W, C) a layer of the first picture in 8 bits: see `Picture.display`."""
+        return self.picture.display(layer)
 
     def save(self, pattern: str | os.PathLike[str], force: bool = False) -> list[Path]:
         """Write the files of ``illum render -o PATTERN``, with the same bytes. Returns their paths.

@@ -10,9 +10,13 @@ from illumcli import __version__
 from illumcli.cache.fingerprint import digest, file_digest
 from illumcli.files.outputs import is_kept, refresh, refuse_suffix
 from illumcli.film.channels import ChannelType, Metadata
-from illumcli.film.heat import heat
-from illumcli.film.metrics import absolute_difference
-from illumcli.images.comparison import LayerDifference, layer_differences, read_pair, shared_layers, stacked
+from illumcli.images.comparison import (
+    LayerDifference,
+    heat_picture,
+    layer_differences,
+    read_pair,
+    shared_layers,
+)
 from illumcli.images.contents import image_contents
 from illumcli.images.reader import Image
 from illumcli.images.writer import ImageWriter
@@ -101,6 +105,5 @@ def _write_heat(path: Path, a: Image, b: Image, layer: LayerDifference, content:
     scale = layer.heat_scale
     metadata: Metadata = {"illum:layer": layer.name, "illum:heat_scale": scale, "illum:content": content}
     types: dict[str, ChannelType] = dict.fromkeys("RGB", "uint8")
-    largest = absolute_difference(stacked(a, layer.channels), stacked(b, layer.channels)).max(axis=-1)
     with ImageWriter(path, a.width, a.height, types, metadata) as writer:
-        writer.write_band(0, heat(largest, scale))
+        writer.write_band(0, heat_picture(a, b, layer))

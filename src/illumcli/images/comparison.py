@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.film.channels import group_by_layer
-from illumcli.film.metrics import Difference, difference
+from illumcli.film.heat import heat
+from illumcli.film.metrics import Difference, absolute_difference, difference
 from illumcli.images.flip import flip
 from illumcli.images.reader import Image, read_image
 from illumcli.records import Value
@@ -140,6 +141,12 @@ def color_channels(channels: Sequence[str]) -> list[str]:
 def stacked(image: Image, channels: Sequence[str]) -> NDArray[np.float32]:
     """(H, W, C) the values of some channels."""
     return np.stack([image.channels[channel] for channel in channels], axis=-1)
+
+
+def heat_picture(reference: Image, test: Image, layer: LayerDifference) -> NDArray[np.uint8]:
+    """(H, W, 3) sRGB: where a layer differs, by the channel that differs most, brightest at `heat_scale`."""
+    values = (stacked(each, layer.channels) for each in (reference, test))
+    return heat(absolute_difference(*values).max(axis=-1), layer.heat_scale)
 
 
 def _flip(reference: NDArray[np.float32], test: NDArray[np.float32], encoded: bool) -> float | None:

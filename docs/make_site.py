@@ -1,25 +1,35 @@
-"""Builds the site from this folder: python docs/make_site.py [FOLDER], by default build/site.
+"""Builds the site from this folder: python docs/make_site.py [FOLDER] [--draft], by default build/site.
 
-It needs `pip install '.[site]'` and no network. What did not change since the last build is kept.
+It needs `pip install '.[site]'` and no network. What did not change since the last build is kept. A draft,
+for tests, has small pictures.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
 from sphinx.cmd.build import build_main
 
-from sitepages import source
+from sitepages import model_pages, scene_reference, source
+from sitepages.drawing import draw
+from sitepages.examples import Examples
 
 
-def main(folder: Path) -> int:
+def main(folder: Path, draft: bool) -> int:
     """Write the pages that Sphinx reads, and build them; the exit code of Sphinx."""
-    pages = source.hand_written()
-    source.write(folder / "source", pages | source.pictures() | source.linked_files(pages))
+    examples = Examples(source.scenes())
+    pages = source.hand_written() | scene_reference.pages(examples) | model_pages.pages(examples)
+    drawn = draw(model_pages.drawings(), folder / "drawn", draft)
+    source.write(folder / "source", pages | source.pictures() | drawn | source.linked_files(pages))
     words = ["-c", source.DOCS, "-W", "--keep-going", "-q", "-j", "2", "-d", folder / "doctrees"]
     return build_main([str(word) for word in [*words, folder / "source", folder / "html"]])
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1] if len(sys.argv) > 1 else source.ROOT / "build" / "site")))
+    parser = argparse.ArgumentParser(description="Build the site.")
+    parser.add_argument("folder", nargs="?", type=Path, default=source.ROOT / "build" / "site")
+    parser.add_argument("--draft", action="store_true", help="small pictures")
+    given = parser.parse_args()
+    sys.exit(main(given.folder, given.draft))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -9,7 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote, urldefrag, urlsplit
 
+import jsonschema
 import pytest
+import yaml
+
+from illumcli.commands.schema_generator import schema_of
+from illumcli.scene.spec import Scene
+from illumcli.schema.families import members
+from illumcli.schema.sources import FAMILIES, tags
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +25,9 @@ def site(tmp_path_factory) -> Path:
     """The folder of the built site."""
     folder = tmp_path_factory.mktemp("site")
     script = Path(__file__).parents[1] / "docs" / "make_site.py"
-    done = subprocess.run([sys.executable, script, folder], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, script, folder, "--draft"], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert not done.stderr
     return folder / "html"
@@ -80,3 +90,51 @@ class HTMLLoads(HTMLParser):
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         name = {"link": "href", "script": "src", "img": "src", "iframe": "src"}.get(tag)
         self.urls += [value for key, value in attributes if key == name and value]
+
+
+def test_every_model_has_a_page_with_its_formula_and_plots(site):
+    for tag in tags("illumcli.models"):
+        text = (site / "models" / f"{tag}.html").read_text()
+        assert "<math" in text or tag == "formula", tag
+        assert text.count("<img") >= (tag not in ("merl", "rgl")), tag
+
+
+def test_formulas_are_read_as_they_are_meant(root, monkeypatch):
+    monkeypatch.syspath_prepend(str(root / "docs"))
+    from sitepages.formulas import FormulaError, mathml
+
+    def plain(formula: str) -> str:
+        text = re.sub(r"<(/?)(mfrac|msup|msqrt|msub)>", r" \1\2 ", mathml(formula))
+        return " ".join(re.sub(r"<[^>]*>", " ", text).split())
+
+    assert plain("r = kd / pi * n_l") == "r = mfrac msub k d /msub π /mfrac ( n ⋅ l )"
+    assert plain("C = (e + 2) / (8 pi)") == "C = mfrac e + 2 8 π /mfrac"
+    assert plain("x = 28 Rd / (23 pi) (1 - Rs)") == (
+        "x = mfrac 28 msub R d /msub 23 π /mfrac ( 1 − msub R s /msub )"
+    )
+    assert plain("f = tan^2(theta) + n_h**(-e/2)") == (
+        "f = msup tan 2 /msup ( θ ) + msup ( n ⋅ h ) − mfrac e 2 /mfrac /msup"
+    )
+    assert plain("q = <E> / |t x l|,  w = g(a, b)") == "q = mfrac ⟨ E ⟩ | t × l | /mfrac w = g ( a , b )"
+    with pytest.raises(FormulaError):
+        mathml("s = l + v is the vector. It is not of unit length")
+
+
+def test_the_examples_of_keys_are_valid(root, monkeypatch):
+    monkeypatch.syspath_prepend(str(root / "docs"))
+    from sitepages import facts, source
+    from sitepages.examples import Examples
+
+    examples = Examples(source.scenes())
+    for cls in [Scene, *(cls for family in FAMILIES for cls in members(family))]:
+        whole = schema_of(cls)
+        definitions = whole.pop("$defs", {})
+        below = facts.parts_below(
+            {**whole, "$defs": definitions}, lambda title, _: title not in facts.INTERNAL
+        )
+        for part in [facts.part_of(whole), *below.values()]:
+            for fact in facts.facts(part, definitions):
+                text = examples.of(part, fact)
+                valid = {"$defs": definitions, **fact.schema}
+                if not re.search(r"\bcurve:", text):
+                    jsonschema.Draft202012Validator(valid).validate(yaml.safe_load(text))

@@ -40,7 +40,10 @@ def with_links(text: str, path: Path) -> str:
             return match[0]
         if target.is_dir():
             return words
-        return f"[{words}]({place(target.relative_to(ROOT).as_posix())}{anchor})"
+        page = place(target.relative_to(ROOT).as_posix())
+        if page == "models.md" and anchor:
+            page, anchor = f"models/{anchor[1:]}.md", ""
+        return f"[{words}]({page}{anchor})"
 
     return LINK.sub(link, text)
 
@@ -50,6 +53,11 @@ def place(file: str) -> str:
     if file.startswith("docs/"):
         return file.removeprefix("docs/")
     return MOVED.get(file, COPIES + file)
+
+
+def scenes() -> list[Path]:
+    """The scenes of the repository."""
+    return sorted((ROOT / "scenes").glob("*.yaml"))
 
 
 def pictures() -> dict[str, bytes]:

@@ -47,7 +47,7 @@ for dot products, integrals for closed forms): 895 cases of parameters as a scen
 2e-13 at most, and 90 of `generated`, whose tables are made by quadrature, within 1.5e-5. The values of `merl`
 and `rgl` stand in files; the tests compare the lookup with values known beforehand.
 
-![Fifty teapots: a column per model, a row per parameter](gallery.png)
+![Sixty teapots: a column per family of models, a row per parameter](gallery.png)
 
 The columns, from the left: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as
 copper and as plastic; Cook-Torrance's distributions; Ward; Ashikhmin-Shirley; Kajiya-Kay, Poulin-Fournier,

@@ -7,9 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from illumcli.errors import InputError
-from illumcli.scene.load import load, read_text
 from illumcli.viewer.controls import controls
-from illumcli.viewer.edits import after_reset, after_set, overrides_of
+from viewer.window import Window
 
 SCENE = """version: 1
 ambient: [0.3, 0.3, 0.3]
@@ -21,25 +20,6 @@ lights:
   - {light: point, name: key, position: [1, 2, 3], intensity: 5}
   - {light: point, position: [3, 2, 1]}
 """
-
-
-class Window:
-    """A scene with edits, as a session keeps them."""
-
-    def __init__(self, path):
-        self.path, self.text, self.edits = path, read_text(path), {}
-        self.original = self.now = load(path, (), self.text)
-
-    def set(self, path, value):
-        edits = after_set(self.original, self.now, self.edits, path, value)
-        self.now = load(self.path, overrides_of(edits), self.text)
-        self.edits = edits
-        return self.now.scene
-
-    def reset(self, path=None):
-        self.edits = after_reset(self.original, self.now, self.edits, path)
-        self.now = load(self.path, overrides_of(self.edits), self.text)
-        return self.now.scene
 
 
 @pytest.fixture
@@ -132,44 +112,16 @@ def test_all_is_reset_at_once(window):
     assert window.reset() == window.original.scene
 
 
-def value_for(data, control):
-    """A value that the page could set with a control."""
-    match control.kind:
-        case "switch":
-            return data.draw(st.booleans())
-        case "choice":
-            return data.draw(st.sampled_from(control.choices))
-        case "integer":
-            return data.draw(st.integers(int(control.minimum), int(control.maximum)))
-        case "number":
-            return data.draw(st.floats(control.minimum, control.maximum))
-        case "color" | "vector":
-            size = len(control.value or (0, 0, 0))
-            number = st.floats(control.minimum, control.maximum)
-            return data.draw(st.lists(number, min_size=size, max_size=size))
-    return control.value
-
-
-REFUSALS = ("which only its author knows", "near must be below far", "must differ", "zero vector")
-
-
 @settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_random_use_of_the_controls_of_every_scene(root, data):
     window = Window(data.draw(st.sampled_from(sorted((root / "scenes").glob("*.yaml")))))
     for _ in range(6):
-        found = {each.path: each for each in controls(window.original, window.now)}
-        control = found[data.draw(st.sampled_from(sorted(found)))]
-        value = value_for(data, control)
-        try:
-            window.set(control.path, value)
-        except InputError as error:
-            if any(each in str(error) for each in REFUSALS):
-                continue
-            raise
+        control, value = window.use(data)
         now = {each.path: each for each in controls(window.original, window.now)}
-        assert now[control.path].value == value
-        assert now[control.path].changed == (now[control.path].value != now[control.path].original)
-        if data.draw(st.integers(0, 3)) == 0:
-            window.reset(control.path)
+        if control is not None:
+            assert now[control.path].value == value
+            assert now[control.path].changed == (now[control.path].value != now[control.path].original)
+            if data.draw(st.integers(0, 3)) == 0:
+                window.reset(control.path)
     assert window.reset() == window.original.scene

@@ -31,8 +31,6 @@ class SceneReader:
 
     def file(self, path: Path, above: tuple[Path, ...]) -> Node | None:
         """The tree of a scene file, merged with all that it extends; `above` are the files that extend it."""
-        # Read the text.
-        self.files += 1
         try:
             with path.open("rb") as stream:
                 text = stream.read(MAX_BYTES + 1)
@@ -40,8 +38,12 @@ class SceneReader:
             fact = getattr(error, "strerror", None) or str(error)
             self.problems.append(Problem(Place(str(path)), (), f"cannot be read: {fact}"))
             return None
+        return self.text(text, path, above)
 
+    def text(self, text: bytes, path: Path, above: tuple[Path, ...]) -> Node | None:
+        """The same of the text of a file that is, or will be, at `path`."""
         # Parse it, within the limits for all files together.
+        self.files += 1
         tree, problems = source.read(text, str(path))
         self.problems += problems
         if tree is None or not isinstance(tree.value, dict):
@@ -75,7 +77,7 @@ class SceneReader:
             return None
         tree = self.file(path.parent / str(node.value), above)
         folder = os.path.dirname(str(node.value))
-        return _moved(tree, folder) if tree and folder else tree
+        return moved(tree, folder) if tree and folder else tree
 
     def refusal(self, node: Node, path: Path, above: tuple[Path, ...]) -> str | None:
         """Why the file that `path` extends is refused; None if it is not."""
@@ -84,7 +86,7 @@ class SceneReader:
         file = file_inside(node.value, path.parent, self.roots)
         if isinstance(file, str):
             return file
-        if any(file.samefile(each) for each in above):
+        if any(file.samefile(each) for each in above if each.exists()):  # the text may be of a new file
             return f"{node.value} extends itself; remove one extends:"
         if len(above) > MAX_EXTENDS:
             return f"more than {MAX_EXTENDS} files, each extending the next"
@@ -98,7 +100,7 @@ def merged(base: Node, over: Node) -> Node:
     """
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
-    if (kind := _kind(over.value)) and kind != _kind(base.value):
+    if (kind := kind_of(over.value)) and kind != kind_of(base.value):
         return over
     entries = dict(base.value)
     for key, node in over.value.items():
@@ -109,7 +111,7 @@ def merged(base: Node, over: Node) -> Node:
     return replace(over, value=entries)
 
 
-def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
+def kind_of(entries: Mapping[str, Node]) -> dict[str, Any]:
     """The tag of a mapping, from its keys; a mesh or material that is named like a tag is not text."""
     texts = {key: node.value for key, node in entries.items() if isinstance(node.value, str)}
     kind: dict[str, Any] = {key: value for key, value in texts.items() if key in CHOICES}
@@ -118,7 +120,7 @@ def _kind(entries: Mapping[str, Node]) -> dict[str, Any]:
     return kind | {key: True for key in ("file", "texture", "vertex") if key in texts}
 
 
-def _moved(tree: Node, folder: str) -> Node:
+def moved(tree: Node, folder: str) -> Node:
     """The tree with its paths, which are relative to `folder`, made relative to the folder above."""
     for path, node in list(paths_in(tree)):
         tree = _with(tree, path, replace(node, value=os.path.join(folder, str(node.value))))

@@ -86,24 +86,7 @@ def load(
     text = text or read_text(path)
     reader = SceneReader(text.roots)
     changes = [change for text in overrides if (change := parse(text, reader.problems))]
-    settings = [change for change in changes if change.steps[0] == SETTINGS]
-
-    # The tree of the file, or of the studio with the mesh.
-    if is_mesh_file(path):
-        tree = _studio(path, settings, reader)
-    else:
-        tree = text.tree
-        reader.problems += text.problems
-        fact = f"{path} is not a mesh file; change its camera and the transforms of its objects"
-        reader.problems += [Problem(change.value.place, (), fact) for change in settings]
-
-    # Overrides in turn, each with the tree before it, so that a fault can be attributed to one.
-    applied: list[Applied] = []
-    if tree is not None:
-        for change in changes:
-            if change not in settings and (changed := assign(tree, change, reader.problems)):
-                applied.append(Applied(change, tree))
-                tree = changed
+    tree, applied = _changed(path, text, changes, reader)
 
     # Evaluate its curves, and validate the tree.
     surroundings = Surroundings(path.parent, reader.roots, text.tables)
@@ -119,6 +102,40 @@ def load(
     return SceneFile(
         scene, path, path.parent, path.stem, values, now.tree, reader.roots, now.frame, now.varying
     )
+
+
+def written(path: Path, overrides: Sequence[str], text: SceneText) -> Node:
+    """The tree of a valid scene or mesh with overrides as a file would have it: curves are not evaluated."""
+    reader = SceneReader(text.roots)
+    changes = [change for text in overrides if (change := parse(text, reader.problems))]
+    tree, _ = _changed(path, text, changes, reader)
+    if tree is None or reader.problems:
+        raise InputError(problem_lines(reader.problems, overrides))
+    return tree
+
+
+def _changed(
+    path: Path, text: SceneText, changes: Sequence[Override], reader: SceneReader
+) -> tuple[Node | None, list[Applied]]:
+    """The tree of a scene or mesh with changes, and each change with the tree before it."""
+    # The tree of the file, or of the studio with the mesh.
+    settings = [change for change in changes if change.steps[0] == SETTINGS]
+    if is_mesh_file(path):
+        tree = _studio(path, settings, reader)
+    else:
+        tree = text.tree
+        reader.problems += text.problems
+        fact = f"{path} is not a mesh file; change its camera and the transforms of its objects"
+        reader.problems += [Problem(change.value.place, (), fact) for change in settings]
+
+    # Overrides in turn, each with the tree before it, so that a fault can be attributed to one.
+    applied: list[Applied] = []
+    if tree is not None:
+        for change in changes:
+            if change not in settings and (changed := assign(tree, change, reader.problems)):
+                applied.append(Applied(change, tree))
+                tree = changed
+    return tree, applied
 
 
 def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> Node | None:

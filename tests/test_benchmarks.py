@@ -14,6 +14,7 @@ from illumcli.geometry.shapes.torus import Torus
 
 SCRIPTS = {
     "clusters": "same bytes: 8 of 8",
+    "python": "ratio loop, PNGs / illum sweep",
     "startup": "ratio tiny render / six libraries",
     "stages": "beside the job",
     "threads": "what the machine gives",

@@ -8,36 +8,46 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.api.scenes import AnyScene, file_of, named_scene, without_folder
+from illumcli.api.choices import BakeChoices, chosen, plain_number
+from illumcli.api.scenes import AnyScene, Overrides, file_of, named_scene, override_texts, without_folder
+from illumcli.errors import InputError
 from illumcli.progress import Progress, no_progress
 from illumcli.records import Record
+from illumcli.schema.messages import suggestion
 from illumcli.visibility.baked import read_npz
+from illumcli.visibility.channels import whats
 
 
 class BakeKeywords(TypedDict, total=False):
     """How a mesh is baked; each is the option of ``illum ao-bake`` of the same name."""
 
     samples: int
-    """Rays per vertex."""
+    """Rays per vertex, by default 256."""
     target_error: float
+    """RMSE that the rays are chosen for, instead of `samples`."""
     reconstruct: bool
+    """Values of few rays from those around; by default with a `target_error`."""
     falloff: str | Mapping[str, Any]
     """A name, or the keys of `obscurance.falloff` in scenes: ``{"falloff": "exponential", "tau": 2}``."""
     sampler: str
     faces: str
     method: str
-    occluders: Sequence[str]
+    occluders: Sequence[str] | str
     ground: str
-    what: Sequence[str]
+    what: Sequence[str] | str
+    """`ao`, by default, and others of `--what`."""
     color: str
     split: bool
-    texture: tuple[int, int]
+    texture: int | tuple[int, int]
+    """Width and height; one number for both."""
     bits: int
     unwrap: str
     seed: int
+    threads: int
+    strict: bool
+    """True to refuse meshes that need repairs."""
 
 
 class Baking(Record):
@@ -69,8 +79,9 @@ class Baking(Record):
 
 def bake(
     mesh: AnyScene,
-    outputs: Sequence[str | os.PathLike[str]] = (),
+    outputs: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (),
     *,
+    overrides: Overrides = (),
     force: bool = False,
     progress: Progress = no_progress,
     **keywords: Unpack[BakeKeywords],
@@ -82,8 +93,10 @@ def bake(
     mesh : path, mapping, Scene or mesh
         A mesh or scene file, a scene as `load` takes it, or a mesh: a mapping with arrays `vertices` and
         `faces`, or an object that has both, such as trimesh's.
-    outputs : sequence of path
+    outputs : path or sequence of path
         Files as `-o` of ``illum ao-bake`` names them.
+    overrides : mapping or sequence of str
+        Of a scene, as `render` takes them.
     force : bool
         Replace files that differ.
     keywords
@@ -101,20 +114,54 @@ def bake(
     from illumcli.baking.bake import bake_mesh
     from illumcli.baking.settings import BakeOptions, BakeSettings
 
-    given: dict[str, Any] = {
-        name: each.item() if isinstance(each, np.generic) else each for name, each in keywords.items()
-    }
-    if isinstance(falloff := given.get("falloff"), str):
-        given["falloff"] = {"falloff": falloff}
-    given |= {name: tuple(given[name]) for name in ("occluders", "what") if name in given}
+    size = plain_number(keywords.get("texture"))
+    both = {"texture": (size, size)} if isinstance(size, int) else {}
+    given = chosen(BakeChoices, {**keywords, **both}, ("occluders", "what"))
+    settings = BakeSettings(**_settings(given))
+    named = (outputs,) if isinstance(outputs, str | os.PathLike) else outputs
     with tempfile.TemporaryDirectory(prefix="illum-") as folder:
         own = Path(folder)
         path = file_of(mesh, own)
-        values, files = own / "values.npz", tuple(map(Path, outputs))
-        settings = BakeSettings(**given)
+        values, files = own / "values.npz", tuple(map(Path, named))
         with named_scene(own):
-            _, report = bake_mesh(path, (values, *files), settings, BakeOptions(force=force), progress)
+            texts = override_texts(overrides, own)
+            options = BakeOptions(texts, given.threads, force, given.strict)
+            _, report = bake_mesh(path, (values, *files), settings, options, progress)
         baked = read_npz(values)
     written = [name for name in report.as_data()["written"] if name != str(values)]
     facts = without_folder({**report.as_data(), "written": written}, own)
     return Baking(baked.channels, baked.corner_channels, facts, files)
+
+
+def _settings(given: BakeChoices) -> dict[str, Any]:
+    """The fields of `BakeSettings`.
+
+    Raises
+    ------
+    InputError
+        Options that exclude each other, or a value that is none of them.
+    """
+    if given.samples is not None and given.target_error is not None:
+        raise InputError("samples and target_error exclude each other; give one")
+    of_vertices = {
+        "target_error": given.target_error is not None,
+        "reconstruct": bool(given.reconstruct),
+        "what": tuple(given.what) != ("ao",),
+    }
+    for name, is_given in of_vertices.items():
+        if is_given and given.method == "fit":
+            raise InputError(f"{name} works with method='vertex'; leave it out, or the method")
+    unknown = [word for word in given.what if word not in whats()]
+    if unknown:
+        raise InputError(f"what: no '{unknown[0]}'; {suggestion(unknown[0], whats())}")
+    falloff = {"falloff": given.falloff} if isinstance(given.falloff, str) else given.falloff
+    is_reconstructed = given.target_error is not None if given.reconstruct is None else given.reconstruct
+    settings = {name: value for name, value in given if name not in ("threads", "strict")}
+    return {
+        **settings,
+        "samples": 256 if given.samples is None else given.samples,
+        "reconstruct": is_reconstructed,
+        "falloff": falloff,
+        "occluders": tuple(given.occluders),
+        "what": tuple(word for word in whats() if word in given.what),
+    }

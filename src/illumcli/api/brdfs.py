@@ -240,13 +240,17 @@ def _plot(keywords: PlotKeywords) -> Plot:
 
 def _named(models: Sequence[AnyModel]) -> tuple[list[str], list[str]]:
     """The names of models, and the overrides with their parameters."""
+    if isinstance(models, bytes) or not isinstance(models, Sequence) or not models:
+        raise InputError("model: must be a name, the keys of a material, a description, or a list of these")
     names: list[str] = []
     texts: list[str] = []
     for place, each in enumerate(models, start=1):
         if isinstance(each, str):
             names.append(each)
             continue
-        keys = dict(given_keys(each) if isinstance(each, IlluminationModel) else each)
+        keys: dict[str, Any] = {}
+        if isinstance(each, IlluminationModel | Mapping):
+            keys |= given_keys(each) if isinstance(each, IlluminationModel) else each
         name = keys.pop("model", None)
         if not isinstance(name, str):
             raise InputError(f"model {place}: must name its model, as a material of a scene does")

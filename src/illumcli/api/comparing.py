@@ -26,7 +26,8 @@ from illumcli.images.reader import Image, read_image
 from illumcli.schema.messages import suggestion
 
 AnyImage: TypeAlias = "str | os.PathLike[str] | NDArray[Any] | Picture | Rendering"
-"""An image file, an array (H, W) or (H, W, C) of linear light, or rendered pictures."""
+"""An image file, an array (H, W) or (H, W, C), of floats that are linear light or of uint8 that are display
+values, or rendered pictures."""
 NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 
@@ -108,12 +109,17 @@ def _image(given: AnyImage) -> Image:
         return Image(width, height, channels, encoded=False, metadata=given.metadata)
     if isinstance(given, str | os.PathLike):
         return read_image(Path(given))
-    array = np.asarray(given, np.float32)
+    array = np.asarray(given)
+    is_encoded = array.dtype == np.uint8
+    if not (is_encoded or array.dtype.kind in "fb"):
+        kinds = "a file, a rendering, floats of linear light or uint8 of display values"
+        raise InputError(f"a picture must be {kinds}, is {array.dtype}")
+    array = array.astype(np.float32) / (255 if is_encoded else 1)
     array = array[..., None] if array.ndim == 2 else array
     if array.ndim != 3 or array.shape[2] not in NAMES:
         raise InputError(f"an array of {array.shape} is no picture; give (H, W) or (H, W, 1, 3 or 4)")
     planes = dict(zip(NAMES[array.shape[2]], np.moveaxis(array, -1, 0), strict=True))
-    return Image(array.shape[1], array.shape[0], planes, encoded=False, metadata={})
+    return Image(array.shape[1], array.shape[0], planes, encoded=is_encoded, metadata={})
 
 
 def _name(given: AnyImage, otherwise: str) -> str:

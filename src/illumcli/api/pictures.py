@@ -31,19 +31,22 @@ NO_PIXELS = np.zeros((0, 0, 0), np.float32)
 class Picture(Mapping[str, NDArray[Any]]):
     """The layers of one camera by name: (H, W, C) float32, linear, premultiplied; ids are uint32.
 
+    Arrays are read-only: copy one to change it.
     A notebook shows its first layer.
     """
 
     def __init__(self, image: HeldImage, audited: str | None) -> None:
         self._audited = audited  # the layer whose error was measured
         self._layers = image.layers()
+        for each in self._layers.values():
+            each.flags.writeable = False  # files of it state what they hold
         # Not the pixels, which are the layers once more, nor those of other renders.
         work = replace(image.work, images=ImageFiles())
         self._image = replace(image, work=work, pixels=NO_PIXELS)
 
     def __getitem__(self, layer: str) -> NDArray[Any]:
         if layer not in self._layers:
-            raise KeyError(f"no layer {layer!r}; {suggestion(layer, tuple(self._layers))}")
+            raise KeyError(f"no layer {layer!r}; {suggestion(str(layer), tuple(self._layers))}")
         return self._layers[layer]
 
     def __iter__(self) -> Iterator[str]:
@@ -110,10 +113,10 @@ class Picture(Mapping[str, NDArray[Any]]):
             return target.path.read_bytes()
 
 
-class Rendering(Record):
+class Rendering(Record, Mapping[str, NDArray[Any]]):
     """The pictures of a scene, one per camera, and the report.
 
-    ``rendering["beauty"]`` is a layer of the first picture, which a notebook shows.
+    It is a mapping of the layers of the first picture, which a notebook shows.
     """
 
     pictures: dict[str, Picture]
@@ -144,6 +147,12 @@ class Rendering(Record):
 
     def __getitem__(self, layer: str) -> NDArray[Any]:
         return self.picture[layer]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.picture)
+
+    def __len__(self) -> int:
+        return len(self.picture)
 
     def display(self, layer: str | None = None) -> NDArray[np.uint8]:
         """(H, W, C) a layer of the first picture in 8 bits: see `Picture.display`."""

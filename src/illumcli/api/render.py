@@ -11,6 +11,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, TypedDict, Unpack, overload
 
+from illumcli.api.choices import RenderChoices, chosen, plain_number
 from illumcli.api.pictures import Rendering
 from illumcli.api.scenes import AnyScene, Overrides, file_of, named_scene, override_texts, without_folder
 from illumcli.commands.held_images import HeldImages
@@ -67,6 +68,12 @@ class LoadedScene:
         self._images = HeldImages()
         self._worker = Worker(self._images)
 
+    def __repr__(self) -> str:
+        return f"<scene {without_folder(str(self.path), self._folder)}>"
+
+    def __reduce__(self) -> str:
+        raise TypeError("a loaded scene stays in its process; load it in each")
+
     def render(
         self, overrides: Overrides = (), frame: int | None = None, **options: Unpack[Options]
     ) -> Rendering:
@@ -107,15 +114,23 @@ class LoadedScene:
 
     def _prepared(self, overrides: Overrides, frame: int | None, options: Options) -> Work:
         """What is to be rendered; no ray is cast."""
-        given: dict[str, Any] = {name: each for name, each in options.items() if name != "progress"}
-        layers = given.pop("layers", ())
-        given["only"] = (layers,) if isinstance(layers, str) else tuple(layers)
+        given = chosen(RenderChoices, {**options, "progress": None}, ("layers",))
         texts = override_texts(overrides, self._folder)
         if frame is not None:
             frames = read_frames(self.path, texts, self._worker.shared(self.path).text)
             texts = overrides_at(texts, frame, frames.fps if frames else FRAMES_PER_SECOND)
-        chosen = RenderOptions(overrides=texts, pattern="{camera}.exr", force=True, **given)
-        return self._worker.prepare(RenderJob(self.path, chosen, frame))
+        taken = RenderOptions(
+            texts,
+            "{camera}.exr",
+            tuple(given.layers),
+            given.seed,
+            given.threads,
+            force=True,
+            cache=given.cache,
+            strict=given.strict,
+            target_error=given.target_error,
+        )
+        return self._worker.prepare(RenderJob(self.path, taken, frame))
 
     def _rendered(self, work: Work, progress: Progress) -> Rendering:
         self._images.images.clear()
@@ -150,13 +165,17 @@ def load(scene: AnyScene) -> LoadedScene:
 def render(scene: AnyScene, overrides: Overrides = (), **options: Unpack[Options]) -> Rendering: ...
 @overload
 def render(
-    scene: AnyScene, overrides: Overrides = (), *, frames: str | Iterable[int], **options: Unpack[Options]
+    scene: AnyScene,
+    overrides: Overrides = (),
+    *,
+    frames: str | int | Iterable[int],
+    **options: Unpack[Options],
 ) -> list[Rendering]: ...
 def render(
     scene: AnyScene,
     overrides: Overrides = (),
     *,
-    frames: str | Iterable[int] | None = None,
+    frames: str | int | Iterable[int] | None = None,
     **options: Unpack[Options],
 ) -> Rendering | list[Rendering]:
     """Render a scene into arrays; nothing is written.
@@ -167,7 +186,7 @@ def render(
         As `load` takes it.
     overrides : mapping or sequence of str
         ``{"materials.clay.sigma": 0.3}``, or the texts of `-D`.
-    frames : str or iterable of int, optional
+    frames : str, int or iterable of int, optional
         Frames of an animation: `FIRST:LAST`, `FIRST:LAST:STEP`, or numbers; a list of renderings comes back.
     options
         See `Options`.
@@ -186,5 +205,20 @@ def render(
     loaded = LoadedScene(scene)
     if frames is None:
         return loaded.render(overrides, **options)
-    numbers = frame_numbers(frames) if isinstance(frames, str) else frames
+    numbers = frame_numbers(frames) if isinstance(frames, str) else _numbers(frames)
     return [loaded.render(overrides, number, **options) for number in numbers]
+
+
+def _numbers(frames: Any) -> list[int]:
+    """Numbers of frames.
+
+    Raises
+    ------
+    InputError
+        They are none.
+    """
+    plain = [plain_number(each) for each in (frames if isinstance(frames, Iterable) else [frames])]
+    for each in plain:
+        if isinstance(each, bool) or not isinstance(each, int) or each < 0:
+            raise InputError(f"frames: must be whole numbers, at least 0, or text as 0:47, is {each!r}")
+    return plain

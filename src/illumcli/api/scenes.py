@@ -12,8 +12,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from illumcli.api.choices import plain_number
 from illumcli.api.meshes import MeshLike, is_mesh, write_mesh
-from illumcli.errors import InputError
+from illumcli.errors import InputError, LimitError
 from illumcli.scene.access import is_path
 from illumcli.scene.spec import Scene
 from illumcli.schema.annotations import is_tag
@@ -21,7 +22,7 @@ from illumcli.schema.description import Description
 
 AnyScene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Scene | MeshLike"
 """Path of a scene or mesh file; a scene as a mapping with the keys of the YAML or a description; a mesh."""
-Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str] | str"
+Overrides: TypeAlias = "Mapping[str, Any] | Sequence[str] | str | None"
 """Values by path, ``{"materials.clay.sigma": 0.3}``, or `PATH=VALUE` as ``illum render -D`` takes them."""
 
 NAME = "scene.yaml"
@@ -59,9 +60,25 @@ def file_of(scene: AnyScene, folder: Path) -> Path:
 
 
 def override_texts(overrides: Overrides, folder: Path) -> tuple[str, ...]:
-    """Overrides as `PATH=VALUE`."""
+    """Overrides as `PATH=VALUE`.
+
+    Raises
+    ------
+    InputError
+        They are neither a mapping nor texts, or have a value that no scene can have.
+    """
+    if isinstance(overrides, str):
+        return (overrides,)
     if not isinstance(overrides, Mapping):
-        return (overrides,) if isinstance(overrides, str) else tuple(overrides)
+        texts = overrides if isinstance(overrides, Sequence) else () if overrides is None else (overrides,)
+        for each in texts:
+            if not isinstance(each, str):
+                kinds = "a mapping from paths to values, or texts as PATH=VALUE"
+                raise InputError(f"overrides: must be {kinds}, is of type {type(each).__name__}")
+        return tuple(texts)
+    for path in overrides:
+        if not isinstance(path, str):
+            raise InputError(f"overrides: a path must be text, is {path!r}; write it as 'film.width'")
     return tuple(
         f"{path}={_yaml(_plain(value, tuple(path.split('.')), folder))}" for path, value in overrides.items()
     )
@@ -92,15 +109,17 @@ def _plain(value: Any, path: tuple[str | int, ...], folder: Path) -> Any:
             raise InputError(f"scene: {place}: must be a finite number, is {value}")
         case np.ndarray() if value.dtype.kind == "f" and not np.isfinite(value).all():
             raise InputError(f"scene: {place}: must be finite numbers, and some are not")
-        case np.ndarray() | np.generic():
+        case np.ndarray():
             return value.tolist()
+        case float() | np.generic():
+            return plain_number(value)
         case list() | tuple():
             return [_plain(part, (*path, number), folder) for number, part in enumerate(value)]
         case os.PathLike():
             return os.path.abspath(value)
         case str() if is_path(path, value):
             return os.path.abspath(value)
-        case str() | bool() | int() | float() | None:
+        case str() | bool() | int() | None:
             return value
     raise InputError(f"scene: {place}: a scene holds no {type(value).__name__}; give numbers, text or lists")
 
@@ -110,6 +129,8 @@ def named_scene(folder: Path) -> Iterator[None]:
     """Call the scene file of a temporary folder `scene` in errors, and its mesh files `mesh`."""
     try:
         yield
+    except LimitError as error:
+        raise LimitError(str(error).replace(str(folder / NAME), "scene")) from None
     except InputError as error:
         own = re.compile(rf"{re.escape(str(folder / NAME))}(:\d+:\d+)?")
         mesh = re.compile(rf"{re.escape(str(folder))}/mesh-[0-9a-f]+\.ply")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, Unpack, overload
 
@@ -51,10 +51,10 @@ class Sweep(Sequence[dict[str, Any]]):
 
 def sweep(
     scene: AnyScene,
-    values: Mapping[str, Sequence[Any]],
+    values: Mapping[str, Iterable[Any]],
     *,
     together: bool = False,
-    reference: int | NDArray[Any] | None = None,
+    reference: int | Rendering | NDArray[Any] | None = None,
     **options: Unpack[Options],
 ) -> Sweep:
     """Render a scene with every value of some paths with every other; the last path varies fastest.
@@ -67,7 +67,7 @@ def sweep(
         Path in the scene -> its values: ``{"materials.clay.sigma": [0.1, 0.3, 0.5]}``.
     together : bool
         The first values of all paths, then the second ones, and so on.
-    reference : int or (H, W, C) array, optional
+    reference : int, Rendering or (H, W, C) array, optional
         The variant, from 0, or the picture whose first layer the variants are compared with.
     options
         See `Options`.
@@ -84,13 +84,14 @@ def sweep(
         Values that are no sequence, or of different lengths and to go `together`; a `reference` that there is
         not, or of another size; faults of the scene with any of the values, before the first ray.
     """
-    values = {path: _several(path, each) for path, each in values.items()}
-    lengths = {path: len(each) for path, each in values.items()}
+    lists = {path: _several(path, each) for path, each in _by_path(values).items()}
+    lengths = {path: len(each) for path, each in lists.items()}
     if together and len(set(lengths.values())) > 1:
         raise InputError(f"values of different lengths cannot go together: {lengths}")
-    rows = zip(*values.values(), strict=True) if together else product(*values.values())
-    variants = [dict(zip(values, row, strict=True)) for row in rows]
-
+    rows = zip(*lists.values(), strict=True) if together else product(*lists.values())
+    variants = [dict(zip(lists, row, strict=True)) for row in rows]
+    if isinstance(reference, np.integer):
+        reference = int(reference)
     if isinstance(reference, int) and not -len(variants) <= reference < len(variants):
         raise InputError(f"reference {reference}: there are {len(variants)} variants, numbered from 0")
 
@@ -99,7 +100,9 @@ def sweep(
     renderings = loaded.variants(variants, **options)
 
     # Measure.
-    against = _first_layer(renderings[reference]) if isinstance(reference, int) else reference
+    if isinstance(reference, int):
+        reference = renderings[reference]
+    against = _first_layer(reference) if isinstance(reference, Rendering) else reference
     records = []
     for variant, rendering in zip(variants, renderings, strict=True):
         layer, report = _first_layer(rendering), rendering.report
@@ -115,11 +118,22 @@ def sweep(
     return Sweep(records, renderings)
 
 
-def _several(path: str, values: Any) -> Sequence[Any]:
-    """The values of a path."""
-    if isinstance(values, str | Mapping) or not hasattr(values, "__len__"):
-        raise InputError(f"{path}: give its values as a list, [{values!r}]")
+def _by_path(values: Any) -> Mapping[str, Any]:
+    if not isinstance(values, Mapping):
+        fact = f"must be a mapping from paths to their values, is of type {type(values).__name__}"
+        raise InputError(f"values: {fact}; write {{'film.width': [160, 320]}}")
     return values
+
+
+def _several(path: str, values: Any) -> list[Any]:
+    """The values of a path, those of numpy as those of Python."""
+    is_one = isinstance(values, str | Mapping) or (isinstance(values, np.ndarray) and values.ndim == 0)
+    if is_one or not isinstance(values, Iterable):
+        raise InputError(f"{path}: give its values as a list, [{values!r}]")
+    listed = [each.tolist() if isinstance(each, np.generic) else each for each in values]
+    if not listed:
+        raise InputError(f"{path}: has no values; give at least one")
+    return listed
 
 
 def _first_layer(rendering: Rendering) -> NDArray[Any]:

@@ -63,7 +63,7 @@ def data(tag: str | None = None) -> list[dict[str, Any]]:
             "claims": {claim: bool(getattr(Model, claim)) for claim in CLAIMS},
             "schema": schema_of(Model),
         }
-        for Model in ([_model(tag)] if tag else members(PACKAGE))
+        for Model in ([_model(tag)] if tag is not None else members(PACKAGE))
     ]
 
 

@@ -47,6 +47,7 @@ from illumcli.visibility.falloffs import AnyFalloff
 from illumcli.visibility.samplers import SAMPLERS
 
 Count: TypeAlias = Annotated[int, Field(ge=1, le=2**31 - 1)]
+Seed: TypeAlias = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Row: TypeAlias = Annotated[tuple[Number, Number, Number, Number], Strict(False)]
 Matrix: TypeAlias = Annotated[tuple[Row, Row, Row, Row], Strict(False)]
 
@@ -420,7 +421,7 @@ class Scene(Description):
     """The lights; without any there is only ambient light."""
     outputs: Outputs = DEFAULTS
     """Layers and files that are written."""
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    seed: Seed = 0
     """Seed of all random numbers: the same seed gives the same image."""
 
     @model_validator(mode="after")

@@ -119,7 +119,7 @@ def test_a_type_checker_knows_the_interface(tmp_path):
     told = {int(number): text for number, text in re.findall(r"user\.py:(\d+): (.*)", done.stdout)[::-1]}
     assert told.keys() == TOLD.keys(), done.stdout
     for number, text in TOLD.items():
-        assert text in told[number]
+        assert text in told[number].replace("builtins.", "")  # older versions say builtins.int
 
 
 def test_reports_name_no_temporary_folder(tmp_path):

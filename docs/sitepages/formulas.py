@@ -113,9 +113,6 @@ class _Parser:
         """All of the text."""
         parts = [self._sum()]
         while token := self._next():
-            if token.text == "over":
-                rest = " ".join(each.text for each in self._rest)
-                return "".join([*parts, f"<mtext>&#xA0;over {rest}</mtext>"])
             if token.text in WORDS:
                 parts.append(f"<mtext>&#xA0;{token.text}&#xA0;</mtext>")
             elif token.text in ("=", "<", ">", "<=", ">=", ",", ";", ".."):
@@ -151,6 +148,11 @@ class _Parser:
         while self._is("+", "-"):
             parts.append(f"<mo>{'−' if self._next().text == '-' else '+'}</mo>")  # type: ignore[union-attr]
             parts.append(self._product())
+        if self._is("over"):  # what a sum is over, in words
+            words = []
+            while (token := self._peek()) and token.kind == "name":
+                words.append(self._rest.pop(0).text)
+            parts.append(f"<mtext>&#xA0;{' '.join(words)}</mtext>")
         return f"<mrow>{''.join(parts)}</mrow>"
 
     def _product(self) -> str:

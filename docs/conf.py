@@ -5,7 +5,9 @@ from illumcli import __version__
 project = "illum"
 release = version = __version__
 root_doc = "index"
-extensions = ["myst_parser", "sphinx_copybutton", "sphinx_design"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "sphinx_design"]
+nb_execution_mode = "off"
+autodoc_typehints_format = "short"
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
 copybutton_exclude = ".linenos, .gp, .go"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sphinx.cmd.build import build_main
 
-from sitepages import model_pages, scene_reference, source
+from sitepages import command_reference, gallery, model_pages, scene_reference, source
 from sitepages.drawing import draw
 from sitepages.examples import Examples
 
@@ -21,8 +21,10 @@ def main(folder: Path, draft: bool) -> int:
     """Write the pages that Sphinx reads, and build them; the exit code of Sphinx."""
     examples = Examples(source.scenes())
     pages = source.hand_written() | scene_reference.pages(examples) | model_pages.pages(examples)
+    pages |= command_reference.pages()
     drawn = draw(model_pages.drawings(), folder / "drawn", draft)
-    source.write(folder / "source", pages | source.pictures() | drawn | source.linked_files(pages))
+    shown = gallery.pages(folder / "gallery", draft)
+    source.write(folder / "source", pages | shown | source.pictures() | drawn | source.linked_files(pages))
     words = ["-c", source.DOCS, "-W", "--keep-going", "-q", "-j", "2", "-d", folder / "doctrees"]
     return build_main([str(word) for word in [*words, folder / "source", folder / "html"]])
 

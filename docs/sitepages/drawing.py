@@ -51,7 +51,7 @@ def draw(drawings: Sequence[Drawing], folder: Path, draft: bool) -> dict[str, by
     if draft:
         for each in drawings:
             words = shlex.split(each.command)[1:]
-            _run([*words[: words.index("-o")], "--csv", str(folder / "draft.csv"), "--force"])
+            run([*words[: words.index("-o")], "--csv", str(folder / "draft.csv"), "--force"])
         return dict.fromkeys((each.file for each in drawings), GREY)
     missing = [each for each in drawings if not kept(each, folder).exists()]
     with ProcessPoolExecutor(max_workers=2) as pool:
@@ -68,10 +68,10 @@ def _draw(drawing: Drawing, folder: Path) -> None:
     """Run the command of a picture."""
     words = shlex.split(drawing.command)[1:]
     words[words.index("-o") + 1] = str(kept(drawing, folder))
-    _run(words)
+    run(words)
 
 
-def _run(words: Sequence[str]) -> None:
+def run(words: Sequence[str]) -> None:
     """Run a command, whose output is the picture alone."""
     with contextlib.redirect_stdout(io.StringIO()):
         illum.main([*words, "-q"], standalone_mode=False)

@@ -45,7 +45,7 @@ class Examples:
             elif isinstance(value, dict) and "patternProperties" in each:
                 for inner in value.values():
                     self._visit(next(iter(each["patternProperties"].values())), inner)
-            elif isinstance(value, dict) and fits(each, value):
+            elif isinstance(value, dict) and "properties" in each and fits(each, value):
                 name = part_of(each).name
                 for key, inner in value.items():
                     if key in each["properties"]:
@@ -98,29 +98,29 @@ WRITTEN = {
     "sequence.number": "frame / 2",
     "step.keys": "{0: phong, 24: ward}",
     "spot.attenuation": "{law: windowed, range: 10}",
-    "exponential.max_distance": "0.5r",
-    "linear.max_distance": "0.5r",
-    "power.max_distance": "0.5r",
+    "max_distance": "0.5r",
     "formula.parameters": "{diffuse: 0.3, shine: 40}",
     "formula.response": "diffuse / pi * n_l",
     "formula.specular": "0.2 * max(0, 1 - gap_rv)**shine",
     "formula.claims": "[reciprocal]",
     "formula.formula": "exp(-(tan(theta) / 0.2)**2)",
     "lafortune.further": "[{cx: 0.9, cy: 0.9, exponent: 8}]",
+    "text.text": "Ward",
     "table.file": "slopes.csv",
     "disc.file": "facets.png",
     "profile.file": "groove.png",
     "merl.file": "gold-metallic-paint.binary",
     "rgl.file": "paint_rgb.bsdf",
 }
-"""Examples of keys that no scene has, and whose schema does not say what makes sense."""
+"""Examples of keys, by description or for all, where no scene has one and the schema does not tell one."""
 
 
 def made(part: Part, fact: Fact) -> str:
     """A value that the key takes, where no scene has one."""
-    if (name := f"{part.name}.{fact.key}") in WRITTEN:
-        return WRITTEN[name]
-    field = alternatives(fact.schema)[-1 if fact.key == "max_distance" else 0]
+    name = f"{part.name}.{fact.key}"
+    if written := WRITTEN.get(name) or WRITTEN.get(fact.key):
+        return written
+    field = alternatives(fact.schema)[0]
     default = fact.schema.get("default")
     if "enum" in field:
         return yaml_words(next(choice for choice in reversed(field["enum"]) if choice != default))
@@ -130,7 +130,11 @@ def made(part: Part, fact: Fact) -> str:
         return yaml_words([_number(field["items"], None)] * field["minItems"])
     if field.get("type") in ("number", "integer"):
         return yaml_words(_number(field, default))
-    raise LookupError(f"{name} needs an example")
+    if field.get("type") == "string":
+        return fact.key
+    raise LookupError(
+        f"{name}: no scene has it; use it in one, or write an example into docs/sitepages/examples.py"
+    )
 
 
 def _number(field: Schema, default: Any) -> float:

@@ -52,6 +52,8 @@ def place(file: str) -> str:
     """Where a file of the repository is on the site: a page, a picture, or a copy to look at."""
     if file.startswith("docs/"):
         return file.removeprefix("docs/")
+    if re.fullmatch(r"scenes/[\w-]+\.yaml", file):
+        return f"gallery/{Path(file).stem}.md"
     return MOVED.get(file, COPIES + file)
 
 

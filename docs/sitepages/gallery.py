@@ -1,0 +1,172 @@
+"""The gallery: every scene with its picture, its YAML, its command, seconds and error.
+
+The renderer itself keeps a picture whose content would be the same, so that only changed scenes render again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import OpenImageIO
+import yaml
+
+from illumcli.errors import OutputError
+from sitepages.drawing import SOURCE, digest_of, run
+from sitepages.source import ROOT, scenes
+
+HEAD = """\
+# Gallery
+
+Scenes of the folder `scenes`, each of which shows one idea. Choose one for its file to copy, its command,
+how long it took and how large its error is.
+
+::::{grid} 2 3 3 3
+:gutter: 2
+
+"""
+CARD = """\
+:::{{grid-item-card}} {title}
+:link: gallery/{name}
+:link-type: doc
+:img-top: gallery/{thumbnail}
+:::
+"""
+PAGE = """\
+# {title}
+
+{idea}
+
+{pictures}
+
+{facts}
+
+```sh
+{command}
+```
+
+`scenes/{name}.yaml`
+
+```yaml
+{text}```
+"""
+THUMBNAIL = 480
+"""Width [pixels]."""
+DRAFT = "film={width: 48, height: 27, samples: 1}"
+
+
+class Entry(NamedTuple):
+    """A scene of the gallery, as it was rendered."""
+
+    title: str
+    idea: str
+    command: str
+    pictures: list[str]
+    seconds: float
+    rays: int
+    error: float | None
+    """Root mean square of the standard error of pixels; None if it is not known."""
+
+
+def pages(folder: Path, draft: bool) -> dict[str, str | bytes]:
+    """Name -> content of the pages and pictures of the gallery, which is kept below a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sources = digest_of([*SOURCE.rglob("*.py"), *SOURCE.rglob("*.c")])
+    files = [path for path in (ROOT / "scenes").rglob("*") if path.is_file() and path.suffix != ".yaml"]
+    inputs = digest_of(files)
+    written: dict[str, str | bytes] = {}
+    head = HEAD
+    for scene in scenes():
+        key = f"{sources} {inputs} {digest_of(_texts(scene))} {draft}"
+        entry = _remembered(scene, folder, key, draft)
+        names = [Path(picture).name for picture in entry.pictures]
+        written |= {f"gallery/{Path(each).name}": Path(each).read_bytes() for each in entry.pictures}
+        thumbnail = f"{scene.stem}.thumbnail.jpg"
+        written[f"gallery/{thumbnail}"] = (folder / thumbnail).read_bytes()
+        written[f"gallery/{scene.stem}.md"] = _page(scene, entry, names)
+        head += CARD.format(title=entry.title, name=scene.stem, thumbnail=thumbnail)
+    names = "\n".join(f"gallery/{scene.stem}" for scene in scenes())
+    written["gallery.md"] = f"{head}::::\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
+    return written
+
+
+def _texts(scene: Path) -> list[Path]:
+    """A scene, and the scenes that it extends."""
+    bases = yaml.safe_load(scene.read_text()).get("extends", [])
+    bases = [bases] if isinstance(bases, str) else bases
+    return [scene, *(path for base in bases for path in _texts(scene.parent / base))]
+
+
+def _page(scene: Path, entry: Entry, names: Sequence[str]) -> str:
+    facts = [f"{entry.seconds:.1f} s on two cores, as shown"]
+    if entry.rays:
+        facts.append(f"{entry.rays:,} rays")
+    if entry.error is not None:
+        facts.append(f"standard error of a pixel {entry.error:.1g} (root mean square)")
+    return PAGE.format(
+        title=entry.title,
+        idea=entry.idea,
+        pictures="\n\n".join(f"![{entry.title}]({name})" for name in names),
+        facts=", ".join(facts) + ".",
+        command=entry.command,
+        name=scene.stem,
+        text=scene.read_text(),
+    )
+
+
+def _remembered(scene: Path, folder: Path, key: str, draft: bool) -> Entry:
+    """A scene as it was rendered with equal sources, or rendered now."""
+    memory = folder / f"{scene.stem}.entry.json"
+    if memory.exists() and (known := json.loads(memory.read_text()))["key"] == key:
+        return Entry(**known["entry"])
+    entry = _entry(scene, folder, draft)
+    picture = OpenImageIO.ImageBuf(entry.pictures[0])
+    spec = picture.spec()
+    width = min(THUMBNAIL, spec.width)
+    size = OpenImageIO.ROI(0, width, 0, max(width * spec.height // spec.width, 1), 0, 1, 0, 3)
+    OpenImageIO.ImageBufAlgo.resize(picture, roi=size).write(str(folder / f"{scene.stem}.thumbnail.jpg"))
+    memory.write_text(json.dumps({"key": key, "entry": entry._asdict()}))
+    return entry
+
+
+def _entry(scene: Path, folder: Path, draft: bool) -> Entry:
+    """A scene, rendered below a folder unless its pictures are kept."""
+    text = scene.read_text()
+    title, _, idea = text.partition("\n")[0].lstrip("# ").partition(": ")
+    keys = yaml.safe_load(text)
+    frame = keys["frames"]["last"] // 2 if "frames" in keys else 0
+    frames = ["--frames", f"{frame}:{frame}"] if "frames" in keys else []
+    small = ["-D", DRAFT] if draft else []
+    report = _render(scene, folder / "{scene}.{camera}.{layer}.png", [*frames, *small])
+    return Entry(
+        title=title,
+        idea=idea[:1].upper() + idea[1:],
+        command=" ".join(["illum render", f"scenes/{scene.name}", *frames]),
+        pictures=[*report["written"], *report["kept"]],
+        seconds=report["total_seconds"],
+        rays=sum(report["rays"].values()),
+        error=None if draft else _error(scene, folder, frames, keys.get("film", {})),
+    )
+
+
+def _error(scene: Path, folder: Path, frames: Sequence[str], film: dict[str, Any]) -> float | None:
+    """The error of a picture, from one of a quarter of its size, whose pixels have as many samples."""
+    sizes = {"width": 1280, "height": 720}
+    small = [f"film.{key}={max(film.get(key, usual) // 4, 1)}" for key, usual in sizes.items()]
+    words = [*frames, "--only", "beauty", "--only", "error", "-D", small[0], "-D", small[1]]
+    report = _render(scene, folder / "{scene}.{camera}.{layer}.small.png", words)
+    return max((error["rms"] for error in report["standard_error"].values()), default=None)
+
+
+def _render(scene: Path, pattern: Path, words: Sequence[str]) -> dict[str, Any]:
+    """The report of a render, which is the old one where pictures are kept."""
+    kind = ".small" if "small" in pattern.suffixes[-2] else ""
+    report = pattern.with_name(f"{scene.stem}{kind}.report.json")
+    command = ["render", str(scene), "-o", str(pattern), "--report", str(report), *words]
+    try:
+        run(command)
+    except OutputError:  # another picture of this name: the scene has changed
+        run([*command, "--force"])
+    return json.loads(report.read_text())

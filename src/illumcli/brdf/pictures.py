@@ -33,11 +33,16 @@ def draw_pictures(view: str, axes: Sequence[Any], models: Sequence[Look], plot: 
 
 
 def _draw_picture(axes: Axes, picture: Doubles) -> None:
-    """A picture, (H, W, 4) linear R, G, B, premultiplied, and coverage."""
+    """A picture as `in_srgb` takes it."""
+    axes.imshow(in_srgb(picture), interpolation="antialiased")
+    axes.set_axis_off()
+
+
+def in_srgb(picture: Doubles) -> Doubles:
+    """(H, W, 4) sRGB and coverage, of a picture, (H, W, 4) linear R, G, B, premultiplied, and coverage."""
     alpha = picture[..., 3:]
     color = to_srgb(np.clip(picture[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
-    axes.imshow(np.concatenate([color, alpha], axis=-1), interpolation="antialiased")
-    axes.set_axis_off()
+    return np.concatenate([color, alpha], axis=-1)
 
 
 def _draw_lobes(axes: Sequence[Any], models: Sequence[Look], plot: Plot) -> None:

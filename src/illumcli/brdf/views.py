@@ -1,9 +1,10 @@
 """The data of BRDF views, in double precision: slices, lobes, a lit sphere, a lit plane.
 
-The surface is z = 0 with its normal along z and its grain along x; light comes from the left, in the plane of
-x and z. A value is f_r = response / n.l, or with `times_cos` the response itself: the radiance that leaves
-under a light of unit irradiance across its own direction. For the intensity models of the texts f_r is the
-BRDF that gives the same image; it grows without bound as the light approaches the horizon.
+The surface is z = 0 with its normal along z and its grain along x, or at an angle to it; light comes from the
+left, in the plane of x and z. A value is f_r = response / n.l, or with `times_cos` the response itself: the
+radiance that leaves under a light of unit irradiance across its own direction. For the intensity models of
+the texts f_r is the BRDF that gives the same image; it grows without bound as the light approaches the
+horizon.
 """
 
 from __future__ import annotations
@@ -61,15 +62,17 @@ def values(model: Look, n: Vectors, l: Vectors, v: Vectors, t: Vectors, times_co
     return out
 
 
-def seen_from(model: Look, incidence: float, v: Vectors, times_cos: bool) -> Doubles:
-    """(N, 3) values of the flat surface lit from `incidence` degrees, seen from unit vectors `v`."""
+def seen_from(model: Look, incidence: float, v: Vectors, times_cos: bool, grain: float = 0.0) -> Doubles:
+    """(N, 3) values of the flat surface lit from `incidence` degrees, seen from unit vectors `v`, with its
+    grain at `grain` degrees from x towards y."""
 
     def everywhere(vector: tuple[float, float, float]) -> Vectors:
         return np.broadcast_to(np.array(vector), v.shape)
 
-    angle = np.radians(incidence)
+    angle, turn = np.radians([incidence, grain])
     l = everywhere((-np.sin(angle), 0.0, np.cos(angle)))
-    return values(model, everywhere((0.0, 0.0, 1.0)), l, v, everywhere((1.0, 0.0, 0.0)), times_cos)
+    t = everywhere((np.cos(turn), np.sin(turn), 0.0))
+    return values(model, everywhere((0.0, 0.0, 1.0)), l, v, t, times_cos)
 
 
 def slice_angles(incidence: float) -> Doubles:
@@ -83,18 +86,22 @@ def slice_angles(incidence: float) -> Doubles:
     return np.unique(angles[np.abs(angles) < 90])
 
 
-def polar_slice(model: Look, incidence: float, times_cos: bool = False) -> tuple[Doubles, Doubles]:
+def polar_slice(
+    model: Look, incidence: float, times_cos: bool = False, grain: float = 0.0
+) -> tuple[Doubles, Doubles]:
     """(K,) angles of view in degrees and (K, 3) values in the plane of incidence.
 
     Parameters
     ----------
     incidence : float
         Angle of the light to the normal [degrees]; its mirror direction is seen at the same angle of view.
+    grain : float
+        Angle of the grain to the plane of incidence [degrees].
     """
     angles = slice_angles(incidence)
     theta = np.radians(angles)
     v = column_major(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1))
-    return angles, seen_from(model, incidence, v, times_cos)
+    return angles, seen_from(model, incidence, v, times_cos, grain)
 
 
 def across_slice(model: Look, incidence: float, times_cos: bool = False) -> tuple[Doubles, Doubles]:
@@ -113,7 +120,9 @@ def across_slice(model: Look, incidence: float, times_cos: bool = False) -> tupl
     return angles, seen_from(model, incidence, column_major(v), times_cos)
 
 
-def lobe(model: Look, incidence: float, times_cos: bool = False, steps: int = 90) -> tuple[Doubles, Doubles]:
+def lobe(
+    model: Look, incidence: float, times_cos: bool = False, steps: int = 90, grain: float = 0.0
+) -> tuple[Doubles, Doubles]:
     """(S + 1, 2 S + 1, 3) unit directions over the hemisphere, and (S + 1, 2 S + 1, 3) values there.
 
     The columns run from the mirror direction to the horizon, crowded at their beginning: a narrow highlight
@@ -128,7 +137,7 @@ def lobe(model: Look, incidence: float, times_cos: bool = False, steps: int = 90
     # Rotate the axis from the mirror direction to the normal.
     x, y, z = np.sin(away) * np.cos(around), np.sin(away) * np.sin(around), np.cos(away)
     v = np.stack([x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)], axis=-1)
-    values = seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos)
+    values = seen_from(model, incidence, unit(column_major(v.reshape(-1, 3))), times_cos, grain)
     return v, np.reshape(values, v.shape)
 
 

@@ -65,7 +65,7 @@ def main() -> None:
             "illum sweep": partial(illum, *sweep, "--force", "-q", "-t", 1, cwd=folder),
             "illum render, each": partial(renders, scene, folder),
         }
-        times = interleaved(runs, 1 if SMALL else REPEATS)
+        times = interleaved(runs, 1 if SMALL else 2)
         table(times, "illum sweep")
         ratio("loop, PNGs / illum sweep", times, "loop, PNGs", "illum sweep")
         ratio("illum render, each / loop, PNGs", times, "illum render, each", "loop, PNGs")

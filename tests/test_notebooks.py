@@ -19,6 +19,11 @@ def codes(notebook):
     return [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
 
 
+def kinds_shown(cell):
+    """What a cell shows; texts may come in several parts."""
+    return {(each["output_type"], *sorted(each.get("data", ()))) for each in cell["outputs"]}
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_holds_what_its_cells_show(path):
     text = path.read_text(encoding="utf-8")
@@ -45,11 +50,5 @@ def test_it_runs_in_an_empty_folder(path, tmp_path, monkeypatch):
     ]
     assert told == []
     stored = json.loads(path.read_text(encoding="utf-8"))
-    shown = [
-        [
-            [(output["output_type"], *sorted(output.get("data", ()))) for output in cell["outputs"]]
-            for cell in codes(each)
-        ]
-        for each in (done, stored)
-    ]
+    shown = [[kinds_shown(cell) for cell in codes(each)] for each in (done, stored)]
     assert shown[0] == shown[1], "run docs/make_notebooks.py"

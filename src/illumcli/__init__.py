@@ -9,9 +9,11 @@ The commands as functions, for programs and notebooks: nothing is imported befor
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as in typing, whose import takes longer than that of this module
 if TYPE_CHECKING:
+    from typing import Any
+
     from illumcli.api.baking import bake
     from illumcli.api.brdfs import brdf
     from illumcli.api.comparing import compare

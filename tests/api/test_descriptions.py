@@ -110,14 +110,25 @@ TOLD = {
 """Line -> what a type checker says of it."""
 
 
-def test_a_type_checker_knows_the_interface(tmp_path):
-    """Without the plugin that checks this repository, as in an editor."""
+def test_a_type_checker_knows_the_interface(root, tmp_path):
+    """Without the plugin that checks this repository, as in an editor; the page of examples has no fault."""
     (tmp_path / "user.py").write_text(USER)
+    page = (root / "docs" / "python.md").read_text()
+    (tmp_path / "page.py").write_text("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)))
     (tmp_path / "none.ini").write_text("[mypy]\nfollow_imports = silent\n")
-    words = [sys.executable, "-m", "mypy", "--config-file=none.ini", "--cache-dir=/dev/null", "user.py"]
+    words = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--config-file=none.ini",
+        "--cache-dir=/dev/null",
+        "user.py",
+        "page.py",
+    ]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     told = {int(number): text for number, text in re.findall(r"user\.py:(\d+): (.*)", done.stdout)[::-1]}
     assert told.keys() == TOLD.keys(), done.stdout
+    assert "page.py" not in done.stdout, done.stdout
     for number, text in TOLD.items():
         assert text in told[number].replace("builtins.", "")  # older versions say builtins.int
 

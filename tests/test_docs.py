@@ -7,9 +7,11 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -51,13 +53,31 @@ def folder(tmp_path_factory):
     return path
 
 
+def view_answers(line, folder, environment):
+    """Run a command that serves a page, load the page, and interrupt it."""
+    pytest.importorskip("websockets")
+    words = [sys.executable, "-m", "illumcli", *shlex.split(line, comments=True)[1:], "--no-browser"]
+    with subprocess.Popen(words, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            url = process.stdout.readline().strip()
+            assert url.startswith("http://127.0.0.1:"), line
+            with urllib.request.urlopen(url) as answer:
+                assert b"illum view" in answer.read()
+        finally:
+            process.send_signal(signal.SIGINT)
+    assert process.returncode == -signal.SIGINT, line
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_runs(page, folder):
     place_files(page, folder)
     for line in commands(page):
+        environment = {**os.environ, "ILLUM_CACHE": str(folder / "cache")}
+        if line.startswith("illum view "):
+            view_answers(line, folder, environment)
+            continue
         small = re.sub(r"\billum (render|sweep)\b", rf"illum \1 {SMALL}", line)
         command = ["bash", "-ec", f'illum() {{ {shlex.quote(sys.executable)} -m illumcli "$@"; }}; {small}']
-        environment = {**os.environ, "ILLUM_CACHE": str(folder / "cache")}
         done = subprocess.run(
             command, cwd=folder, env=environment, capture_output=True, text=True, check=False
         )

@@ -55,3 +55,10 @@ def viewer(scene):
     """The server of the scene's page."""
     with served(scene) as viewer:
         yield viewer
+
+
+@pytest.fixture
+def another_viewer(scene):
+    """A second server of the same scene."""
+    with served(scene) as viewer:
+        yield viewer

@@ -7,7 +7,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import field, fields
 from functools import cached_property, partial
 from inspect import ismethod
@@ -109,6 +110,18 @@ class FileFingerprints:
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, Callable[[Path], Iterable[Path]]], FileFingerprint] = {}
+
+    @property
+    def count(self) -> int:
+        """Number of the files so far."""
+        return len(self._known)
+
+    def paths(self) -> Iterator[Path]:
+        """The paths of all files so far, and of those that they name."""
+        for each in self._known.values():
+            with suppress(InputError):
+                yield each.path
+                yield from each.beside(each.path)
 
     def of(
         self, path: str, locate: Callable[[str], Path], beside: Callable[[Path], Iterable[Path]] = _none

@@ -10,20 +10,20 @@ from illumcli.progress import Progress, no_progress
 
 def reporter(quiet: bool) -> Progress:
     """A `Progress`: one line that is rewritten on a terminal, otherwise a plain line every ten seconds."""
-    start, last = time.monotonic(), time.monotonic()
+    start, last, begun = time.monotonic(), time.monotonic(), ""
     terminal = sys.stderr.isatty()
     rewrite = getattr(sys.stderr, "write_raw", sys.stderr.write)
 
     def report(what: str, done: int, total: int) -> None:
-        nonlocal start, last
+        nonlocal start, last, begun
         now = time.monotonic()
-        if done == 0:
-            start = now
+        if done == 0 and begun != what:
+            start, begun = now, what
         if done >= total:
             if terminal:
                 rewrite("\r\x1b[K")
                 sys.stderr.flush()
-            start = now
+            start, begun = now, ""
             return
         if now - last < (0.1 if terminal else 10):
             return

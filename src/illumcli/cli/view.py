@@ -55,7 +55,7 @@ def view(
     from illumcli.viewer.server import Viewer
     from illumcli.viewer.session import Session
 
-    Renderer(scene, overrides, threads).loaded(())  # faults of the scene are told before a page opens
+    Renderer(scene, overrides, threads).loaded()  # faults of the scene are told before a page opens
     viewer = Viewer(lambda send: Session(Renderer(scene, overrides, threads), send), host, port)
     click.echo(viewer.url)
     if not quiet:

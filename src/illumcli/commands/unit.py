@@ -78,6 +78,11 @@ class Worker:
             self._scenes[scene] = SharedParts(read_text(scene))
         return self._scenes[scene]
 
+    def reread(self, scene: Path, text: SceneText) -> None:
+        """Take a new text of a scene, and read its files again; buffers in memory are named by content, and
+        stay."""
+        self._scenes[scene] = SharedParts(text, memory=self.shared(scene).memory)
+
     @overload
     def prepare(self, unit: RenderJob) -> Work: ...
     @overload

@@ -43,6 +43,8 @@ from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
 
 Result = TypeVar("Result")
+STEP = 0.02
+"""Time to wait for a tile before looking whether the run shall end [seconds]."""
 
 
 class Band(Record):
@@ -118,7 +120,8 @@ def bands(
     shared : mapping
         The buffers of the whole scene, from `run_once`.
     done : callable
-        Called with the number of pixels of each finished tile.
+        Called with the number of pixels of each finished tile, and with 0 many times a second while none is;
+        its exceptions end the run.
 
     Raises
     ------
@@ -140,7 +143,7 @@ def bands(
         try:
             pending: list[tuple[Tile, Future[tuple[Mapping[str, NDArray[Any]], Kept]]]] = []
             queue = iter([tile for row in rows for tile in row])
-            ahead = _Ahead(common, rows, pool)
+            ahead = _Ahead(common, rows, pool, done)
 
             # Keep a row of tiles and a few more in progress, so that no thread waits for the consumer.
             def submit() -> None:
@@ -158,7 +161,7 @@ def bands(
                 kept: dict[str, list[NDArray[Any] | None]] = defaultdict(list)
                 for _ in row:
                     tile, future = pending.pop(0)
-                    layers, others = _result(future)
+                    layers, others = _result(future, done)
                     for name, values in layers.items():
                         if name not in band:
                             band[name] = np.empty((height, view.width, values.shape[2]), values.dtype)
@@ -182,18 +185,24 @@ def bands(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _result(future: Future[Result]) -> Result:
-    """What a thread computed; waits in short steps, so that an interrupt reaches this thread."""
-    while not wait([future], timeout=0.2, return_when=FIRST_COMPLETED).done:
-        pass
+def _result(future: Future[Result], done: Callable[[int], None]) -> Result:
+    """What a thread computed; waits in short steps, so that an interrupt or `done` can end it."""
+    while not wait([future], timeout=STEP, return_when=FIRST_COMPLETED).done:
+        done(0)
     return future.result()
 
 
 class _Ahead:
     """Runs the first nodes of tiles some rows ahead of the others, which read the pixels around."""
 
-    def __init__(self, common: TileContext, rows: Sequence[Sequence[Tile]], pool: ThreadPoolExecutor) -> None:
-        self.common, self.rows, self.pool = common, rows, pool
+    def __init__(
+        self,
+        common: TileContext,
+        rows: Sequence[Sequence[Tile]],
+        pool: ThreadPoolExecutor,
+        done: Callable[[int], None],
+    ) -> None:
+        self.common, self.rows, self.pool, self.done = common, rows, pool, done
         self.first_row, self.next_row = 0, 0
         self.started: dict[Tile, Future[StartedTile | StartedAdaptive]] = {}
         self.pixels: dict[Tile, ObjectPixels] = {}
@@ -221,14 +230,14 @@ class _Ahead:
         for row in self.rows[self.first_row : self.next_row]:
             for each in row if row[0].y < lower else ():
                 if each not in self.pixels:
-                    self.pixels[each] = _result(self.started[each]).buffers["object_pixels"]
+                    self.pixels[each] = _result(self.started[each], self.done).buffers["object_pixels"]
                 if (
                     each != tile
                     and each.x < tile.x + tile.width + MARGIN
                     and each.x + each.width > tile.x - MARGIN
                 ):
                     parts.append(self.pixels[each])
-        own = _result(self.started.pop(tile))
+        own = _result(self.started.pop(tile), self.done)
         return self.pool.submit(_last_nodes, self.common, own, within(parts, tile, MARGIN))
 
 

@@ -34,6 +34,11 @@ class TableFiles:
     def __init__(self) -> None:
         self._texts: dict[Path, str] = {}
 
+    @property
+    def files(self) -> list[Path]:
+        """The files that were read."""
+        return list(self._texts)
+
     def text(self, path: Path) -> str:
         """The text of a file.
 

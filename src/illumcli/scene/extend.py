@@ -26,11 +26,13 @@ class SceneReader:
 
     roots: tuple[Path, ...]
     problems: list[Problem] = field(default_factory=list)
-    files: int = 0
+    paths: list[Path] = field(default_factory=list)
+    """The files that were read, or should have been."""
     nodes: int = 0
 
     def file(self, path: Path, above: tuple[Path, ...]) -> Node | None:
         """The tree of a scene file, merged with all that it extends; `above` are the files that extend it."""
+        self.paths.append(path)
         try:
             with path.open("rb") as stream:
                 text = stream.read(MAX_BYTES + 1)
@@ -43,7 +45,6 @@ class SceneReader:
     def text(self, text: bytes, path: Path, above: tuple[Path, ...]) -> Node | None:
         """The same of the text of a file that is, or will be, at `path`."""
         # Parse it, within the limits for all files together.
-        self.files += 1
         tree, problems = source.read(text, str(path))
         self.problems += problems
         if tree is None or not isinstance(tree.value, dict):
@@ -90,7 +91,7 @@ class SceneReader:
             return f"{node.value} extends itself; remove one extends:"
         if len(above) > MAX_EXTENDS:
             return f"more than {MAX_EXTENDS} files, each extending the next"
-        return f"more than {MAX_FILES} files in all" if self.files >= MAX_FILES else None
+        return f"more than {MAX_FILES} files in all" if len(self.paths) >= MAX_FILES else None
 
 
 def merged(base: Node, over: Node) -> Node:

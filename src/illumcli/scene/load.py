@@ -38,13 +38,15 @@ class SceneText(Value):
     roots: tuple[Path, ...]
     tables: TableFiles = field(default_factory=TableFiles)
     """Files that its curves name, once they were read."""
+    files: tuple[Path, ...] = ()
+    """The files of the text itself, read or not."""
 
 
 def read_text(path: Path) -> SceneText:
     """The text of the scene file `path`; nothing is written where that is a mesh file."""
     reader = SceneReader(readable_folders(path.parent))
     tree = None if is_mesh_file(path) else reader.file(path, ())
-    return SceneText(tree, tuple(reader.problems), reader.roots)
+    return SceneText(tree, tuple(reader.problems), reader.roots, files=tuple(reader.paths))
 
 
 def read_frames(path: Path, overrides: Sequence[str] = (), text: SceneText | None = None) -> Frames | None:

@@ -18,11 +18,13 @@ from illumcli.commands.unit import Worker
 from illumcli.commands.work import Work, work_of
 from illumcli.images.jpeg import jpeg_bytes
 from illumcli.progress import Progress
+from illumcli.rays.viewpoints import Camera
 from illumcli.records import Record
-from illumcli.scene.load import load
+from illumcli.scene.load import load, read_text
 from illumcli.scene.scene_file import SceneFile
 from illumcli.viewer.quality import Coarse, coarse_scene
-from illumcli.viewer.shown import Shown, view_values, with_values
+from illumcli.viewer.watching import Watch
+from illumcli.viewer.window import Window
 
 PICKED = ("object_id", "material_id")
 """Layers of full pictures that say what is under the mouse."""
@@ -33,37 +35,56 @@ BEHIND = 36
 class Picture(Record):
     """A picture of a window."""
 
-    shown: Shown
-    layer: str
+    window: Window
     coarse: Coarse | None
     """How coarse it is; None for the full picture."""
     image: HeldImage
     report: Report
     seconds: float
 
-    def layers(self) -> dict[str, NDArray[Any]]:
-        """Layer -> (H, W, C), as ``illum render`` writes them."""
-        return self.image.layers()
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        return self.image.target.view.width, self.image.target.height
+
+    @property
+    def camera(self) -> Camera:
+        """Its camera in its place, though the scene may only say what it fits."""
+        return self.image.target.view.camera
+
+    @property
+    def rays(self) -> int:
+        """The rays that were cast for it."""
+        return sum(self.report.rays.values())
 
     @property
     def error(self) -> float | None:
         """Its root mean square error, where one was measured."""
-        errors = self.report.audited_error.get(self.shown.camera)
+        errors = self.report.audited_error.get(self.window.camera)
         return None if errors is None else float(errors["rmse"])
+
+    def layers(self) -> dict[str, NDArray[Any]]:
+        """Layer -> (H, W, C), as ``illum render`` writes them."""
+        return self.image.layers()
+
+    def channels(self, layer: str) -> list[str]:
+        """The names of a layer's channels, without the layer's."""
+        (found,) = (each for each in self.image.target.layers if each.name == layer)
+        return [name.rpartition(".")[2] for name in self.image.work.development.names(found)]
 
     def pixels(self) -> NDArray[np.uint8]:
         """(H, W, 1 or 3), as a PNG shows the layer, in front of grey."""
         image = self.image
-        (layer,) = (layer for layer in image.target.layers if layer.name == self.layer)
+        (layer,) = (each for each in image.target.layers if each.name == self.window.layer)
         target = replace(image.target, path=Path("picture.png"), layers=(layer,))
         pixels = image.work.development.encoded(target, self.layers(), (0, 0), image.space)
         if pixels.shape[-1] not in (2, 4):
             return pixels
-        alpha = pixels[..., -1:]
+        colors, alpha = pixels[..., :-1], pixels[..., -1:]
         if (alpha == 255).all():
-            return pixels[..., :-1]
+            return colors
         share = alpha.astype(np.float32) / 255
-        return np.rint(pixels[..., :-1] * share + BEHIND * (1 - share)).astype(np.uint8)
+        return np.rint(colors * share + BEHIND * (1 - share)).astype(np.uint8)
 
     def jpeg(self) -> bytes:
         """The bytes that a browser shows."""
@@ -71,7 +92,7 @@ class Picture(Record):
 
 
 class Renderer:
-    """Renders one scene again and again.
+    """Renders one scene again and again, and tells when its files change.
 
     Parameters
     ----------
@@ -88,8 +109,11 @@ class Renderer:
         self._images = HeldImages()
         self._worker = Worker(self._images)
         self._last: dict[bool, Work] = {}
+        self._watch = Watch()
+        self._files = 0
+        """Number of the files of the scene that are watched."""
 
-    def loaded(self, overrides: Sequence[str]) -> SceneFile:
+    def loaded(self, overrides: Sequence[str] = ()) -> SceneFile:
         """The scene with overrides.
 
         Raises
@@ -99,8 +123,30 @@ class Renderer:
         """
         return load(self.path, (*self.given, *overrides), self._worker.shared(self.path).text)
 
-    def picture(self, shown: Shown, loaded: SceneFile, coarse: Coarse | None, progress: Progress) -> Picture:
-        """The picture of what a window shows; `loaded` has its edits.
+    def read(self) -> SceneFile:
+        """Read the files of the scene, again; where they are faulty, the scene stays as it was.
+
+        Raises
+        ------
+        InputError
+            All problems of the scene without edits.
+        """
+        self._watch.begin()
+        text = read_text(self.path)
+        self._watch.add([self.path, *text.files])
+        loaded = load(self.path, self.given, text)
+        self._watch.add(text.tables.files)
+        self._worker.reread(self.path, text)
+        self._files = 0
+        return loaded
+
+    @property
+    def is_outdated(self) -> bool:
+        """True if files have changed since they were read."""
+        return self._watch.have_changed()
+
+    def picture(self, window: Window, coarse: Coarse | None, progress: Progress) -> Picture:
+        """The picture of a window.
 
         Raises
         ------
@@ -108,25 +154,25 @@ class Renderer:
             What ``illum render`` would say.
         """
         start = time.perf_counter()
-        scene = with_values(loaded.scene, view_values(shown, loaded.scene))
-        only = (shown.layer,) if coarse else tuple(dict.fromkeys((shown.layer, *PICKED)))
+        scene = window.scene if coarse is None else coarse_scene(window.scene, window.camera, coarse)
         options = RenderOptions(
             pattern="{camera}.exr",
-            only=only,
+            only=tuple(dict.fromkeys((window.layer, *PICKED))) if coarse is None else (window.layer,),
             threads=self._threads,
             force=True,
             cache=False,
             audit=coarse is None,
         )
-        if coarse is not None:
-            scene = coarse_scene(scene, shown.camera, coarse)
-        job = RenderJob(self.path, options, cameras=(shown.camera,))
+        job = RenderJob(self.path, options, cameras=(window.camera,))
         files = self._worker.shared(self.path).files
-        work = replace(work_of(job, replace(loaded, scene=scene), files), images=self._images)
+        work = replace(work_of(job, replace(window.now, scene=scene), files), images=self._images)
+        if files.count != self._files:  # looking for what files name takes a while
+            self._watch.add(files.paths())
+            self._files = files.count
 
         # Coarse and full pictures take turns: what either will read again stays in memory.
         self._images.images.clear()
         _, report = self._worker.run(work, progress, self._last.get(coarse is None))
         self._last[coarse is not None] = work
         (image,) = self._images.images
-        return Picture(shown, shown.layer, coarse, image, report, time.perf_counter() - start)
+        return Picture(window, coarse, image, report, time.perf_counter() - start)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from illumcli.records import Value
 from illumcli.scene.spec import Scene
+from illumcli.viewer.window import camera_path, with_values
 
-RAYS = 8
-"""Obscurance rays of a sample of a coarse picture, at most; its obscurance is reconstructed."""
+FEWEST_RAYS, FEW_RAYS = 4, 8
+"""Obscurance rays of a sample of a coarse picture, while something moves and at rest; its obscurance is
+reconstructed."""
 
 
 class Coarse(Value):
@@ -14,22 +16,20 @@ class Coarse(Value):
 
     divisor: float = 1.0
     """Its width and height are divided by this."""
-    rays: int = RAYS
+    rays: int = FEW_RAYS
+    """Of each sample's obscurance, if the scene has any."""
 
 
 def coarse_scene(scene: Scene, camera: str, coarse: Coarse) -> Scene:
-    """The scene with one sample for each pixel of a smaller picture, and few obscurance rays."""
+    """The scene with one sample for each pixel of a smaller picture of a camera, and few obscurance rays."""
     view = scene.named_cameras()[camera]
-    size = {
-        name: max(1, round((getattr(view, name) or getattr(scene.film, name)) / coarse.divisor))
-        for name in ("width", "height")
-    }
-    seen = view.model_copy(update={**size, "samples": 1})
-    changes: dict[str, object] = (
-        {"cameras": {**scene.cameras, camera: seen}} if scene.cameras else {"camera": seen}
-    )
-    changes["film"] = scene.film.model_copy(update={"adaptive": False})
+    path = camera_path(scene, camera)
+    scene = scene if scene.cameras or scene.camera else scene.model_copy(update={"camera": view})
+    values: dict[str, object] = {"film.adaptive": False, f"{path}.samples": 1}
+    for name in ("width", "height"):
+        pixels = getattr(view, name) or getattr(scene.film, name)
+        values[f"{path}.{name}"] = max(1, round(pixels / coarse.divisor))
     if scene.obscurance is not None:
-        few = {"samples": min(coarse.rays, scene.obscurance.samples), "reconstruct": True}
-        changes["obscurance"] = scene.obscurance.model_copy(update=few)
-    return scene.model_copy(update=changes)
+        values["obscurance.samples"] = coarse.rays
+        values["obscurance.reconstruct"] = True
+    return with_values(scene, values)

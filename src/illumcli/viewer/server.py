@@ -30,6 +30,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
+EVERYWHERE = ("", "0.0.0.0", "::")
 LARGEST = 1 << 20
 """Bytes of a message of the page, at most."""
 
@@ -52,11 +53,12 @@ class Viewer:
             raise InputError(
                 "illum view needs websockets; install it: pip install 'illumcli[view]'"
             ) from None
+        if host in EVERYWHERE:
+            raise InputError(f"--host {host}: give one address of this machine; the page's own has it in it")
         self._session = session
         self._token = secrets.token_urlsafe(18)
-        quiet = logging.getLogger("illumcli.viewer")
+        quiet = logging.Logger("illum view")  # connections that break off are no news
         quiet.addHandler(logging.NullHandler())
-        quiet.propagate = False
         try:
             self._server: Server = serve(
                 self._connected,
@@ -117,8 +119,14 @@ class Viewer:
             except ConnectionClosed:
                 session.close()
 
+        def render() -> None:
+            try:
+                session.run()
+            finally:  # after a fault the page connects again
+                connection.close()
+
         session = self._session(send)
-        rendering = Thread(target=session.run, name="session", daemon=True)
+        rendering = Thread(target=render, name="session", daemon=True)
         rendering.start()
         try:
             for message in connection:

@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from threading import Condition
 from typing import Any
 
 from illumcli.errors import InputError, known
-from illumcli.layers import FIXED, PER_LIGHT
+from illumcli.layers import FIXED
 from illumcli.rays.viewpoints import Camera
-from illumcli.scene.scene_file import SceneFile
-from illumcli.viewer.cameras import dollied, orbited, panned, placement
+from illumcli.viewer.answers import picture_answer, pixel_answer, scene_answer
+from illumcli.viewer.changes import changed, reread
+from illumcli.viewer.controls import controls
 from illumcli.viewer.messages import Message, coalesced
+from illumcli.viewer.pace import Pace
 from illumcli.viewer.pictures import Picture, Renderer
-from illumcli.viewer.quality import Coarse
-from illumcli.viewer.shown import Shown, camera_path
+from illumcli.viewer.quality import FEW_RAYS, FEWEST_RAYS, Coarse
+from illumcli.viewer.watching import PERIOD
+from illumcli.viewer.window import Window
 
 Send = Callable[[str | bytes], None]
 """Sends a message to the page."""
+LINGER = 0.15
+"""Seconds without a message after which a drag counts as resting, so that pictures become finer."""
+TRACED, SHADED = 0.12, 0.04
+"""Seconds for a coarse picture whose rays are cast anew, and for one that casts few or none."""
+GEOMETRY = {"hits", "obscurance", "raw_obscurance"}
+"""Buffers whose rays are many; those of a light that moves are few."""
+
+
+QUESTIONS = ("pick",)
+"""Messages that change nothing."""
 
 
 class Superseded(Exception):
@@ -28,14 +40,18 @@ class Superseded(Exception):
 
 
 class Session:
-    """What one window shows; two threads use it: one receives messages, the other renders.
+    """What one window shows. One thread gives it messages; another one, in `run`, does everything else.
+
+    A message that changes the picture ends whatever is being rendered, at its next batch of rays. Then come a
+    coarse picture, at once, and finer ones up to the full picture. Coarse pictures are as large as the times
+    of the last ones allow; whether a change casts many rays is known from its last time.
 
     Parameters
     ----------
     renderer : Renderer
         Of the scene; this session's own.
     send : callable
-        Sends a text or bytes to the page; called by both threads.
+        Sends a text or bytes to the page.
     """
 
     def __init__(self, renderer: Renderer, send: Send) -> None:
@@ -44,24 +60,34 @@ class Session:
         self._news = Condition()
         self._pending: list[Message] = []
         self._is_closed = False
-        self._stamp: float | None = None
+
+        # What is shown, as of how many changes, and up to which of them the pictures are complete.
+        self._window: Window | None = None
+        self._version, self._complete = 0, 0
         self._picture: Picture | None = None
-        self._loaded: SceneFile | None = None
-        self._shown = Shown("main")
+        self._stamp: float | None = None
+        self._is_dragging = False
+        self._faulty: int | None = None
+        """The change whose problem the page shows."""
+        self._is_unread = False
+        """True if the file of the scene is faulty."""
+
+        # What the page knows of the controls, and what the pictures of changes cost.
+        self._told: dict[str, Any] = {}
+        self._causes: set[str] = set()
+        self._traced = {"move"}
+        self._moving, self._resting = Pace(TRACED), Pace(SHADED)
+        self._is_warm = False
+        self._coarse: Coarse | None = None
 
     def receive(self, text: str | bytes) -> None:
         """Take a message of the page."""
         try:
             message = json.loads(text)
-            kind = message["type"]
-        except (ValueError, TypeError, KeyError):
-            self._tell_problem([f"message: not understood: {text[:80]!r}"], "edit")
-            return
-        if kind == "pick":
-            self._answer_pick(message)
-            return
+        except ValueError:
+            message = None
         with self._news:
-            self._pending.append(message)
+            self._pending.append(message if isinstance(message, dict) else {"type": "unknown"})
             self._news.notify()
 
     def close(self) -> None:
@@ -71,180 +97,177 @@ class Session:
             self._news.notify()
 
     def run(self) -> None:
-        """Render until the session is closed: the newest state, first coarse, then in full."""
-        self._begin()
+        """Answer messages and render until the session is closed."""
+        self._read()
         while not self._is_closed:
             try:
-                self._render()
+                self._refine()
             except Superseded:
-                pass
+                continue
             except Exception as error:
                 if (fault := known(error)) is None:
                     raise
-                self._tell_problem(str(fault).splitlines(), "edit")
-            with self._news:
-                self._news.wait_for(lambda: self._pending or self._is_closed)
-            self._settle()
+                self._tell_problem(str(fault).splitlines(), "edit" if str(fault).startswith("-D") else "file")
+            self._complete = self._version
+            while self._complete == self._version and not self._is_closed:
+                self._wait(PERIOD)
+                self._listen()
 
-    def _begin(self) -> None:
-        loaded = self._loaded = self._renderer.loaded(())
-        self._shown = Shown(next(iter(loaded.scene.named_cameras())))
-        self._tell_scene()
+    # --- pictures -------------------------------------------------------------------------------------------
 
-    def _settle(self) -> None:
-        """Apply the messages that came; each that is faulty is reported and has no effect."""
+    def _refine(self) -> None:
+        """Show pictures of the window, from coarse to full."""
+        window, version = self._window, self._version
+
+        def go_on(*progress: object) -> None:
+            self._listen()
+            if self._version != version or self._is_closed:
+                raise Superseded
+
+        if window is None:
+            return
+        for coarse in self._stages(window):
+            self._show(window, coarse, go_on)
+            if self._is_dragging:
+                self._wait(LINGER)
+            go_on()
+
+    def _stages(self, window: Window) -> Iterator[Coarse | None]:
+        """How coarse the pictures are that follow a change."""
+        if window.layer in FIXED and FIXED[window.layer].per_pixel:  # it is made of complete pictures
+            yield None
+            return
+        pixels = window.film[0] * window.film[1]
+        obscurance = window.now.scene.obscurance
+        rays = 1 if obscurance is None else obscurance.samples
+        moving = Coarse(self._moving.divisor(pixels), min(FEWEST_RAYS, rays))
+        resting = Coarse(self._resting.divisor(pixels), min(FEW_RAYS, rays))
+        yield moving if self._coarse is None or self._causes & self._traced else self._coarse
+        if self._coarse != resting:
+            yield resting
+        yield None
+
+    def _show(self, window: Window, coarse: Coarse | None, go_on: Callable[..., None]) -> None:
+        """Render a picture, send it, and note its time."""
+        start = time.perf_counter()
+        picture = self._picture = self._renderer.picture(window, coarse, go_on)
+        if coarse is None:
+            self._complete = self._version
+        self._send(picture_answer(picture, self._stamp))
+        if self._faulty is not None and self._faulty < self._version and not self._is_unread:
+            self._faulty = None
+            self._tell({"type": "solved"})
+        if coarse is None:
+            return
+        is_traced = bool(GEOMETRY & picture.report.rays.keys())
+        self._traced = self._traced | self._causes if is_traced else self._traced - self._causes | {"move"}
+        if self._is_warm:  # nothing was read from files
+            pace = self._moving if is_traced else self._resting
+            pace.add(coarse.divisor, time.perf_counter() - start)
+        self._causes, self._coarse, self._is_warm = set(), coarse, True
+
+    # --- messages -------------------------------------------------------------------------------------------
+
+    def _wait(self, seconds: float) -> None:
+        """Wait for a message."""
+        with self._news:
+            self._news.wait_for(lambda: self._pending or self._is_closed, timeout=seconds)
+
+    def _listen(self) -> None:
+        """Apply the messages that came, and changes of files; what is faulty changes nothing."""
+        if self._renderer.is_outdated:
+            self._read()
         with self._news:
             messages, self._pending = self._pending, []
+        if not messages or self._window is None:
+            return
+        before, is_told, is_change = self._version, True, False
         for message in coalesced(messages):
-            self._stamp = message.get("stamp", self._stamp)
+            is_change |= message.get("type") not in QUESTIONS
             try:
-                self._apply(message)
+                is_told = self._apply(message) and is_told
             except InputError as error:
-                self._tell_problem(error.problems, "edit")
-            except (KeyError, TypeError, ValueError) as error:
-                self._tell_problem([f"message: not understood: {error}: {json.dumps(message)[:80]}"], "edit")
+                self._tell_problem(error.problems, "save" if message.get("type") == "save" else "edit")
+                is_told = False
+            except (LookupError, TypeError, ValueError) as error:
+                text = json.dumps(message)[:80]
+                self._tell_problem([f"message: not understood: {text}: {error}"], "edit")
+        if not is_told:
+            self._tell_controls(self._window)
+        if is_change and before == self._version == self._complete:
+            self._tell({"type": "same", "stamp": self._stamp})
 
-    def _apply(self, message: Message) -> None:
-        """Change what is shown as a message says."""
-        assert self._loaded is not None
-        shown, loaded = self._shown, self._loaded
-        edits: Mapping[str, Any] = shown.edits
-        match message["type"]:
-            case "view":
-                self._shown = _with_view(shown, message, loaded)
-                return
-            case "set":
-                edits = {**edits, str(message["path"]): message["value"]}
-            case "reset":
-                path = message.get("path")
-                edits = {name: value for name, value in edits.items() if path is not None and name != path}
-            case "move":
-                camera = _moved(self._camera(), message)
-                path = camera_path(loaded.scene, shown.camera)
-                edits = {**edits, **{f"{path}.{name}": value for name, value in placement(camera).items()}}
-            case kind:
-                raise ValueError(f"no type '{kind}'")
-        self._loaded = self._renderer.loaded([f"{path}={json.dumps(value)}" for path, value in edits.items()])
-        self._shown = replace(shown, edits=edits)
+    def _apply(self, message: Message) -> bool:
+        """Do what a message says. Returns False if the page has to be told what its controls show now."""
+        assert self._window is not None
+        kind = message["type"]
+        if kind == "pick":
+            if self._picture is not None:
+                self._tell({**pixel_answer(self._picture, message["x"], message["y"]), **_stamp(message)})
+            return True
+
+        # A change: the page knows already what it sets.
+        if (stamp := message.get("stamp")) is not None:
+            self._stamp = max(self._stamp or 0.0, float(stamp))
+        self._is_dragging = bool(message.get("dragging"))
+        if kind == "set" and message["path"] in self._told:
+            self._told[message["path"]] = message["value"]
+        if kind in ("reset", "restore"):
+            self._told.clear()
+        window = changed(self._window, message, self._renderer.loaded, self._camera())
+        if window.choices != self._window.choices:
+            self._version += 1
+            self._causes.add(str(message.get("path", kind)))
+        self._window = window
+        return kind == "view" or self._is_dragging
 
     def _camera(self) -> Camera:
-        """The camera as it is placed."""
-        assert self._loaded is not None
-        camera = self._loaded.scene.named_cameras()[self._shown.camera]
-        if camera.fit is None or self._picture is None:
+        """The window's camera in its place."""
+        assert self._window is not None
+        camera = self._window.now.scene.named_cameras()[self._window.camera]
+        if camera.fit is None or self._picture is None or self._picture.window.camera != self._window.camera:
             return camera
-        return self._picture.image.target.view.camera
+        return self._picture.camera
 
-    def _render(self) -> None:
-        for coarse in (Coarse(), None):
-            assert self._loaded is not None
-            picture = self._renderer.picture(self._shown, self._loaded, coarse, self._unless_newer)
-            self._picture = picture
-            header = {
-                "type": "picture",
-                "stage": "full" if coarse is None else "coarse",
-                "layer": picture.layer,
-                "camera": picture.shown.camera,
-                "width": picture.image.target.view.width,
-                "height": picture.image.target.height,
-                "seconds": picture.seconds,
-                "rays": sum(picture.report.rays.values()),
-                "error": picture.error,
-                "stamp": self._stamp,
-            }
-            text = json.dumps(header).encode()
-            self._send(struct.pack("<I", len(text)) + text + picture.jpeg())
-            self._unless_newer("", 0, 0)
-
-    def _unless_newer(self, what: str, done: int, total: int) -> None:
-        """Called while a picture is rendered."""
-        if self._pending or self._is_closed:
-            raise Superseded
-
-    def _answer_pick(self, message: Message) -> None:
-        picture, loaded = self._picture, self._loaded
-        if picture is None or loaded is None:
+    def _read(self) -> None:
+        """Read the scene, at first or because its files have changed; edits that it cannot have any more are
+        left out."""
+        try:
+            original = self._renderer.read()
+        except InputError as error:
+            self._tell_problem(error.problems, "file")
+            self._is_unread = True
             return
-        layers = picture.layers()
-        height, width = next(iter(layers.values())).shape[:2]
-        x, y = (min(n - 1, max(0, int(message[k] * n))) for k, n in (("x", width), ("y", height)))
-        target = picture.image.target
-        names = {
-            layer.name: [name.rpartition(".")[2] for name in picture.image.work.development.names(layer)]
-            for layer in target.layers
-        }
-        values = {
-            name: dict(zip(names[name], (each.item() for each in layers[name][y, x]), strict=True))
-            for name in layers
-        }
-        answer: dict[str, Any] = {
-            "type": "pixel",
-            "x": x,
-            "y": y,
-            "layers": values,
-            "stamp": message.get("stamp"),
-        }
-        if "object_id" in values and (number := int(values["object_id"]["Y"])) > 0:
-            thing = loaded.scene.objects[number - 1]
-            answer["object"] = loaded.scene.object_names()[number - 1]
-            answer["material"] = thing.material if isinstance(thing.material, str) else None
-        self._tell(answer)
+        self._is_unread = False
+        self._window, problems = reread(self._window, original, self._renderer.loaded)
+        self._version += 1
+        self._is_warm = False
+        self._told.clear()
+        self._tell_controls(self._window)
+        if problems:
+            self._tell_problem(problems, "edit")
 
-    def _tell_scene(self) -> None:
-        assert self._loaded is not None
-        scene, shown = self._loaded.scene, self._shown
-        lights = scene.named_lights()
-        per_light = [(row, light) for row in PER_LIGHT.values() for light in lights]
-        self._tell(
-            {
-                "type": "scene",
-                "name": self._loaded.name,
-                "cameras": list(scene.named_cameras()),
-                "layers": [
-                    *({"name": layer.name, "help": layer.text} for layer in FIXED.values()),
-                    *({"name": row.of(light).name, "help": row.text} for row, light in per_light),
-                ],
-                "lights": [{"name": name, "kind": dict(light)["light"]} for name, light in lights.items()],
-                "models": [],
-                "materials": [
-                    {"name": name, "model": dict(model)["model"], "objects": []}
-                    for name, model in scene.materials.items()
-                ],
-                "controls": [],
-                "edits": dict(shown.edits),
-                "view": {"camera": shown.camera, "layer": shown.layer},
-                "film": [scene.film.width, scene.film.height],
-            }
-        )
+    # --- answers --------------------------------------------------------------------------------------------
 
-    def _tell_problem(self, lines: Any, origin: str) -> None:
+    def _tell_controls(self, window: Window) -> None:
+        """Tell the page the values of controls that it does not know; the whole scene if the controls differ
+        from those that it has."""
+        current = controls(window.original, window.now)
+        values = {control.path: control.value for control in current}
+        if values.keys() != self._told.keys():
+            self._tell(scene_answer(window, current))
+        else:
+            news = {path: value for path, value in values.items() if value != self._told[path]}
+            self._tell({"type": "values", "values": news, "edits": dict(window.edits)})
+        self._told = values
+
+    def _tell_problem(self, lines: Sequence[str], origin: str) -> None:
+        self._faulty = self._version
         self._tell({"type": "problem", "lines": list(lines), "from": origin})
 
     def _tell(self, answer: Mapping[str, Any]) -> None:
         self._send(json.dumps(answer))
 
 
-def _with_view(shown: Shown, message: Message, loaded: SceneFile) -> Shown:
-    """What is shown after a message about the view."""
-    changes: dict[str, Any] = {}
-    if "camera" in message:
-        if message["camera"] not in loaded.scene.named_cameras():
-            raise ValueError(f"no camera '{message['camera']}'")
-        changes["camera"] = message["camera"]
-    if "layer" in message:
-        changes["layer"] = str(message["layer"])
-    if "exposure" in message:
-        changes["exposure"] = float(message["exposure"])
-    if "width" in message and "height" in message:
-        changes["size"] = (int(message["width"]), int(message["height"]))
-    if "hidden_lights" in message:
-        changes["hidden_lights"] = frozenset(message["hidden_lights"])
-    return replace(shown, **changes)
-
-
-def _moved(camera: Camera, message: Message) -> Camera:
-    if "orbit" in message:
-        return orbited(camera, *message["orbit"])
-    if "pan" in message:
-        return panned(camera, *message["pan"])
-    return dollied(camera, float(message["dolly"]))
+def _stamp(message: Message) -> dict[str, Any]:
+    return {"stamp": message["stamp"]} if "stamp" in message else {}

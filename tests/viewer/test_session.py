@@ -1,0 +1,312 @@
+"""Sessions without a server: messages in, answers and pictures out."""
+
+from __future__ import annotations
+
+import json
+import struct
+from queue import Queue
+from threading import Event, Thread
+
+import pytest
+
+from illumcli.viewer import watching
+from illumcli.viewer.pictures import Renderer
+from illumcli.viewer.session import Session
+
+PATIENCE = 15
+
+
+class Page:
+    """What a page does: it sends messages with stamps, and takes answers and pictures."""
+
+    def __init__(self, renderer):
+        self.answers = Queue()
+        self.session = Session(renderer, self.answers.put)
+        self.thread = Thread(target=self.session.run, daemon=True)
+        self.thread.start()
+        self.stamp = 0
+
+    def tell(self, **message):
+        self.stamp += 1
+        self.session.receive(json.dumps({**message, "stamp": self.stamp}))
+
+    def next(self):
+        answer = self.answers.get(timeout=PATIENCE)
+        if isinstance(answer, str):
+            return json.loads(answer)
+        (length,) = struct.unpack("<I", answer[:4])
+        header = json.loads(answer[4 : 4 + length])
+        assert answer[4 + length :].startswith(b"\xff\xd8")  # a JPEG
+        return header
+
+    def until(self, **wanted):
+        """All answers up to one that has these values; the last one has them."""
+        answers = []
+        while not (answers and all(answers[-1].get(key) == value for key, value in wanted.items())):
+            answers.append(self.next())
+        return answers
+
+    def settled(self):
+        """All answers up to the full picture of all messages, or that there is nothing new to show."""
+        answers = []
+        while True:
+            answers.append(self.next())
+            is_last = answers[-1]["type"] == "same" or answers[-1].get("stage") == "full"
+            if is_last and (answers[-1]["stamp"] or 0) >= self.stamp:
+                return answers
+
+    def close(self):
+        self.session.close()
+        self.thread.join(timeout=PATIENCE)
+        assert not self.thread.is_alive()
+
+
+@pytest.fixture
+def opened():
+    """Opens pages, and closes them."""
+    pages = []
+
+    def open_page(renderer):
+        pages.append(Page(renderer))
+        return pages[-1]
+
+    yield open_page
+    for page in pages:
+        page.close()
+
+
+@pytest.fixture
+def page(opened, scene):
+    """A page whose first full picture is there."""
+    page = opened(Renderer(scene, threads=1))
+    page.settled()
+    return page
+
+
+def types(answers):
+    return [answer.get("stage", answer["type"]) for answer in answers]
+
+
+def pictures(answers):
+    return [answer for answer in answers if answer["type"] == "picture"]
+
+
+def test_a_window_begins_with_the_scene_and_its_first_layer(opened, scene):
+    scene.write_text(scene.read_text() + "outputs: {layers: [normal, depth]}\n")
+    answers = opened(Renderer(scene, threads=1)).settled()
+    assert types(answers)[0] == "scene"
+    assert answers[0]["view"] == {
+        "camera": "main", "layer": "normal", "exposure": 0.0, "width": 96, "height": 54, "hidden_lights": [],
+    }  # fmt: skip
+    assert answers[0]["materials"][0] == {"name": "clay", "model": "phong", "objects": ["ball"]}
+    assert {"name": "fill", "kind": "point"} in answers[0]["lights"]
+    assert {"name": "ward"}.items() <= next(m for m in answers[0]["models"] if m["name"] == "ward").items()
+    names = [layer["name"] for layer in answers[0]["layers"]]
+    assert {"beauty", "depth", "key", "shadow.fill"} <= set(names)
+    assert "materials.clay.exponent" in [control["path"] for control in answers[0]["controls"]]
+    assert answers[0]["film"] == [96, 54]
+    assert types(pictures(answers))[0] == "coarse"
+    assert {picture["layer"] for picture in pictures(answers)} == {"normal"}
+
+
+def test_a_material_costs_no_ray_and_comes_with_the_newest_stamp(page):
+    page.tell(type="set", path="materials.clay.diffuse", value=[0.1, 0.2, 0.3])
+    answers = page.settled()
+    assert types(answers) == ["values", "coarse", "full"]
+    assert answers[0] == {
+        "type": "values", "values": {}, "edits": {"materials.clay.diffuse": [0.1, 0.2, 0.3]},
+    }  # fmt: skip
+    assert [picture["rays"] for picture in pictures(answers)] == [0, 0]
+    assert {picture["stamp"] for picture in pictures(answers)} == {1}
+
+
+def test_what_changes_nothing_is_answered_too(page):
+    page.tell(type="set", path="materials.clay.exponent", value=20)
+    assert types(page.settled())[-1] == "same"
+    page.tell(type="view", layer="beauty", hidden_lights=[])
+    assert types(page.settled()) == ["same"]
+    page.tell(type="move", orbit=[0, 0], dragging=False)
+    assert types(page.settled())[-1] == "same"
+
+
+def test_a_refused_value_is_told_with_its_place_and_the_one_in_force(page):
+    page.tell(type="set", path="camera.fov", value=500)
+    problem, values, _ = page.settled()
+    assert problem["type"] == "problem"
+    assert problem["from"] == "edit"
+    assert problem["lines"] == ["-D camera.fov=500: must be below 180, is 500"]
+    assert values["values"] == {"camera.fov": 35.0}
+    assert values["edits"] == {}
+    page.tell(type="set", path="camera.fov", value=50)
+    assert types(page.settled()) == ["values", "coarse", "solved", "full"]
+
+
+def test_a_switch_of_the_model_brings_other_controls(page):
+    page.tell(type="set", path="materials.clay.model", value="ward")
+    answers = page.settled()
+    assert types(answers)[0] == "scene"
+    paths = [control["path"] for control in answers[0]["controls"]]
+    assert "materials.clay.alpha_x" in paths
+    assert "materials.clay.exponent" not in paths
+    assert {picture["rays"] for picture in pictures(answers)} == {0}
+    page.tell(type="reset")
+    answers = page.settled()
+    assert types(answers)[0] == "scene"
+    assert answers[0]["edits"] == {}
+    page.tell(type="model", material="clay", model="ward")
+    assert types(page.settled())[0] == "scene"
+
+
+def test_all_motions_count_though_pictures_are_skipped(page, scene):
+    for _ in range(50):
+        page.tell(type="move", orbit=[0.01, 0], dragging=True)
+    page.tell(type="move", orbit=[0, 0], dragging=False)
+    answers = page.settled()
+    (values,) = (answer for answer in answers if answer["type"] == "values")
+    x, _, z = values["values"]["camera.position"]
+    assert x == pytest.approx(-4, abs=0.01)  # half a turn of half a turn
+    assert z == pytest.approx(0, abs=0.01)
+    assert len(pictures(answers)) < 40
+
+
+def test_a_drag_is_shown_coarse_and_rests_full(page):
+    page.tell(type="set", path="lights.key.position", value=[-2, 5, 3], dragging=True)
+    answers = page.settled()
+    assert types(answers) == ["coarse", "full"]
+    page.tell(type="set", path="lights.key.position", value=[-2, 5, 3], dragging=False)
+    assert types(page.settled()) == ["values", "same"]
+
+
+def test_values_under_the_mouse(page):
+    page.tell(type="pick", x=0.5, y=0.5)
+    (pixel,) = page.until(type="pixel")
+    assert (pixel["object"], pixel["material"], pixel["stamp"]) == ("ball", "clay", 1)
+    assert (pixel["x"], pixel["y"]) == (48, 27)
+    assert pixel["layers"]["object_id"] == {"Y": 1}
+    assert set(pixel["layers"]["beauty"]) == {"R", "G", "B"}
+    page.tell(type="pick", x=1.0, y=0)
+    (pixel,) = page.until(type="pixel")
+    assert (pixel["x"], pixel["y"]) == (95, 0)
+    assert (pixel["object"], pixel["material"]) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "nonsense", "[1]", "{}", '{"type": "dance"}', '{"type": "set", "path": "materials.clay"}',
+             '{"type": ["set"]}', '{"type": "move", "orbit": "left"}',
+             '{"type": "set", "path": {}, "value": 1}', '{"type": "restore"}',
+             '{"type": "view", "width": 3}', '{"type": "pick", "x": "left", "y": 0}',
+             '{"type": "move", "orbit": [NaN, 0]}', '{"type": "set", "path": "camera.fov", "value": NaN}',
+             '{"type": "set", "path": "", "value": 1}'],
+)  # fmt: skip
+def test_messages_that_make_no_sense_are_told_and_change_nothing(page, text):
+    page.session.receive(text)
+    assert page.until(type="problem")[-1]["from"] == "edit"
+    page.tell(type="view", layer="beauty")
+    assert types(page.settled())[-1] == "same"
+
+
+def test_a_picture_in_progress_gives_way_to_a_newer_message(opened, scene):
+    begun = Event()
+
+    class Slow(Renderer):
+        """Full pictures take for ever, until someone stops them."""
+
+        def picture(self, window, coarse, progress):
+            while coarse is None and "materials.clay.exponent" not in window.edits:
+                begun.set()
+                progress("main", 0, 1)
+            return super().picture(window, coarse, progress)
+
+    page = opened(Slow(scene, threads=1))
+    assert begun.wait(PATIENCE)
+    page.tell(type="pick", x=0.5, y=0.5)  # is answered meanwhile
+    assert types(page.until(type="pixel")).count("full") == 0
+    page.tell(type="set", path="materials.clay.exponent", value=5)
+    answers = page.settled()
+    assert types(answers).count("full") == 1
+    assert answers[-1]["stamp"] == 2
+
+
+def test_a_closed_window_ends_at_once(opened, scene):
+    begun = Event()
+
+    class Slow(Renderer):
+        def picture(self, window, coarse, progress):
+            while True:
+                begun.set()
+                progress("main", 0, 1)
+
+    page = opened(Slow(scene))
+    assert begun.wait(PATIENCE)
+    page.close()
+
+
+def test_windows_do_not_know_of_each_other(opened, scene):
+    first, second = opened(Renderer(scene, threads=1)), opened(Renderer(scene, threads=1))
+    first.settled()
+    second.settled()
+    first.tell(type="set", path="materials.clay.exponent", value=5)
+    first.settled()
+    second.tell(type="set", path="materials.floor.diffuse", value=0.1)
+    assert second.settled()[0]["edits"] == {"materials.floor.diffuse": 0.1}
+    assert first.answers.empty()
+
+
+@pytest.fixture
+def _soon(monkeypatch):
+    """Changes of files are seen soon."""
+    monkeypatch.setattr(watching, "PERIOD", 0.02)
+
+
+@pytest.mark.usefixtures("_soon")
+def test_a_mistake_in_the_file_is_told_and_the_picture_stays_until_it_is_mended(page, scene):
+    text = scene.read_text()
+    page.tell(type="set", path="materials.clay.exponent", value=5)
+    page.settled()
+    scene.write_text(text.replace("model: phong", "model: phng"))
+    (problem,) = page.until(type="problem")
+    assert problem["from"] == "file"
+    assert problem["lines"] == [f"{scene}:7:10: materials.clay.model: no model 'phng'; did you mean 'phong'?"]
+    page.tell(type="set", path="materials.floor.diffuse", value=0.1)  # still possible, and solves nothing
+    assert types(page.settled()) == ["values", "coarse", "full"]
+    scene.write_text(text.replace("[0.6, 0.2, 0.1]", "[0.1, 0.2, 0.6]"))
+    answers = page.until(stage="full")
+    assert types(answers) == ["scene", "coarse", "solved", "full"]
+    assert answers[0]["edits"] == {"materials.clay.exponent": 5, "materials.floor.diffuse": 0.1}
+    assert {picture["rays"] for picture in pictures(answers)} == {0}
+
+
+@pytest.mark.usefixtures("_soon")
+def test_meshes_textures_and_extended_scenes_are_watched(opened, scene, tmp_path):
+    (tmp_path / "mesh.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0.2\nusemtl red\nf 1 2 3\n")
+    (tmp_path / "m.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    child = tmp_path / "child.yaml"
+    mesh = "{mesh: {file: mesh.obj, materials: true}}"
+    child.write_text(f"extends: ball.yaml\nobjects: [{mesh}]\nmaterials: {{clay: {{exponent: 3}}}}\n")
+    page = opened(Renderer(child, threads=1))
+    page.settled()
+    for path, old, new in (
+        (scene, "[0.6, 0.2, 0.1]", "[0.1, 0.2, 0.6]"),
+        (tmp_path / "mesh.obj", "v 1 0 0", "v 2 0 0"),
+        (tmp_path / "m.mtl", "Kd 1", "Kd 0.5"),
+    ):
+        path.write_text(path.read_text().replace(old, new))
+        assert types(page.until(stage="full"))[0] == "scene", path
+    (tmp_path / "mesh.obj").write_text("v 0 0\n")
+    (problem,) = (answer for answer in page.until(type="problem") if answer["type"] == "problem")
+    assert "mesh.obj" in problem["lines"][0]
+    assert problem["from"] == "file"
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0.2\nf 1 2 3\n")
+    assert "solved" in types(page.until(stage="full"))
+
+
+@pytest.mark.usefixtures("_soon")
+def test_a_scene_that_is_faulty_from_the_beginning_shows_once_it_is_mended(opened, scene):
+    text = scene.read_text()
+    scene.write_text(text.replace("version: 1", "version: 7"))
+    page = opened(Renderer(scene, threads=1))
+    (problem,) = page.until(type="problem")
+    assert problem["lines"][0].startswith(f"{scene}:1:")
+    page.tell(type="view", layer="depth")
+    scene.write_text(text)
+    assert types(page.until(stage="full"))[0] == "scene"

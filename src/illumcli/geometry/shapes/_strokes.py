@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 Points: TypeAlias = NDArray[np.float64]  # (N, 2)
 Face: TypeAlias = list[int]
 
-CURVE_STEPS = 6
+CURVE_STEPS = 8
 """Straight pieces of a parabola."""
-ARC_STEP = np.pi / 8
+ARC_STEP = np.pi / 12
 """Greatest angle between the corners of a round end [rad]."""
 SHARP = 0.7
 """Lines that turn by more than this have a round outer corner, others a pointed one [rad]."""

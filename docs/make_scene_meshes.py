@@ -55,7 +55,8 @@ def block() -> NDArray[np.float64]:
                 low + size * np.array(corners) for axis, end, corners in SIDES if (axis, end) != (1, -1)
             ]
             shrink = random.uniform(0.45, 0.8)
-            low = low + size * np.array([random.uniform(0, 1 - shrink), 1, random.uniform(0, 1 - shrink)])
+            aside = random.uniform(0.15, 0.85, 2) * (1 - shrink)
+            low = low + size * np.array([aside[0], 1, aside[1]])
             size = size * np.array([shrink, 0.35 * (random.random() < 0.6), shrink])
     return np.array(faces)
 

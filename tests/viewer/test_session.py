@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shlex
 import struct
 from queue import Queue
 from threading import Event, Thread
 
 import pytest
 
+from illumcli.scene.load import load
 from illumcli.viewer import watching
 from illumcli.viewer.pictures import Renderer
 from illumcli.viewer.session import Session
@@ -310,3 +312,58 @@ def test_a_scene_that_is_faulty_from_the_beginning_shows_once_it_is_mended(opene
     page.tell(type="view", layer="depth")
     scene.write_text(text)
     assert types(page.until(stage="full"))[0] == "scene"
+
+
+def test_the_panel_of_brdfs_is_answered_with_its_own_stamp(page):
+    page.tell(type="lobes", of=[{"material": "clay"}, {"model": "merl"}], theta=30, phi=0)
+    answer = page.next()
+    assert (answer["type"], answer["stamp"]) == ("lobes", 1)
+    assert [each["label"] for each in answer["lobes"]] == ["clay", "merl"]
+    assert "problem" in answer["lobes"][1]
+    page.tell(type="set", path="materials.clay.model", value="lambert")
+    page.settled()
+    page.tell(type="lobes", of=[{"material": "clay"}], theta=30, phi=0)
+    assert page.next()["lobes"][0]["title"] == "Lambert"
+
+
+def test_the_command_renders_the_picture(opened, scene, illum, tmp_path):
+    page = opened(Renderer(scene, ["film.samples=2"], threads=1))
+    page.settled()
+    page.tell(type="set", path="materials.clay.model", value="ward")
+    page.tell(type="view", layer="normal", exposure=1.5, width=40, height=30, hidden_lights=["fill"])
+    page.settled()
+    page.tell(type="command")
+    words = shlex.split(page.next()["text"])
+    assert words[:5] == ["illum", "render", str(scene), "-D", "film.samples=2"]
+    assert words[-2:] == ["--only", "normal"]
+    done = illum(*words[1:], "-o", "picture.png")
+    assert done.returncode == 0, done.stderr
+    width, height = struct.unpack(">II", (tmp_path / "picture.png").read_bytes()[16:24])
+    assert (width, height) == (40, 30)
+
+
+def test_edits_are_saved_as_a_scene(page, scene):
+    target = scene.with_name("new.yaml")
+    page.tell(type="set", path="materials.clay.exponent", value=50)
+    page.settled()
+    page.tell(type="save", file=str(target))
+    assert page.next() == {"type": "saved", "file": str(target), "stamp": 2}
+    assert load(target).scene.materials["clay"].exponent == 50
+
+    page.tell(type="reset")
+    page.settled()
+    page.tell(type="save", file=str(target))
+    problem = page.next()
+    assert (problem["type"], problem["from"]) == ("problem", "save")
+    assert "a different file is there" in problem["lines"][0]
+    page.next()
+    page.tell(type="save", file=str(target), replace=True)
+    assert page.next()["type"] == "saved"
+    assert load(target).scene == load(scene).scene
+
+
+def test_an_edit_that_only_a_render_can_refuse_is_not_blamed_on_the_file(page):
+    page.tell(type="set", path="materials.clay.diffuse", value="{vertex: no_such}")
+    (problem,) = (answer for answer in page.until(type="problem") if answer["type"] == "problem")
+    assert problem["from"] == "edit"
+    assert "no_such" in problem["lines"][0]

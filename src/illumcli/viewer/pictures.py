@@ -20,9 +20,13 @@ from illumcli.images.jpeg import jpeg_bytes
 from illumcli.progress import Progress
 from illumcli.rays.viewpoints import Camera
 from illumcli.records import Record
+from illumcli.render_graph.needs import layers
 from illumcli.scene.load import load, read_text
 from illumcli.scene.scene_file import SceneFile
+from illumcli.schema.sources import folders
+from illumcli.viewer.edits import overrides_of
 from illumcli.viewer.quality import Coarse, coarse_scene
+from illumcli.viewer.saving import command_text, save
 from illumcli.viewer.watching import Watch
 from illumcli.viewer.window import Window
 
@@ -139,6 +143,19 @@ class Renderer:
         self._worker.reread(self.path, text)
         self._files = 0
         return loaded
+
+    def command(self, window: Window) -> str:
+        """The command that renders the picture of a window, for a shell."""
+        own = [layer.name for layer in layers(window.now.scene, window.now.scene.outputs.layers)]
+        words = [] if own == [window.layer] else ["--only", window.layer]
+        for option, variable in (("--models", "ILLUM_MODELS"), ("--allow", "ILLUM_ALLOW")):
+            words += [word for folder in folders(variable) for word in (option, str(folder))]
+        return command_text(self.path, (*self.given, *window.overrides), words)
+
+    def save(self, target: Path, window: Window, replace: bool = False) -> None:
+        """Write the scene of a window with its edits; see `saving.save`."""
+        overrides = (*self.given, *overrides_of(window.edits))
+        save(target, self.path, overrides, self._worker.shared(self.path).text, replace)
 
     @property
     def is_outdated(self) -> bool:

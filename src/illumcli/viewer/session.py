@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from threading import Condition
 from typing import Any
 
-from illumcli.errors import InputError, known
+from illumcli.errors import IllumError, InputError, known
 from illumcli.layers import FIXED
 from illumcli.rays.viewpoints import Camera
 from illumcli.viewer.answers import picture_answer, pixel_answer, scene_answer
 from illumcli.viewer.changes import changed, reread
 from illumcli.viewer.controls import controls
+from illumcli.viewer.lobes import LobePanel
 from illumcli.viewer.messages import Message, coalesced
 from illumcli.viewer.pace import Pace
 from illumcli.viewer.pictures import Picture, Renderer
@@ -31,8 +33,8 @@ GEOMETRY = {"hits", "obscurance", "raw_obscurance"}
 """Buffers whose rays are many; those of a light that moves are few."""
 
 
-QUESTIONS = ("pick",)
-"""Messages that change nothing."""
+QUESTIONS = ("pick", "lobes", "save", "command")
+"""Messages that do not change what is shown."""
 
 
 class Superseded(Exception):
@@ -79,6 +81,7 @@ class Session:
         self._moving, self._resting = Pace(TRACED), Pace(SHADED)
         self._is_warm = False
         self._coarse: Coarse | None = None
+        self._lobes = LobePanel()
 
     def receive(self, text: str | bytes) -> None:
         """Take a message of the page."""
@@ -107,7 +110,8 @@ class Session:
             except Exception as error:
                 if (fault := known(error)) is None:
                     raise
-                self._tell_problem(str(fault).splitlines(), "edit" if str(fault).startswith("-D") else "file")
+                is_edited = self._window is not None and bool(self._window.edits)
+                self._tell_problem(str(fault).splitlines(), "edit" if is_edited else "file")
             self._complete = self._version
             while self._complete == self._version and not self._is_closed:
                 self._wait(PERIOD)
@@ -186,8 +190,9 @@ class Session:
             is_change |= message.get("type") not in QUESTIONS
             try:
                 is_told = self._apply(message) and is_told
-            except InputError as error:
-                self._tell_problem(error.problems, "save" if message.get("type") == "save" else "edit")
+            except IllumError as error:
+                lines = str(error).splitlines()
+                self._tell_problem(lines, "save" if message.get("type") == "save" else "edit")
                 is_told = False
             except (LookupError, TypeError, ValueError) as error:
                 text = json.dumps(message)[:80]
@@ -201,9 +206,9 @@ class Session:
         """Do what a message says. Returns False if the page has to be told what its controls show now."""
         assert self._window is not None
         kind = message["type"]
-        if kind == "pick":
-            if self._picture is not None:
-                self._tell({**pixel_answer(self._picture, message["x"], message["y"]), **_stamp(message)})
+        if kind in QUESTIONS:
+            if answer := self._answer(self._window, message):
+                self._tell({**answer, **_stamp(message)})
             return True
 
         # A change: the page knows already what it sets.
@@ -220,6 +225,20 @@ class Session:
             self._causes.add(str(message.get("path", kind)))
         self._window = window
         return kind == "view" or self._is_dragging
+
+    def _answer(self, window: Window, message: Message) -> dict[str, Any] | None:
+        """The answer to a question; None if there is none yet."""
+        match message["type"]:
+            case "pick":
+                picture = self._picture
+                return None if picture is None else pixel_answer(picture, message["x"], message["y"])
+            case "lobes":
+                return self._lobes.answer(window.now, message)
+            case "save":
+                self._renderer.save(Path(message["file"]), window, bool(message.get("replace")))
+                return {"type": "saved", "file": message["file"]}
+            case _:
+                return {"type": "command", "text": self._renderer.command(window)}
 
     def _camera(self) -> Camera:
         """The window's camera in its place."""

@@ -24,8 +24,12 @@ def main(folder: Path, draft: bool) -> int:
     pages |= command_reference.pages()
     drawn = draw(model_pages.drawings(), folder / "drawn", draft)
     shown = gallery.pages(folder / "gallery", draft)
-    source.write(folder / "source", pages | shown | source.pictures() | drawn | source.linked_files(pages))
-    words = ["-c", source.DOCS, "-W", "--keep-going", "-q", "-j", "2", "-d", folder / "doctrees"]
+    source.write(
+        folder / "source",
+        pages | shown | source.pictures() | source.notebooks() | drawn | source.linked_files(pages),
+    )
+    # -a: Sphinx forgets the index entries of pages that it does not write again, and search needs them
+    words = ["-a", "-c", source.DOCS, "-W", "--keep-going", "-q", "-j", "2", "-d", folder / "doctrees"]
     return build_main([str(word) for word in [*words, folder / "source", folder / "html"]])
 
 

@@ -99,15 +99,20 @@ def test_readmes_sample_of_mistakes_is_what_is_printed(folder):
 
 def test_readme_names_every_command():
     text = (ROOT / "README.md").read_text()
+    for name, what in COMMANDS.items():
+        assert f"| `illum {name}` | {what} |\n" in text, name
+
+
+def test_every_command_is_shown_on_a_page():
+    text = "".join(page.read_text() for page in PAGES)
     for name in COMMANDS:
         assert re.search(rf"^illum {name}\b", text, flags=re.M), name
 
 
-def test_readme_names_every_scene():
-    text = (ROOT / "README.md").read_text()
-    for scene in (ROOT / "scenes").glob("*.yaml"):
-        stem = "textbook-*" if scene.stem.startswith("textbook-") else scene.stem
-        assert f"`{stem}`" in text, scene.name
+@pytest.mark.parametrize("scene", sorted((ROOT / "scenes").glob("*.yaml")), ids=lambda scene: scene.stem)
+def test_every_scene_begins_with_its_title_and_its_idea(scene):
+    """The gallery shows them."""
+    assert re.match(r"# [^:\n]+: \S", scene.read_text()), scene.name
 
 
 def test_ci_runs_the_readmes_two_commands():

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
-from urllib.parse import unquote, urldefrag, urlsplit
+from urllib.parse import quote_plus, unquote, urldefrag, urlsplit
 
 import jsonschema
 import pytest
@@ -138,3 +139,24 @@ def test_the_examples_of_keys_are_valid(root, monkeypatch):
                 valid = {"$defs": definitions, **fact.schema}
                 if not re.search(r"\bcurve:", text):
                     jsonschema.Draft202012Validator(valid).validate(yaml.safe_load(text))
+
+
+@pytest.mark.parametrize(
+    ("words", "pages"),
+    [
+        ("Ambient occlusion", {"obscurance"}),
+        ("AO bake", {"obscurance"}),
+        ("BRDF viewer", {"view", "figures"}),
+        ("vertex colours", {"baking"}),
+        ("oren_nayar", {"models/oren_nayar"}),
+    ],
+)
+def test_words_lead_to_the_right_page(words, pages, site, chromium):
+    """From disk, as a reader opens it, the search lists the page first."""
+    chromium.get(f"{(site / 'search.html').as_uri()}?q={quote_plus(words)}")
+    links = "return [...document.querySelectorAll('ul.search li a')].map(a => a.getAttribute('href'))"
+    deadline = time.monotonic() + 20
+    while not (found := chromium.execute_script(links)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert found
+    assert urldefrag(found[0])[0].removesuffix(".html") in pages, found[:5]

@@ -107,6 +107,8 @@ def page(cls: Any, examples: Examples) -> str:
         f"(model-{tag.replace('_', '-')})=",
         f"# {name} (`{tag}`)",
         "",
+        f"```{{index}} ! {name.partition(',')[0]}\n```",
+        "",
         f"{what[0].upper()}{what[1:]}.",
         "",
     ]

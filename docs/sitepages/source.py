@@ -15,6 +15,16 @@ MOVED = {
     "benchmarks/README.md": "benchmarks.md",
 }
 """File of the repository outside of `docs` -> its page on the site."""
+SEARCHED = {
+    "obscurance.md": ("ambient occlusion", "AO", "AO bake", "bake ambient occlusion"),
+    "baking.md": ("vertex colours", "vertex colors", "bent normals", "thickness"),
+    "baking-faults.md": ("AO artifacts", "dark blobs", "seams"),
+    "figures.md": ("BRDF viewer", "BRDF plot", "lobe plot"),
+    "view.md": ("BRDF viewer", "interactive", "live view"),
+    "textures.md": ("AO map", "AO texture", "lightmap"),
+    "sweeps.md": ("parameter sweep", "batch rendering"),
+}
+"""Page -> words that people search it by, beside those of its text."""
 COPIES = "files/"
 """Folder of the site for other files that pages link to."""
 PICTURES = ("*.png", "*.svg")
@@ -27,7 +37,24 @@ def hand_written() -> dict[str, str]:
     """Name -> text of the pages that people write."""
     pages = {path.relative_to(DOCS).as_posix(): path for path in sorted(DOCS.glob("*.md"))}
     pages |= {page: ROOT / file for file, page in MOVED.items()}
-    return {page: with_links(path.read_text(), path) for page, path in pages.items()}
+    written = {page: with_links(path.read_text(), path) for page, path in pages.items()}
+    for page in written.keys() & SEARCHED.keys():
+        words = SEARCHED[page]
+        title, _, rest = written[page].partition("\n")
+        written[page] = f"{title}\n\n```{{index}} {', '.join(f'! {each}' for each in words)}\n```\n{rest}"
+    if unlisted := [page[:-3] for page in written if not _is_listed(page[:-3], written)]:
+        written["index.md"] += "\n```{toctree}\n:hidden:\n\n" + "\n".join(unlisted) + "\n```\n"
+    return written
+
+
+def _is_listed(page: str, pages: Mapping[str, str]) -> bool:
+    """Is a page in the table of contents of another?"""
+    return page == "index" or any(re.search(rf"^{page}$", text, flags=re.M) for text in pages.values())
+
+
+def notebooks() -> dict[str, bytes]:
+    """Name -> content of the notebooks."""
+    return {f"notebooks/{path.name}": path.read_bytes() for path in sorted(DOCS.glob("notebooks/*.ipynb"))}
 
 
 def with_links(text: str, path: Path) -> str:

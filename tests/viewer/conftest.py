@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import threading
-from contextlib import contextmanager
-
 import pytest
+
+from viewing import served
 
 SCENE = """version: 1
 camera: {position: [0, 1.2, 4], target: [0, 0.6, 0], fov: 35}
@@ -32,27 +31,18 @@ def scene(tmp_path):
     return path
 
 
-@contextmanager
-def served(path):
-    """The server of a scene's page, which runs in a thread."""
-    pytest.importorskip("websockets", reason="needs websockets")
-    from illumcli.viewer.pictures import Renderer
-    from illumcli.viewer.server import Viewer
-    from illumcli.viewer.session import Session
-
-    viewer = Viewer(lambda send: Session(Renderer(path), send))
-    thread = threading.Thread(target=viewer.run)
-    thread.start()
-    try:
+@pytest.fixture(scope="module")
+def viewer(tmp_path_factory):
+    """The server of a page of such a scene, which stays as it is."""
+    path = tmp_path_factory.mktemp("viewed") / "ball.yaml"
+    path.write_text(SCENE)
+    with served(path) as viewer:
         yield viewer
-    finally:
-        viewer.stop()
-        thread.join()
 
 
 @pytest.fixture
-def viewer(scene):
-    """The server of the scene's page."""
+def own_viewer(scene):
+    """The server of the page of the test's own scene."""
     with served(scene) as viewer:
         yield viewer
 

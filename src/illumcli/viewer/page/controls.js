@@ -46,7 +46,7 @@ export class Controls {
   // --- building -----------------------------------------------------------------------------------------
 
   #build() {
-    const focused = document.activeElement?.closest("[data-path]")?.dataset.path;
+    const focused = this.#focused();
     const { scene } = this.session;
     const isFirst = this.#groups.size === 0;
     this.#rows.clear();
@@ -64,7 +64,13 @@ export class Controls {
     this.#show([...this.#rows.keys()]);
     this.#showLights();
     this.list.scrollTop = scrolled;
-    if (focused) $(`[data-path="${CSS.escape(focused)}"] :is(input, select)`, this.list)?.focus();
+    if (focused) inputs(this.#rows.get(focused.path)?.row)[focused.place]?.focus({ preventScroll: true });
+  }
+
+  /** Which input of which control has the focus. */
+  #focused() {
+    const row = document.activeElement?.closest("[data-path]");
+    return row && { path: row.dataset.path, place: inputs(row).indexOf(document.activeElement) };
   }
 
   #makeGroup(name, controls) {
@@ -99,7 +105,7 @@ export class Controls {
     const row = el("div", { class: `control ${control.kind}`, role: "group", "aria-label": control.label, "data-path": control.path },
       el("span", { class: "label", title: control.label }, control.label),
       ...field.parts, reset);
-    for (const input of $$("input, select", row)) input.setAttribute("aria-description", control.help ?? "");
+    for (const input of inputs(row)) input.setAttribute("aria-description", control.help ?? "");
     const made = { control, row, field };
     this.#rows.set(control.path, made);
     return made;
@@ -180,6 +186,10 @@ function toggleQuietly(details, open, chosen, name) {
   const was = chosen.has(name);
   details.open = open;
   details.addEventListener("toggle", () => (was ? chosen.add(name) : chosen.delete(name)), { once: true });
+}
+
+function inputs(row) {
+  return row ? $$("input, select", row) : [];
 }
 
 function written(value) {

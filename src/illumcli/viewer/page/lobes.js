@@ -76,7 +76,7 @@ export class Lobes {
     const { materials, models } = this.session.scene;
     this.#of = this.#of.filter(({ material }) => !material || materials.some(({ name }) => name === material));
     fillChoices(this.add, [
-      { value: "", text: "Add to compare…" },
+      { value: "", text: "Compare with…" },
       ...materials.map(({ name, model }) => ({ value: `material:${name}`, text: `${name} (${model})` })),
       ...models.map(({ name, title }) => ({ value: `model:${name}`, text: `${name} as it comes`, title })),
     ], "");

@@ -6,7 +6,7 @@ const KEPT = `illum view ${location.pathname}`; // in the storage of this tab, s
 
 export class Session {
   scene = null; // the server's last description
-  edits = {}; // path -> value, in the order in which they were made
+  edits = {}; // path -> value, as the server has them
   view = { exposure: 0, hidden_lights: [] }; // and camera, layer, width, height
   values = new Map(); // path -> what the control shows
   asked = 0; // when a picture was asked for last [ms]
@@ -38,7 +38,7 @@ export class Session {
 
   set(path, value, dragging) {
     this.#remember(path, dragging);
-    this.#update({ [path]: value }, { ...this.edits, [path]: value });
+    this.#update({ [path]: value }, this.edits);
     this.outbox.post(path, { type: "set", path, value, dragging });
   }
 
@@ -106,6 +106,8 @@ export class Session {
   }
 
   #restore({ edits, view = this.view }) {
+    this.view = view;
+    this.#tell("view");
     this.#ask();
     this.live.send({ type: "restore", edits, view });
   }

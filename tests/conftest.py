@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -64,5 +66,24 @@ def illum(tmp_path):
         return subprocess.run(
             command, cwd=cwd, env=env, capture_output=True, text=True, check=False, timeout=120
         )
+
+    return run
+
+
+@pytest.fixture
+def illum_here(tmp_path, monkeypatch):
+    """The same in this process, for tests that call the command often and test nothing of its process."""
+    from illumcli.cli import _status
+
+    def run(*words: object, cwd: Path = tmp_path, **environment: str) -> subprocess.CompletedProcess[str]:
+        arguments = ["illum", *map(str, words)]
+        with monkeypatch.context() as here:
+            here.chdir(cwd)
+            here.setattr(sys, "argv", arguments)
+            for name, value in environment.items():
+                here.setenv(name, value)
+            with redirect_stdout(io.StringIO()) as stdout, redirect_stderr(io.StringIO()) as stderr:
+                code = _status()
+        return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
 
     return run

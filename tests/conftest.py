@@ -57,8 +57,14 @@ def real_mesh():
 
 
 @pytest.fixture
-def illum(tmp_path):
-    """Run the command in a fresh process and folder: ``illum("render", "x.yaml")``."""
+def illum(illum_process):
+    """Run the command: ``illum("render", "x.yaml")``."""
+    return illum_process
+
+
+@pytest.fixture
+def illum_process(tmp_path):
+    """Run the command in a fresh process and folder."""
 
     def run(*words: object, cwd: Path = tmp_path, **environment: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "illumcli", *map(str, words)]
@@ -72,7 +78,7 @@ def illum(tmp_path):
 
 @pytest.fixture
 def illum_here(tmp_path, monkeypatch):
-    """The same in this process, for tests that call the command often and test nothing of its process."""
+    """The same in this process, which starts at once, for tests of what the command does and says."""
     from illumcli.cli import _status
 
     def run(*words: object, cwd: Path = tmp_path, **environment: str) -> subprocess.CompletedProcess[str]:

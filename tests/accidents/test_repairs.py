@@ -34,6 +34,11 @@ EXPECTED = {
 
 
 @pytest.fixture
+def illum(illum_here):
+    return illum_here
+
+
+@pytest.fixture
 def scene(tmp_path):
     (tmp_path / "bad.obj").write_text(BAD)
     small = "version: 1\nfilm: {width: 8, height: 8, samples: 1}\n"

@@ -29,6 +29,12 @@ outputs: {files: ["{scene}.png"]}
 
 
 @pytest.fixture
+def illum(illum_process):
+    """What is kept lasts beyond a process."""
+    return illum_process
+
+
+@pytest.fixture
 def own(tmp_path, monkeypatch):
     """A scene and a cache folder of its own."""
     (tmp_path / "ring.yaml").write_text(SCENE)

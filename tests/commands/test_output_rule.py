@@ -52,11 +52,6 @@ def pictures(tmp_path_factory):
 
 
 @pytest.fixture
-def illum(illum_here):
-    return illum_here
-
-
-@pytest.fixture
 def folder(tmp_path, pictures):
     shutil.copytree(pictures, tmp_path, dirs_exist_ok=True)
     return tmp_path

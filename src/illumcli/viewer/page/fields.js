@@ -44,7 +44,8 @@ function color(control, change) {
   // a well that was opened and closed has not changed a colour that its 8 bits cannot hold
   const pick = (dragging) => take(well.value === hexOf(value) ? value : linearOf(well.value, Math.max(1, ...value)), dragging);
   const channels = ["red", "green", "blue"].map((name, k) => makeNumber(
-    `${control.label}, ${name}, linear`, control, (each, dragging) => take(value.with(k, each), dragging),
+    `${control.label}, ${name}, linear`, control,
+    (each, dragging) => (each === null ? change(null, false) : take(value.with(k, each), dragging)),
   ));
   const strength = makeSlider(
     { ...control, minimum: control.minimum ?? 0 }, `${control.label}, brightness`,
@@ -54,9 +55,11 @@ function color(control, change) {
     parts: [strength.input, well, el("span", { class: "numbers" }, ...channels.map(({ input }) => input))],
     show(next) {
       value = asColor(next);
+      const isAbsent = next === null || next === undefined;
       well.value = hexOf(value);
-      well.title = `linear ${value.map((each) => shown(each)).join(" ")}, sRGB ${well.value}`;
-      channels.forEach((channel, k) => channel.show(value[k]));
+      well.classList.toggle("absent", isAbsent);
+      well.title = isAbsent ? "not set" : `linear ${value.map((each) => shown(each)).join(" ")}, sRGB ${well.value}`;
+      channels.forEach((channel, k) => channel.show(isAbsent ? null : value[k]));
       strength.show(Math.max(...value));
     },
   };

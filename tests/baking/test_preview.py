@@ -85,7 +85,7 @@ def test_it_is_kept_with_its_content(tmp_path):
     assert image_contents(tmp_path / "preview.png") != content
 
 
-def test_what_cannot_be_shown_is_refused_before_the_bake(illum, tmp_path):
+def test_what_cannot_be_shown_is_refused_before_the_bake(illum_here, tmp_path):
     (tmp_path / "box.obj").write_text(BOX)
     (tmp_path / "s.yaml").write_text("version: 1\nobjects: [{mesh: box.obj}, {mesh: {shape: plane}}]\n")
     for words, told in (
@@ -100,11 +100,11 @@ def test_what_cannot_be_shown_is_refused_before_the_bake(illum, tmp_path):
         ),
         (("box.obj", "s.yaml", "-o", "{name}.glb", "--preview", "a.png"), "write {name} into the pattern"),
     ):
-        done = illum("ao-bake", *words)
+        done = illum_here("ao-bake", *words)
         assert (done.returncode, told in done.stderr) == (2, True), done.stderr
     assert not list(tmp_path.glob("*.npz"))
 
-    done = illum("ao-bake", "box.obj", "s.yaml", "-o", "{name}.glb", "--preview", "{name}.png", "--json")
+    done = illum_here("ao-bake", "box.obj", "s.yaml", "-o", "{name}.glb", "--preview", "{name}.png", "--json")
     assert [each["files"] for each in json.loads(done.stdout)] == [["box.glb", "box.png"], ["s.glb", "s.png"]]
 
 

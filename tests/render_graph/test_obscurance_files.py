@@ -103,21 +103,21 @@ def test_images_over_the_uv_of_a_mesh(path):
         obscurance(path, "w.png")
 
 
-def test_no_ray_is_cast_and_it_is_told(illum, path, tmp_path):
+def test_no_ray_is_cast_and_it_is_told(illum_here, path, tmp_path):
     (tmp_path / "baked").mkdir()
-    assert illum("ao-bake", "room.obj", "-o", "room.glb", "--samples", "16", "-q").returncode == 0
+    assert illum_here("ao-bake", "room.obj", "-o", "room.glb", "--samples", "16", "-q").returncode == 0
     small = ("-D", "film={width: 32, height: 20, samples: 1}", "-D", "objects.floor=null")
-    done = illum("render", "room.glb", *small, "-o", "a.png", "-v", "--report", "r.json")
+    done = illum_here("render", "room.glb", *small, "-o", "a.png", "-v", "--report", "r.json")
     assert done.returncode == 0, done.stderr
     assert "room.glb: subject: obscurance from room.glb, 0 rays" in done.stderr
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["obscurance_files"] == {"subject": "room.glb"}
     assert "obscurance" not in report["rays"]
-    planned = illum("plan", "room.glb", *small)
+    planned = illum_here("plan", "room.glb", *small)
     assert "baked   subject: obscurance from room.glb, 0 rays" in planned.stdout
 
     # the file's values are the scene's to leave out
-    traced = illum("plan", "room.glb", *small, "-D", "meshes.subject.obscurance=null")
+    traced = illum_here("plan", "room.glb", *small, "-D", "meshes.subject.obscurance=null")
     assert "obscurance 10,240" in traced.stdout
     assert "baked   " not in traced.stdout
 

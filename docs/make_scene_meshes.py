@@ -1,4 +1,7 @@
-"""Writes the meshes of scenes/meshes: a sponge, a block of houses, gears, a terrain with vertex colours."""
+"""Writes the meshes of scenes/meshes.
+
+A sponge, a block of houses, gears, a terrain with vertex colours, and a ridged ball with baked obscurance.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+import illumcli as illum
 
 FOLDER = Path(__file__).parents[1] / "scenes" / "meshes"
 SIDES = (  # axis, towards which end, and the corners of a unit cube's side, counter-clockwise from outside
@@ -133,6 +138,21 @@ end_header
     (FOLDER / f"{name}.ply").write_bytes(head.encode() + vertices.tobytes() + faces.tobytes())
 
 
+def ridges() -> dict[str, object]:
+    """A scene of a ball with three twisted ridges."""
+    radius = "(1 + 0.24*sin(3*u + 4*cos(v))*sin(v)**2)"
+    ball = {
+        "shape": "parametric",
+        "x": f"sin(v)*cos(u)*{radius}",
+        "y": f"-0.95*cos(v)*{radius}",
+        "z": f"-sin(v)*sin(u)*{radius}",
+        "u": [0, 2 * np.pi],
+        "v": [0, np.pi],
+        "resolution": [72, 30],
+    }
+    return {"version": 1, "objects": [{"name": "ridges", "mesh": ball}]}
+
+
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     write_obj("sponge", sponge(2))
@@ -140,3 +160,4 @@ if __name__ == "__main__":
     for teeth in (12, 18, 30):
         write_obj(f"gear{teeth}", gear(teeth))
     write_ply("terrain", *terrain(60))
+    illum.bake(ridges(), FOLDER / "ridges.ply", samples=4096, ground="y", force=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -12,12 +10,6 @@ from illumcli.scene.load import load
 from planned import layers_of, planned
 
 SMALL = ["film.width=48", "film.height=27", "film.samples=1"]
-
-
-def test_every_scene_begins_with_its_title_and_idea(root):
-    for path in sorted((root / "scenes").glob("*.yaml")):
-        first = path.read_text().partition("\n")[0]
-        assert re.fullmatch(r"# [A-Z][\w' ,-]{2,40}: .{20,}\.", first), f"{path.name}: {first}"
 
 
 def test_no_file_of_a_scene_is_large(root):

@@ -97,6 +97,16 @@ def test_readmes_sample_of_mistakes_is_what_is_printed(folder):
     assert len(done.stderr.splitlines()) == 2
 
 
+def test_getting_started_shows_the_mistake_that_is_printed(folder):
+    page = ROOT / "docs" / "getting-started.md"
+    place_files(page, folder)
+    scene = folder / "first.yaml"
+    scene.write_text(scene.read_text().replace("oren_nayar", "oren_nayer"))
+    command = [sys.executable, "-m", "illumcli", "check", "first.yaml"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert f"```text\n{done.stderr}```\n" in page.read_text()
+
+
 def test_readme_names_every_command():
     text = (ROOT / "README.md").read_text()
     for name, what in COMMANDS.items():

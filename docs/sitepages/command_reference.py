@@ -39,11 +39,11 @@ def _page(name: str, top: click.Context) -> str:
     assert command is not None
     context = click.Context(command, info_name=name, parent=top)
     usage = " ".join(command.collect_usage_pieces(context))
-    lines = [f"# illum {name}", "", f"```text\nillum {name} {usage}\n```", ""]
+    lines = [f"# illum {name}", "", COMMANDS[name], "", f"```text\nillum {name} {usage}\n```", ""]
     lines += [_paragraph(text) for text in _paragraphs(command.help)]
     lines += ["## Options", "", f"```{{program}} illum {name}\n```", ""]
     for parameter in command.get_params(context):
-        if record := parameter.get_help_record(context):
+        if isinstance(parameter, click.Option) and (record := parameter.get_help_record(context)):
             names, text = record
             lines += [f"```{{option}} {names.replace(' / ', ', ')}", escaped(text), "```", ""]
     lines += [_paragraph(text) for text in _paragraphs(command.epilog)]

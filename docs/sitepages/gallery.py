@@ -65,6 +65,7 @@ class Entry(NamedTuple):
     command: str
     pictures: list[str]
     seconds: float
+    threads: int
     rays: int
     error: float | None
     """Root mean square of the standard error of pixels; None if it is not known."""
@@ -100,7 +101,7 @@ def _texts(scene: Path) -> list[Path]:
 
 
 def _page(scene: Path, entry: Entry, names: Sequence[str]) -> str:
-    facts = [f"{entry.seconds:.1f} s on two cores, as shown"]
+    facts = [f"Rendered in {entry.seconds:.1f} s by {entry.threads} threads"]
     if entry.rays:
         facts.append(f"{entry.rays:,} rays")
     if entry.error is not None:
@@ -146,6 +147,7 @@ def _entry(scene: Path, folder: Path, draft: bool) -> Entry:
         command=" ".join(["illum render", f"scenes/{scene.name}", *frames]),
         pictures=[*report["written"], *report["kept"]],
         seconds=report["total_seconds"],
+        threads=report["threads"],
         rays=sum(report["rays"].values()),
         error=None if draft else _error(scene, folder, frames, keys.get("film", {})),
     )

@@ -139,6 +139,20 @@ def test_no_material_casts_a_ray_however_pictures_alternate(shot):
         assert set(shot.picture(coarse).report.rays) == {"shadow:key"}
 
 
+def test_layers_that_were_seen_cast_no_ray_again_until_the_camera_moves(shot):
+    layers = ["beauty", "obscurance", "normal", "shadow.key", "beauty", "obscurance", "shadow.key"]
+    rays = []
+    for layer in layers:
+        shot.tell(type="view", layer=layer)
+        rays.append((shot.picture(Coarse(2, 4)).rays, shot.picture().rays))
+    assert rays[1:] == [(0, 0)] * 6
+    shot.tell(type="move", orbit=[0.1, 0])
+    shot.picture(Coarse(2, 4))
+    assert len(shot.renderer._lasting) == 5  # the coarse picture, and four full ones of before
+    shot.picture()
+    assert len(shot.renderer._lasting) == 2
+
+
 class Enough(Exception):
     pass
 
@@ -161,6 +175,22 @@ def test_an_abandoned_picture_leaves_nothing_behind(shot):
         assert held() == memory._bytes, turn
     assert_rendered(shot)
     assert held() == memory._bytes
+
+
+def test_a_picture_that_is_given_up_costs_no_other_one_its_rays(shot):
+    def stop(what, done, total):
+        raise Enough
+
+    for coarse in (Coarse(2, 4), Coarse(1, 4), None):
+        shot.picture(coarse)
+    shot.tell(type="view", width=100, height=60)
+    for coarse in (Coarse(2, 4), None):
+        with pytest.raises(Enough):
+            shot.picture(coarse, stop)
+    shot.tell(type="view", width=96, height=54)
+    shot.tell(type="set", path="materials.clay.exponent", value=3)
+    assert shot.picture(Coarse(1, 4)).rays == 0
+    assert shot.picture().rays == 0
 
 
 def test_memory_does_not_grow_with_the_number_of_pictures(shot):

@@ -22,6 +22,10 @@ class MemoryCache:
     def __init__(self, wanted: frozenset[str] = frozenset(), limit: int = LIMIT) -> None:
         self.wanted = wanted
         """Keys of buffers that the next variant reads."""
+        self.asked = wanted
+        """Those of them that the last run asked for."""
+        self.kept: frozenset[str] = frozenset()
+        """Keys of buffers that stay whatever is run."""
         self.limit = limit
         self.once: dict[str, Any] = {}
         """Buffers of the scene."""
@@ -33,6 +37,10 @@ class MemoryCache:
         self._complete: set[str] = set()
         self._bytes = 0
         self._lock = threading.Lock()
+
+    def want(self, keys: frozenset[str]) -> None:
+        """Note the keys of buffers that the next variant reads."""
+        self.asked, self.wanted = keys, keys | self.kept
 
     def tiles(self, key: str) -> Mapping[Tile, Any] | None:
         """The buffer of this key by tile; None unless all tiles have it."""

@@ -62,7 +62,7 @@ def rendered(
         # With `strict`, repairs of objects that no view sees are refused too.
         graph = place_cameras(graph, run) if options.strict else place_and_cull(graph, outputs, run)
         if cache.memory is not None:
-            cache.memory.wanted = wanted_by(following, work, graph, run)
+            cache.memory.want(wanted_by(following, work, graph, run))
     skipped = why_not(graph, outputs)
     repaired: Repairs = {}
     if options.strict and not due:
@@ -128,11 +128,10 @@ def rendered(
 
 def wanted_by(following: Work | None, work: Work, graph: Graph, run: Run) -> frozenset[str]:
     """Keys of the buffers of a graph that the next variant reads; or that any variant might, if whoever holds
-    the images may ask for more, of this work and of the `following`."""
-    lasting = lasting_keys(graph, work.outputs) if work.images.held else frozenset()
-    if following is None:
-        return lasting
-    other = without_objects(place_cameras(following.graph, run), graph.culled)
+    the images may ask for more."""
     if work.images.held:
-        return lasting | lasting_keys(other, following.outputs)
+        return lasting_keys(graph, work.outputs)
+    if following is None:
+        return frozenset()
+    other = without_objects(place_cameras(following.graph, run), graph.culled)
     return shared_keys(graph, other, following.outputs)

@@ -15,7 +15,7 @@ from illumcli.commands.held_images import HeldImage, HeldImages
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.report import Report
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import Work, work_of
+from illumcli.commands.work import work_of
 from illumcli.images.jpeg import jpeg_bytes
 from illumcli.progress import Progress
 from illumcli.rays.viewpoints import Camera
@@ -112,7 +112,8 @@ class Renderer:
         self._threads = threads
         self._images = HeldImages()
         self._worker = Worker(self._images)
-        self._last: dict[bool, Work] = {}
+        self._lasting: dict[tuple[bool, str], frozenset[str]] = {}
+        """Keys of what pictures leave in memory, by whether they are full, and by layer."""
         self._watch = Watch()
         self._files = 0
         """Number of the files of the scene that are watched."""
@@ -187,9 +188,14 @@ class Renderer:
             self._watch.add(files.paths())
             self._files = files.count
 
-        # Coarse and full pictures take turns: what either will read again stays in memory.
+        # Coarse and full pictures of several layers take turns: what each reads again stays in memory, until
+        # the camera moves.
+        memory, is_full = self._worker.shared(self.path).memory, coarse is None
+        memory.kept = frozenset().union(*self._lasting.values())
         self._images.images.clear()
-        _, report = self._worker.run(work, progress, self._last.get(coarse is None))
-        self._last[coarse is not None] = work
+        _, report = self._worker.run(work, progress)
+        if "hits" in report.rays:
+            self._lasting = {place: keys for place, keys in self._lasting.items() if place[0] != is_full}
+        self._lasting[is_full, window.layer] = memory.asked
         (image,) = self._images.images
         return Picture(window, coarse, image, report, time.perf_counter() - start)

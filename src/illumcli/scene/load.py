@@ -43,9 +43,9 @@ class SceneText(Value):
 
 
 def read_text(path: Path) -> SceneText:
-    """The text of the scene file `path`; nothing is written where that is a mesh file."""
+    """The text of the scene file `path`; that of the studio scene with it where it is a mesh file."""
     reader = SceneReader(readable_folders(path.parent))
-    tree = None if is_mesh_file(path) else reader.file(path, ())
+    tree = _studio(path, reader) if is_mesh_file(path) else reader.file(path, ())
     return SceneText(tree, tuple(reader.problems), reader.roots, files=tuple(reader.paths))
 
 
@@ -123,7 +123,7 @@ def _changed(
     # The tree of the file, or of the studio with the mesh.
     settings = [change for change in changes if change.steps[0] == SETTINGS]
     if is_mesh_file(path):
-        tree = _studio(path, settings, reader)
+        tree = _arranged(text.tree, settings, reader)
     else:
         tree = text.tree
         reader.problems += text.problems
@@ -140,21 +140,25 @@ def _changed(
     return tree, applied
 
 
-def _studio(path: Path, settings: Sequence[Override], reader: SceneReader) -> Node | None:
+def _studio(path: Path, reader: SceneReader) -> Node | None:
     """The tree of the studio scene with the mesh file `path`."""
-    tree, given = reader.file(STUDIO, ()), Node({}, Place(str(STUDIO)))
-    for change in settings:
-        given = assign(given, change, reader.problems) or given
-    studio_settings = _validated(Settings, AtFrame(given, 0), reader.problems)
-    if tree is None or studio_settings is None:
-        return tree
-    tree = arranged(tree, studio_settings.studio)
+    if (tree := reader.file(STUDIO, ())) is None:
+        return None
     mesh = Override(("meshes", "subject", "file"), Node(path.name, Place(str(path))), "")
     tree = assign(tree, mesh, reader.problems) or tree
     if not holds_obscurance(path):
         return tree
     baked = Override(("meshes", "subject", "obscurance"), Node(path.name, Place(str(STUDIO))), "")
     return assign(tree, baked, reader.problems)
+
+
+def _arranged(tree: Node | None, settings: Sequence[Override], reader: SceneReader) -> Node | None:
+    """The tree of the studio scene after its settings."""
+    given = Node({}, Place(str(STUDIO)))
+    for change in settings:
+        given = assign(given, change, reader.problems) or given
+    studio_settings = _validated(Settings, AtFrame(given, 0), reader.problems)
+    return tree if tree is None or studio_settings is None else arranged(tree, studio_settings.studio)
 
 
 def _validated(

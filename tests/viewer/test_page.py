@@ -114,6 +114,8 @@ def test_models_are_switched_and_undone(page):
     page.set(control("materials.clay.model", "select"), "ward")
     page.wait("document.querySelector(arguments[0])", control("materials.clay.alpha_x", "input"))
     page.drawn()
+    groups = "[...document.querySelectorAll('details')].slice(0, 2).map((each) => each.dataset.group)"
+    assert page(groups) == ["materials.clay", "materials.floor"]
     assert page.pixel(0.45, 0.4) != before
     page.press(keys.CONTROL + "z")
     page.wait("document.querySelector(arguments[0])", control("materials.clay.exponent", "input"))
@@ -204,6 +206,66 @@ def test_a_frozen_picture_beside_the_one_of_now(page, tmp_path):
     assert not page.one("#split").is_displayed()
 
 
+def test_save_and_copy_command(open_page, own_viewer, scene):
+    page = open_page(own_viewer.url)
+    page.browser.execute_cdp_cmd(
+        "Browser.grantPermissions", {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
+    )
+    page.set(control("materials.clay.exponent", "[type=number]"), 60)
+    page.drawn()
+    page.one("#command").click()
+    page.wait("document.querySelector('#command-copied').textContent.startsWith('Copied')")
+    command = page.one("#command-text").text
+    assert command.startswith("illum render")
+    assert "materials.clay.exponent=60" in command
+    copied = "const done = arguments[0]; navigator.clipboard.readText().then(done)"
+    assert page.browser.execute_async_script(copied) == command
+    page.one("#command-dialog [data-close]").click()
+
+    page.one("#save").click()
+    assert page.one("#save-file").get_attribute("value") == str(scene.with_name("ball-edited.yaml"))
+    page.one("#save-dialog .main").click()
+    page.wait("!document.querySelector('#save-dialog').open")
+    saved = scene.with_name("ball-edited.yaml")
+    assert "exponent: 60" in saved.read_text()
+
+    # a file of other content is replaced only if that is asked for
+    page.set(control("materials.clay.exponent", "[type=number]"), 70)
+    page.drawn()
+    page.one("#save").click()
+    page.one("#save-dialog .main").click()
+    page.wait("!document.querySelector('#save-problem').hidden")
+    assert "ball-edited.yaml" in page.one("#save-problem").text
+    page.one("#save-replace").click()
+    page.one("#save-dialog .main").click()
+    page.wait("!document.querySelector('#save-dialog').open")
+    assert "exponent: 70" in saved.read_text()
+
+
+def test_the_material_that_is_clicked_is_shown_with_its_lobes(page):
+    page.press("b")
+    page.wait("document.querySelector('#cards .name')?.textContent === 'clay'")
+    page.settle()
+    page.point("#frame", 0, 0.45 * page.one("#frame").size["height"]).click().perform()
+    page.wait("document.querySelector('#cards .name').textContent === 'floor'")
+    assert page("document.querySelector('details[data-group=\"materials.floor\"]').open")
+    page.set("#lobe-add", "model:ward")
+    page.wait("document.querySelectorAll('#cards .solid').length === 2")
+
+    # the light is turned by a drag on a lobe and on the slices, and changes what is drawn
+    drawn = "document.querySelector('#cards .solid').toDataURL()"
+    before = page(drawn)
+    page.drag("#cards .solid", by=(30, 40))
+    page.wait(f"{drawn} !== arguments[0]", before)
+    assert page("Number(document.querySelector('#theta').value)") > 45
+    page.drag("#slices", by=(0, 0), start=(10, -60))
+    page.wait("Number(document.querySelector('#theta').value) < 30")
+    page.one("#log").click()
+    page.one("#cosine").click()
+    page.one("#cards .quiet").click()
+    page.wait("document.querySelectorAll('#cards .card').length === 1")
+
+
 def test_parameters_are_filtered_and_explained(page):
     page.press("/")
     page.press("expon")
@@ -226,6 +288,20 @@ def test_what_a_server_that_has_ended_leaves(chromium, scene):
     assert page.pixel(0.5, 0.5) == before
     chromium.get("about:blank")
     chromium.get_log("browser")  # it holds the attempts to connect again
+
+
+def test_every_control_has_a_name(page):
+    page.press("b")
+    page.wait("document.querySelector('#cards .solid')")
+    page.browser.execute_script("for (const each of document.querySelectorAll('details')) each.open = true")
+    page.press("f")
+    things = "button, input, select, canvas[role], [role=application], [role=slider], aside, body > section"
+    nameless = [
+        each.get_attribute("outerHTML")[:120]
+        for each in page.all(f":is({things})")
+        if each.is_displayed() and not any(map(str.isalnum, each.accessible_name))
+    ]
+    assert nameless == []
 
 
 @pytest.mark.parametrize("width", [1000, 1600])

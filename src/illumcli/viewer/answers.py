@@ -36,7 +36,7 @@ def scene_answer(window: Window, controls: Sequence[Control]) -> dict[str, Any]:
         "models": _models(),
         "materials": [
             {"name": name, "model": tag_of(type(model)), "objects": users[name]}
-            for name, model in scene.materials.items()
+            for name, model in {**window.original.scene.materials, **scene.materials}.items()
         ],
         "controls": [control.as_data() for control in controls],
         "edits": dict(window.edits),

@@ -72,7 +72,7 @@ def controls(original: SceneFile, now: SceneFile) -> tuple[Control, ...]:
 def controlled(before: Scene, now: Scene) -> Iterator[Found]:
     """The controls of a scene, with the parts that they control; `before` is the scene of the file."""
     # Materials, lights and objects by name.
-    for name, material in now.materials.items():
+    for name, material in {**before.materials, **now.materials}.items():  # in the order of the file
         spot = Spot(f"materials.{name}", f"materials.{name}")
         old = before.materials.get(name, ABSENT)
         yield from _of_value(spot, {}, _annotation_of_parts("materials"), material, old)

@@ -19,7 +19,7 @@ export class Dialogs {
   openSave() {
     if (!this.session.scene) return;
     const { file } = this.session.scene;
-    $("#save-file").value ||= file.replace(/^.*[\\/]/, "").replace(/(\.\w+)?$/, "-edited.yaml");
+    $("#save-file").value ||= file.replace(/(\.\w+)?$/, "-edited.yaml");
     $("#save-problem").hidden = true;
     $("#save-dialog").showModal();
   }

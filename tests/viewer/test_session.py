@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import struct
 from queue import Queue
@@ -340,6 +341,20 @@ def test_the_command_renders_the_picture(opened, scene, illum, tmp_path):
     assert done.returncode == 0, done.stderr
     width, height = struct.unpack(">II", (tmp_path / "picture.png").read_bytes()[16:24])
     assert (width, height) == (40, 30)
+
+
+def test_the_command_renders_no_other_camera_or_frame(opened, scene, illum, tmp_path):
+    cameras = "cameras: {near: {fov: 20}, far: {fov: 60}}\nframes: {first: 3, last: 9}"
+    scene.write_text(re.sub("camera:.*", cameras, scene.read_text()))
+    page = opened(Renderer(scene, threads=1))
+    page.settled()
+    page.tell(type="view", camera="far", exposure=0, width=96, height=54)
+    page.settled()
+    page.tell(type="command")
+    words = shlex.split(page.next()["text"])
+    assert words == ["illum", "render", str(scene), "-D", "cameras.near=null", "--frames", "3:3"]
+    done = illum(*words[1:], "-o", "{camera}.{frame}.png")
+    assert (done.returncode, done.stdout.split()) == (0, ["far.0003.png"])
 
 
 def test_edits_are_saved_as_a_scene(page, scene):

@@ -146,12 +146,15 @@ class Renderer:
         return loaded
 
     def command(self, window: Window) -> str:
-        """The command that renders the picture of a window, for a shell."""
-        own = [layer.name for layer in layers(window.now.scene, window.now.scene.outputs.layers)]
+        """The command that renders the picture of a window, and no other, for a shell."""
+        scene, frame = window.now.scene, window.now.frame
+        own = [layer.name for layer in layers(scene, scene.outputs.layers)]
         words = [] if own == [window.layer] else ["--only", window.layer]
+        words += [] if scene.frames is None else ["--frames", f"{frame}:{frame}"]
         for option, variable in (("--models", "ILLUM_MODELS"), ("--allow", "ILLUM_ALLOW")):
             words += [word for folder in folders(variable) for word in (option, str(folder))]
-        return command_text(self.path, (*self.given, *window.overrides), words)
+        others = [f"cameras.{name}=null" for name in scene.cameras if name != window.camera]
+        return command_text(self.path, (*self.given, *window.overrides, *others), words)
 
     def save(self, target: Path, window: Window, replace: bool = False) -> None:
         """Write the scene of a window with its edits; see `saving.save`."""

@@ -61,11 +61,11 @@ class Window(Value):
     def _values(self) -> dict[str, Any]:
         """Value by path of what the window chooses beside edits."""
         scene, values = self.now.scene, dict[str, Any]()
-        if self.exposure is not None:
+        if self.exposure not in (None, scene.film.exposure):
             values["film.exposure"] = self.exposure
-        if self.size is not None:
+        if self.size not in (None, self.own_film):
             camera = scene.named_cameras()[self.camera]
-            for name, number in zip(("width", "height"), self.size, strict=True):
+            for name, number in zip(("width", "height"), self.film, strict=True):
                 own = getattr(camera, name) is not None
                 values[f"{camera_path(scene, self.camera) if own else 'film'}.{name}"] = number
         for name, light in scene.named_lights().items():

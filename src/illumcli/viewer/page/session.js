@@ -100,7 +100,11 @@ export class Session {
   }
 
   #travel(from, to) {
-    if (!from.length) return;
+    while (from.length && JSON.stringify(from.at(-1)) === JSON.stringify(this.edits)) from.pop(); // what was refused
+    if (!from.length) {
+      this.#tell("edits");
+      return;
+    }
     to.push(this.edits);
     this.#restore({ edits: from.pop() });
   }

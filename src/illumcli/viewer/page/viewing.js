@@ -32,7 +32,8 @@ export class Viewing {
     fillChoices($("#camera"), cameras.map((name) => ({ value: name })));
     $("#camera").closest("label").hidden = cameras.length < 2;
     const sizes = SHARES.map((share) => film.map((each) => Math.max(2, Math.round(share * each))).join(" × "));
-    fillChoices(this.size, [{ value: FIT, text: "as the window" }, ...sizes.map((value) => ({ value }))], this.size.value || FIT);
+    const chosen = [FIT, ...sizes][Math.max(this.size.selectedIndex, 0)]; // the same share of another film
+    fillChoices(this.size, [{ value: FIT, text: "as the window" }, ...sizes.map((value) => ({ value }))], chosen);
     this.picture.aspect = film[0] / film[1];
     this.picture.layout();
     this.#resize();

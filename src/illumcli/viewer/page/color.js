@@ -29,7 +29,7 @@ export function hexOf(color) {
 
 /** The linear colour of a well; `scale` is the brightness of a colour above 1. */
 export function linearOf(hex, scale = 1) {
-  return [1, 3, 5].map((at) => rounded(scale * fromSrgb(parseInt(hex.slice(at, at + 2), 16) / 255)));
+  return [1, 3, 5].map((at) => rounded(scale * fromSrgb(parseInt(hex.slice(at, at + 2), 16) / 255), 3));
 }
 
 /** The same hue with its largest channel at `strength`; black becomes grey. */

@@ -142,6 +142,39 @@ def test_layers_exposure_and_size(page):
     assert blue > max(red, green)  # the normal there points to the eye
 
 
+def test_the_chosen_size_stays_that_share_of_another_film(page):
+    page.set("#size", "48 × 27")
+    page.drawn()
+    page.set(control("film.width", "[type=number]"), 128)
+    page.wait("document.querySelector('#size').value === '64 × 27'")
+    page.drawn()
+    assert page.fact("size") == "64 × 27"
+
+
+def test_what_was_refused_is_no_step_to_undo(page):
+    page.set(control("materials.clay.exponent", "[type=number]"), 50)
+    page.drawn()
+    page.set(control("materials.clay.exponent", "[type=number]"), -5)
+    page.wait("!document.querySelector('#problem').hidden")
+    page.drawn()
+    page.one("#undo").click()
+    page.drawn()
+    assert page.value("materials.clay.exponent") == "20"
+
+
+def test_a_colour_that_is_left_out_looks_it(page):
+    fields = control("materials.clay.ambient", "[type=number]")
+    numbers = "[...document.querySelectorAll(arguments[0])].map((each) => each.value)"
+    assert page(numbers, fields) == ["", "", ""]
+    page.set(fields, 0.5)
+    page.drawn()
+    assert page(numbers, fields) == ["0.5", "0", "0"]
+    page.set(fields, "")
+    page.drawn()
+    page.wait(f"({numbers}).join() === ',,'", fields)
+    assert page("document.querySelector('#reset').disabled")
+
+
 def test_a_broken_file_keeps_the_picture_until_it_is_mended(open_page, own_viewer, scene):
     page = open_page(own_viewer.url)
     text = scene.read_text()

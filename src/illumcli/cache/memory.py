@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -63,11 +63,15 @@ class MemoryCache:
         """Note that every tile of these keys has been added."""
         self._complete |= keys & self._tiles.keys()
 
-    def retire(self) -> None:
-        """Drop everything that is not wanted, and what lacks tiles since a run was abandoned."""
-        for key in self._tiles.keys() - (self.wanted & self._complete):
+    def forget(self, keys: Iterable[str]) -> None:
+        """Drop the buffers of these keys with all their tiles."""
+        for key in keys:
             self._drop(key)
             self._complete.discard(key)
+
+    def retire(self) -> None:
+        """Drop everything that is not wanted, and what lacks tiles since a run was abandoned."""
+        self.forget(self._tiles.keys() - (self.wanted & self._complete))
         self.once = {key: value for key, value in self.once.items() if key in self.wanted}
         self.pixels = {key: value for key, value in self.pixels.items() if key in self.wanted}
 

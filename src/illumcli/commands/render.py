@@ -81,7 +81,7 @@ def rendered(
         if not targets:
             continue
         began = time.perf_counter()
-        plan = replace(plan_view(graph, outputs, view, cache), rows=targets[0].rows)
+        plan = plan_view(graph, outputs, view, cache, rows=targets[0].rows)
         run.stats.add({"artifacts": time.perf_counter() - began}, {})
         reused[view.name] = dict(plan.lookup.reused)
         skipped = why_not(graph, outputs, plan)

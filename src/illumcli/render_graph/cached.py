@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import field, replace
 from functools import partial
 from typing import Any, Literal, TypeAlias
@@ -40,6 +40,8 @@ class Lookup(Value):
     """Buffers that are computed and may be kept -> their keys."""
     pixels: Mapping[str, PixelBuffer] = field(default_factory=dict, repr=False)
     """Buffers that are kept for some pixels only."""
+    tiles: Mapping[str, Collection[Tile]] = field(default_factory=dict, repr=False)
+    """Keys of the buffers that are loaded from memory tile by tile -> their tiles."""
 
 
 def substitute_cached(
@@ -67,6 +69,7 @@ def substitute_cached(
     reused: dict[str, str] = {}
     keeps: dict[str, str] = {}
     pixels: dict[str, PixelBuffer] = {}
+    in_memory: dict[str, Collection[Tile]] = {}
 
     # Depth first; the inputs of loaded buffers are not visited.
     pending, visited = list(buffers)[::-1], set(GIVEN)
@@ -97,10 +100,12 @@ def substitute_cached(
             if loader is not None:
                 node = loaders[name] = loader
                 reused[name] = source
+                of_tiles = cache.memory.tiles(key) if cache.memory is not None and tiles == "all" else None
+                in_memory |= {key: of_tiles.keys()} if of_tiles is not None else {}
             elif cache.accepts(name):
                 keeps[name] = key
         pending += list(node.inputs.values())[::-1]
-    return replace(graph, loaders=loaders), Lookup(reused, keeps, pixels)
+    return replace(graph, loaders=loaders), Lookup(reused, keeps, pixels, in_memory)
 
 
 def _pixel_loader(

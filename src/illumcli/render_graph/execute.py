@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.cache.recorder import NO_CACHE, BufferRecorder, Cache
-from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile, tiles
+from illumcli.film.tiles import MAX_TILE_SAMPLES, Scattered, Tile
 from illumcli.graph import Buffers, Node
 from illumcli.memory import keep_freed_memory
 from illumcli.records import Record, Value
@@ -131,8 +131,7 @@ def bands(
     view = plan.view
     if plan.before and plan.rows is not None:
         raise ValueError("pictures of which pixels read those around them are rendered whole")
-    first, end = plan.rows or (0, view.height)
-    rows = tiles(view.width, end - first, plan.tile_side(view, side), plan.samples_per_pixel, first)
+    rows = plan.rows_of_tiles(side)
     keeps = plan.lookup.keeps if plan.rows is None else {}  # buffers of tiles are kept of whole pictures
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
     common = TileContext(

@@ -36,8 +36,33 @@ def place_and_cull(graph: Graph, outputs: Sequence[Layer], run: Run, only_cached
     return graph
 
 
-def plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, look: bool = False) -> Plan:
-    """The plan of one view, in which cached buffers are loaded; with `look` nothing is read."""
+def plan_view(
+    graph: Graph,
+    outputs: Sequence[Layer],
+    view: View,
+    cache: Cache,
+    look: bool = False,
+    rows: tuple[int, int] | None = None,
+) -> Plan:
+    """The plan of one view, or of some of its rows, in which cached buffers are loaded.
+
+    With `look` nothing is read.
+
+    Buffers in memory that are of other tiles are dropped: another layer, reconstruction or reach of the pixel
+    filter may change the tiles.
+    """
+    while True:
+        plan = replace(_plan_view(graph, outputs, view, cache, look), rows=rows)
+        if cache.memory is None or not plan.lookup.tiles:
+            return plan
+        needed = set(plan.tiles_of_buffers())
+        others = [key for key, tiles in plan.lookup.tiles.items() if not needed.issubset(tiles)]
+        if not others:
+            return plan
+        cache.memory.forget(others)
+
+
+def _plan_view(graph: Graph, outputs: Sequence[Layer], view: View, cache: Cache, look: bool) -> Plan:
     buffers = needed_buffers(graph, outputs, [view])
     if view.adaptive is None:
         graph, lookup = substitute_cached(graph, buffers, view, cache, look)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 from illumcli.cache.codec import codec_of
 from illumcli.cache.recorder import Cache
-from illumcli.film.tiles import TILES, TILES_WITH_MARGINS, min_tile_samples, tile_side
+from illumcli.film.tiles import TILES, TILES_WITH_MARGINS, Tile, min_tile_samples, tile_side, tiles
 from illumcli.film.view import View
 from illumcli.graph import Node
 from illumcli.layers import FIXED, Layer
@@ -54,6 +54,9 @@ class Plan(Value):
     """The nodes that run for the replicates of an adaptive picture whose error is asked for."""
     rows: tuple[int, int] | None = None
     """The rows of the picture that are computed, from the first to before the second; by default all."""
+    uncached: int = 0
+    """How many nodes run per tile where nothing is cached. The size of tiles depends on it, not on what is
+    cached: buffers of tiles that are in memory fit the tiles of the next variant."""
 
     @property
     def buffers(self) -> set[str]:
@@ -100,7 +103,7 @@ class Plan(Value):
 
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
-        min_samples = min_tile_samples(len(self.tile))
+        min_samples = min_tile_samples(self.uncached)
         if side is None:
             fitted = reconstructs(self.graph.scene)
             count = TILES_WITH_MARGINS if fitted else TILES
@@ -109,6 +112,18 @@ class Plan(Value):
                 row = view.width * view.samples
                 side = max(min(side, ROW_SAMPLES // row // 8 * 8), min(side, LEAST_FITTED))
         return -(-side // BLOCK) * BLOCK if any(layer.per_pixel for layer in self.outputs) else side
+
+    def rows_of_tiles(self, side: int | None = None) -> list[list[Tile]]:
+        """The tiles of the rows that are computed, row by row, of the default size or of another."""
+        view, (first, end) = self.view, self.rows or (0, self.view.height)
+        return tiles(view.width, end - first, self.tile_side(view, side), self.samples_per_pixel, first)
+
+    def tiles_of_buffers(self) -> Iterator[Tile]:
+        """The tiles that buffers are of: those of an adaptive picture have a border."""
+        view = self.view
+        for row in self.rows_of_tiles():
+            for tile in row:
+                yield tile if view.adaptive is None else tile.grown(view.border, view.width, view.height)
 
     def needed_for(self, name: str) -> frozenset[str]:
         """Every buffer that is computed for `name`, itself included; cached buffers are not."""
@@ -209,11 +224,14 @@ def schedule(
     all_samples : Plan, optional
         For the pixels of an adaptive picture that need all samples; by default from the same graph.
     """
-    once, tile = once_and_tile(graph.topological_order(needed_buffers(graph, outputs, [view])))
+    needed = needed_buffers(graph, outputs, [view])
+    once, tile = once_and_tile(graph.topological_order(needed))
+    uncached = len(once_and_tile(graph.without_loaders().topological_order(needed))[1])
     around = any(SURROUNDINGS in node.inputs.values() for node in tile)
     if view.adaptive is None:
         (before,) = _ordered(graph, tile, [["hits", "object_pixels"] if around else []])
-        return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
+        plan = Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
+        return replace(plan, uncached=uncached)
 
     # An adaptive picture: first what decides, at the centres of pixels.
     own = sampled_outputs(outputs)
@@ -236,7 +254,12 @@ def schedule(
         known |= {node.output for node in once}
     plan = Plan(graph, tuple(outputs), view.centres(), tuple(once), tuple(tile), lookup, before)
     return replace(
-        plan, edges_by=edges_by, decided_by=decided_by, all_samples=all_samples, replicates=replicates
+        plan,
+        edges_by=edges_by,
+        decided_by=decided_by,
+        all_samples=all_samples,
+        replicates=replicates,
+        uncached=uncached,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import re
 import subprocess
 import sys
@@ -23,14 +25,17 @@ from illumcli.schema.sources import FAMILIES, tags
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Path:
-    """The folder of the built site."""
-    folder = tmp_path_factory.mktemp("site")
-    script = Path(__file__).parents[1] / "docs" / "make_site.py"
-    done = subprocess.run(
-        [sys.executable, script, folder, "--draft"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert not done.stderr
+    """The folder of the built site, which the processes of one run share."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "site"
+    with open(folder.with_suffix(".lock"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            script = Path(__file__).parents[1] / "docs" / "make_site.py"
+            words = [sys.executable, script, folder, "--draft"]
+            done = subprocess.run(words, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stdout + done.stderr
+            assert not done.stderr
     return folder / "html"
 
 

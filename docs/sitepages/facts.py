@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from illumcli.viewer.control import unit_in
+
 Schema = Mapping[str, Any]
 
 REFERENCE = "#/$defs/"
@@ -97,7 +99,7 @@ def facts(part: Part, definitions: Schema) -> list[Fact]:
         Fact(
             key=key,
             type=type_words(field, definitions),
-            unit=unit_words(field.get("description", "")),
+            unit=unit_in(field.get("description", "")),
             range=range_words(field),
             default="none, required" if key in required else default_words(field),
             text=field.get("description", ""),
@@ -183,12 +185,6 @@ def _range(number: Schema) -> str:
     lower = lower if above is None else f"above {above:g}"
     upper = upper if below is None else f"below {below:g}"
     return ", ".join(filter(None, [lower, upper]))
-
-
-def unit_words(text: str) -> str:
-    """The unit that a text names in brackets: `degrees` of "Vertical field of view [degrees]."."""
-    unit = re.search(r"\[([^\]\d,][^\],]*)\]", text)
-    return unit[1] if unit else ""
 
 
 def default_words(field: Schema) -> str:

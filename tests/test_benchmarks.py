@@ -28,6 +28,7 @@ SCRIPTS = {
     "reconstruction": "blades",
     "gonioreflectometer": "mirror grooves of many slopes",
     "fits": "RMS z",
+    "view": "resident [MiB]",
 }
 
 

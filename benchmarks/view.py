@@ -1,7 +1,8 @@
 """How long does it take from a change to a picture, in the live view?
 
-One window of 640 x 360 on `illum view`, over its socket: each change is sent when the picture of the one
-before is there, and counts until the first picture that has it, coarse or full. Wall seconds of the client;
+One window of 640 x 360 on `illum view`, over its socket: each change of a drag is sent when the picture of
+the one before is there, a switch of the model after the full picture, and counts until the first picture that
+has it, coarse or full. Wall seconds of the client;
 processor seconds of the server, all threads, pictures that were begun and given up included. Reference: the
 limits that the view is built for, 60 ms for a material and 200 ms for a camera on two free cores. With
 `--minutes`, then random use for so long: what the server keeps in memory, and problems that it tells.
@@ -118,11 +119,14 @@ def measured(window: Window, pid: int, make: Callable[[int], dict[str, Any]]) ->
     walls, widths, rays, start = [], [], [], processor(pid)
     for number in range(CHANGES):
         began = time.perf_counter()
-        window.tell(**make(number))
+        message = make(number)
+        window.tell(**message)
         about = window.picture()
         walls.append(1e3 * (time.perf_counter() - began))
         widths.append(about["width"])
         rays.append(about["rays"])
+        if not message["dragging"] and about.get("stage") == "coarse":
+            window.picture("full")
     cpu = 1e3 * (processor(pid) - start) / CHANGES
     window.tell(type="view", layer="beauty")
     window.picture("full")

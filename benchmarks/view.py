@@ -139,7 +139,9 @@ def used(window: Window, pid: int, minutes: float, seed: int = 0) -> None:
     layers = [layer["name"] for layer in window.scene["layers"] if layer["name"] != "error"]
     sizes, sent, told = [], 0, len(window.problems)
     while (passed := (time.monotonic() - begun) / 60) < minutes:
-        control = draw.choice([each for each in window.scene["controls"] if each["minimum"] is not None])
+        control = draw.choice(
+            [each for each in window.scene["controls"] if None not in (each["minimum"], each["value"])]
+        )
         low, high = control["minimum"], control["maximum"]
         kind = draw.random()
         if kind < 0.5 and control["kind"] in ("number", "color", "vector") and "film" not in control["path"]:

@@ -11,16 +11,18 @@ from typing import Any, TypeAlias, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from illumcli.api.choices import chosen
 from illumcli.api.scenes import Overrides, given_keys, override_texts
 from illumcli.arrays import column_major
 from illumcli.brdf import draw_looks, looks, notes, views, write_merl_of
 from illumcli.brdf.albedo import albedo
-from illumcli.brdf.plot import DEFAULT_VIEWS, VIEWS, Plot, in_order
+from illumcli.brdf.plot import DEFAULT_VIEWS, PLOT, Plot, View, Width, in_order
 from illumcli.brdf.views import Counted
 from illumcli.errors import InputError
 from illumcli.models._base import IlluminationModel
 from illumcli.records import Record
-from illumcli.schema.messages import suggestion
+from illumcli.schema.description import Description
+from illumcli.schema.fields import ListOf
 
 AnyModel: TypeAlias = "str | Mapping[str, Any] | IlluminationModel"
 """A model's name, its keys as a material of a scene has them, or its description."""
@@ -34,13 +36,30 @@ class PlotKeywords(TypedDict, total=False):
     angles: Sequence[float]
     """Angles of incidence of the slices [degrees]; the lobe is that of the middle one."""
     log: bool
+    """True for a logarithmic scale of slices and lobes, four decades."""
     times_cos: bool
     """True for the response, cosine included, instead of the BRDF."""
     overlay: bool
+    """True for the curves of all models on one axis."""
     per_channel: bool
-    labels: Sequence[str]
+    """True for a curve of R, G and B each, instead of luminance."""
+    labels: Sequence[str] | str
+    """What the figure calls the models, one for each."""
     width: float
-    """Of the whole figure [inches]."""
+    """Of the whole figure, 1 to 40 [inches]; by default 3.1 for each model."""
+
+
+class PlotChoices(Description):
+    """The options of `brdf`; angles are checked as those of `Brdf.slice`."""
+
+    views: ListOf[View] = DEFAULT_VIEWS
+    angles: ListOf[float] = PLOT.angles
+    log: bool = PLOT.log
+    times_cos: bool = PLOT.times_cos
+    overlay: bool = PLOT.overlay
+    per_channel: bool = PLOT.per_channel
+    labels: ListOf[str] = PLOT.labels
+    width: Width | None = PLOT.width
 
 
 class Drawing(Record):
@@ -211,9 +230,9 @@ def brdf(
     """
     alone = isinstance(model, str | Mapping | IlluminationModel)
     names, texts = _named([model] if alone else model)  # type: ignore[list-item,arg-type]
-    chosen = _plot(plot)
-    found = looks(names, (*texts, *override_texts(overrides, Path())), chosen.labels)
-    return (Brdf if alone else Brdfs)(found, chosen)
+    settings = _plot(plot)
+    found = looks(names, (*texts, *override_texts(overrides, Path())), settings.labels)
+    return (Brdf if alone else Brdfs)(found, settings)
 
 
 def _plot(keywords: PlotKeywords) -> Plot:
@@ -222,20 +241,13 @@ def _plot(keywords: PlotKeywords) -> Plot:
     Raises
     ------
     InputError
-        Views that there are not; angles or a width out of range.
+        An unknown option, or a value that is none of it.
     """
     given: dict[str, Any] = dict(keywords)
-    chosen = given.get("views", DEFAULT_VIEWS)
-    chosen = (chosen,) if isinstance(chosen, str) else chosen
-    for view in chosen:
-        if view not in (*VIEWS, "all"):
-            raise InputError(f"no view {view!r}; {suggestion(str(view), (*VIEWS, 'all'))}")
-    given["views"] = in_order(chosen)
-    if "angles" in given:
-        given["angles"] = tuple(np.atleast_1d(_angles(given["angles"])).tolist())
-    if not 1 <= given.get("width", 1) <= 40:
-        raise InputError(f"width: must be 1 to 40 inches, is {given['width']:g}")
-    return Plot(**given)
+    if given.get("angles") is not None:
+        given["angles"] = np.atleast_1d(_angles(given["angles"])).tolist()
+    choices = chosen(PlotChoices, given, ("views", "labels"))
+    return Plot(**{**dict(choices), "views": in_order(choices.views)})
 
 
 def _named(models: Sequence[AnyModel]) -> tuple[list[str], list[str]]:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated, Literal, TypeAlias, get_args
+
+from pydantic import Field
 
 from illumcli.records import Value
 
+View: TypeAlias = Literal["polar", "cartesian", "across", "albedo", "sphere", "plane", "lobe", "all"]
+Width: TypeAlias = Annotated[float, Field(ge=1, le=40)]
+"""Of a whole drawing [inches]."""
 CURVES = ("polar", "cartesian", "across", "albedo")
 """Views that are curves, of which several models may share one axis."""
-VIEWS = (*CURVES, "sphere", "plane", "lobe")
-DEFAULT_VIEWS = ("polar", "sphere", "plane", "lobe")
+VIEWS: tuple[str, ...] = get_args(View)[:-1]
+DEFAULT_VIEWS: tuple[View, ...] = ("polar", "sphere", "plane", "lobe")
 COLUMN = 3.3
 """Width of a column of a paper [inches]."""
 PER_MODEL = 3.1

@@ -105,6 +105,14 @@ def test_every_model_has_a_page_with_its_formula_and_plots(site):
         assert text.count("<img") >= (tag not in ("merl", "rgl")), tag
 
 
+def test_the_python_reference_says_what_each_part_is(site):
+    text = (site / "python-reference.html").read_text()
+    documented = re.findall(r'<dt class="sig[^>]*\bid="([^"]+)".*?<dd>(.*?)</dd>', text, re.DOTALL)
+    assert len(documented) > 60
+    assert not [name for name, words in documented if not words]
+    assert ">Type<" not in text  # words before a colon, taken for a type
+
+
 def test_formulas_are_read_as_they_are_meant(root, monkeypatch):
     monkeypatch.syspath_prepend(str(root / "docs"))
     from sitepages.formulas import FormulaError, mathml

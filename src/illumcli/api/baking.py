@@ -30,22 +30,34 @@ class BakeKeywords(TypedDict, total=False):
     reconstruct: bool
     """Values of few rays from those around; by default with a `target_error`."""
     falloff: str | Mapping[str, Any]
-    """A name, or the keys of `obscurance.falloff` in scenes: ``{"falloff": "exponential", "tau": 2}``."""
+    """A name, or keys as ``{"falloff": "exponential", "tau": 2}``, which are those of `obscurance.falloff` in
+    scenes; by default `step`."""
     sampler: str
+    """`spiral`, by default, `owen` or `random`."""
     faces: str
+    """Back faces occlude, `count`, by default; are transparent, `ignore`; or end the ray, `one-sided`."""
     method: str
+    """`vertex`, by default, or `fit`, by least squares to samples of the surface."""
     occluders: Sequence[str] | str
+    """What occludes an object beside itself, by default `scene`; others as of `--occluders`."""
     ground: str
+    """The axis that points up from a ground plane below the mesh, such as `y`; more by `--ground`."""
     what: Sequence[str] | str
-    """`ao`, by default, and others of `--what`."""
+    """`ao`, by default, `bent_normal` and `thickness`."""
     color: str
+    """What obscurance does to vertex colours of the outputs; by default nothing."""
     split: bool
+    """True to split vertices with several normals, uv or values in a `.ply`, too."""
     texture: int | tuple[int, int]
     """Width and height; one number for both."""
     bits: int
+    """Of textures as `.png`, 8, by default, or 16."""
     unwrap: str
+    """`missing` or `all`, the objects that get new uv for textures."""
     seed: int
+    """Of random numbers, by default 0."""
     threads: int
+    """By default one per core."""
     strict: bool
     """True to refuse meshes that need repairs."""
 
@@ -54,7 +66,7 @@ class Baking(Record):
     """Baked values at the vertices of a mesh, in the order of its file; of a scene, object after object."""
 
     channels: Mapping[str, NDArray[Any]]
-    """Name -> (V,) or (V, 3) float32: `obscurance`, `standard_error` and what `what` asks for."""
+    """(V,) or (V, 3) float32 by name, `obscurance`, `standard_error` and what `what` asks for."""
     corner_channels: Mapping[str, NDArray[Any]]
     """The same at corners, polygon by polygon; empty if each vertex has one value."""
     report: dict[str, Any]
@@ -99,8 +111,15 @@ def bake(
         Of a scene, as `render` takes them.
     force : bool
         Replace files that differ.
+    progress : callable
+        Called with a name, the amount done, and all of it.
     keywords
         See `BakeKeywords`.
+
+    Returns
+    -------
+    Baking
+        The values, and the report.
 
     Raises
     ------

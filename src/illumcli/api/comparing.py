@@ -40,7 +40,7 @@ class Comparison(dict[str, dict[str, Any]]):
         self._differences = {each.name: each for each in differences}
 
     def heat(self, layer: str | None = None) -> NDArray[np.uint8]:
-        """(H, W, 3) sRGB, where a layer differs, by default the first: the picture of ``--heat``."""
+        """(H, W, 3) sRGB, the picture of ``--heat``: where a layer differs, by default the first."""
         return heat_picture(*self._images, self._difference(layer))
 
     def flip_map(self, layer: str | None = None) -> NDArray[np.float32]:
@@ -78,6 +78,9 @@ def compare(
 
     Parameters
     ----------
+    reference, test : path, array, Picture or Rendering
+        Arrays are (H, W) or (H, W, C), floats of linear light or uint8 of display values. Of a rendering, its
+        first picture.
     layers : sequence of str or str
         By default all that both have.
     flip : bool

@@ -16,16 +16,21 @@ class Parameter(Value):
     """What a parameter of a model may be."""
 
     name: str
+    """Its key in a material."""
     kind: str
     """`number`, `colour`, `choice`, `switch`, `text`, `list` or `mapping`."""
     default: Any
     """None if it may be left out, or must be given."""
     required: bool
+    """True if it must be given."""
     minimum: float | None
     """Of a number, or of each number of a colour."""
     maximum: float | None
+    """The same, upwards."""
     choices: tuple[str, ...]
+    """Of a choice, or the tags of a mapping."""
     unit: str
+    """Such as `rad`; empty if it has none."""
     text: str
     """What it is."""
     takes: str
@@ -38,12 +43,15 @@ class Model(Value):
     """What there is to know of an illumination model."""
 
     name: str
+    """Its tag, the value of `model` in a material."""
     title: str
+    """Such as `Oren-Nayar`."""
     text: str
     """What it is, in a sentence."""
     formula: str
     """Its description with the formula, as ``illum models NAME`` prints it."""
     sources: tuple[str, ...]
+    """Where it is published."""
     claims: Mapping[str, bool]
     """`physical`, `reciprocal`, `conserving`, `isotropic`, with each choice at its default."""
     parameters: Mapping[str, Parameter]
@@ -85,6 +93,11 @@ def models(name: str | None = None) -> Model | Models:
     ----------
     name : str, optional
         Of one model, such as `ward`.
+
+    Returns
+    -------
+    Model or Models
+        One, or a tuple of all.
 
     Raises
     ------

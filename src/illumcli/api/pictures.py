@@ -77,7 +77,7 @@ class Picture(Mapping[str, NDArray[Any]]):
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What a file of it says: seed, samples, the measured error and others."""
+        """What a file of it says, such as seed, samples and the measured error."""
         image = self._image
         return {**metadata(image.work, image.target, image.space), **image.texts}
 
@@ -155,7 +155,7 @@ class Rendering(Record, Mapping[str, NDArray[Any]]):
         return len(self.picture)
 
     def display(self, layer: str | None = None) -> NDArray[np.uint8]:
-        """(H, W, C) a layer of the first picture in 8 bits: see `Picture.display`."""
+        """(H, W, C) a layer of the first picture in 8 bits, as `Picture.display`."""
         return self.picture.display(layer)
 
     def save(self, pattern: str | os.PathLike[str], force: bool = False) -> list[Path]:

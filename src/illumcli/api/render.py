@@ -33,7 +33,9 @@ class Options(TypedDict, total=False):
     layers: Sequence[str] | str
     """Names of layers, as `--only`; by default those of the scene."""
     seed: int
+    """Of random numbers; by default the scene's."""
     threads: int
+    """By default one per core."""
     target_error: float
     """RMSE that sample counts are chosen for; by default the scene's counts."""
     cache: bool
@@ -152,6 +154,16 @@ def refuse_too_many(works: Sequence[Work]) -> None:
 def load(scene: AnyScene) -> LoadedScene:
     """A scene to render several times; what overrides do not touch is computed once.
 
+    Parameters
+    ----------
+    scene : path, mapping, Scene or mesh
+        As `LoadedScene` takes it.
+
+    Raises
+    ------
+    InputError
+        It is none of these, or a mapping has a value that no scene can have.
+
     Examples
     --------
     >>> teapot = illum.load("scenes/teapot.yaml")
@@ -182,14 +194,19 @@ def render(
 
     Parameters
     ----------
-    scene : path, mapping or Scene
+    scene : path, mapping, Scene or mesh
         As `load` takes it.
     overrides : mapping or sequence of str
         ``{"materials.clay.sigma": 0.3}``, or the texts of `-D`.
     frames : str, int or iterable of int, optional
-        Frames of an animation: `FIRST:LAST`, `FIRST:LAST:STEP`, or numbers; a list of renderings comes back.
+        Frames of an animation: `FIRST:LAST`, `FIRST:LAST:STEP`, or numbers.
     options
         See `Options`.
+
+    Returns
+    -------
+    Rendering or list of Rendering
+        The pictures of all cameras; with `frames`, those of each frame.
 
     Raises
     ------

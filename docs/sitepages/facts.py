@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from illumcli.viewer.control import unit_in
+from illumcli.schema.docs import unit_in
 
 Schema = Mapping[str, Any]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any, overload
 
@@ -10,6 +9,7 @@ from illumcli.api.html_tables import html_table
 from illumcli.commands.models import allowed, data
 from illumcli.errors import InputError
 from illumcli.records import Value
+from illumcli.schema.docs import unit_in
 
 
 class Parameter(Value):
@@ -134,7 +134,6 @@ def _parameter(name: str, field: Mapping[str, Any], required: bool) -> Parameter
     """The record of a field of a schema."""
     text, plain = field.get("description", ""), _constant(field)
     number = plain.get("items", plain)
-    unit = re.search(r"\[([^\]\d][^\]]*)\]", text)
     return Parameter(
         name,
         _kind(plain),
@@ -143,7 +142,7 @@ def _parameter(name: str, field: Mapping[str, Any], required: bool) -> Parameter
         number.get("minimum", number.get("exclusiveMinimum")),
         number.get("maximum"),
         tuple(number.get("enum", plain.get("discriminator", {}).get("mapping", ()))),
-        unit[1] if unit else "",
+        unit_in(text),
         text,
         allowed(field),
         plain is not field and "vertex attribute" in allowed(field),

@@ -40,6 +40,12 @@ def choices(text: str, names: Sequence[str]) -> list[str]:
     return [sentences[name].strip() for name in names] if sentences.keys() >= set(names) else []
 
 
+def unit_in(text: str) -> str:
+    """The unit that a field's text names: `degrees` of "Vertical field of view [degrees]."."""
+    unit = re.search(r"\[([^\]\d,][^\],]*)\]", text)
+    return unit[1] if unit else ""
+
+
 @cache
 def _docs_of_module(module: str) -> dict[str, dict[str, str]]:
     """Class -> field -> docstring, of a module; empty if its source is not there."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -160,9 +159,3 @@ def _limit(number: Schema, name: str) -> float | None:
     """A limit of a number that is an end of a slider; None if it is too far away."""
     limit = number.get(name, number.get(f"exclusive{name.capitalize()}"))
     return None if limit is None or abs(limit) > FAR else float(limit)
-
-
-def unit_in(text: str) -> str:
-    """The unit that a help text names: `degrees` of "Vertical field of view [degrees]."."""
-    unit = re.search(r"\[([^\]\d,][^\],]*)\]", text)
-    return unit[1] if unit else ""

@@ -13,9 +13,9 @@ from illumcli.scene.spec import Object, Scene
 from illumcli.scene.yaml_text import flow
 from illumcli.schema.annotations import field_annotation, is_tag, split
 from illumcli.schema.description import Description, as_json
-from illumcli.schema.docs import summary
+from illumcli.schema.docs import summary, unit_in
 from illumcli.viewer.choices import holds_descriptions, tag_value, tags_in
-from illumcli.viewer.control import Control, Schema, shape_of, slider_of, unit_in, without_null
+from illumcli.viewer.control import Control, Schema, shape_of, slider_of, without_null
 
 ABSENT: Any = object()
 """In place of a value that the scene file does not have, because another description stands there."""

@@ -13,8 +13,9 @@ from illumcli.lights._base import Light
 from illumcli.models._base import IlluminationModel
 from illumcli.schema.annotations import is_tag
 from illumcli.schema.description import Description, as_json
+from illumcli.schema.docs import unit_in
 from illumcli.viewer.choices import tag_value
-from illumcli.viewer.control import shape_of, unit_in
+from illumcli.viewer.control import shape_of
 
 
 def switched(old: Description | None, cls: type[Description], reach: float) -> dict[str, Any]:

@@ -5,6 +5,7 @@ Run it after a change to what they show; a test runs them, too, elsewhere.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ SECONDS = 300
 
 
 def run(path: Path, folder: Path) -> Any:
-    """The notebook in `path` with the outputs of its cells, run in `folder`.
+    """The notebook in `path` with the outputs of its cells, run in `folder` with an empty cache.
 
     Raises
     ------
@@ -32,7 +33,8 @@ def run(path: Path, folder: Path) -> Any:
         resources={"metadata": {"path": str(folder)}},
         record_timing=False,
     )
-    return client.execute()
+    with tempfile.TemporaryDirectory() as cache:
+        return client.execute(env={**os.environ, "ILLUM_CACHE": cache})
 
 
 def text(notebook: Any) -> str:

@@ -29,6 +29,7 @@ def test_it_holds_what_its_cells_show(path):
     text = path.read_text(encoding="utf-8")
     assert len(text) < LARGEST
     assert not re.search(r"/(tmp|home|root|work|usr)/|Traceback|Warning", text)
+    assert re.search(r"with ([\d,]+) rays", text)[1] != "0", "the cache was not empty"
     cells = codes(json.loads(text))
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     kinds = [kind for cell in cells for output in cell["outputs"] for kind in output.get("data", ())]

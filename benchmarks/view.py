@@ -161,7 +161,7 @@ def used(window: Window, pid: int, minutes: float, seed: int = 0) -> None:
             window.tell(type="view", layer=draw.choice(layers))
         elif kind < 0.95:
             name = draw.choice(window.scene["materials"])["name"]
-            window.tell(type="model", material=name, model=draw.choice(MODELS))
+            window.tell(type="set", path=f"materials.{name}.model", value=draw.choice(MODELS))
         else:
             window.tell(type="reset")
         window.picture("full" if draw.random() < 0.1 else None)

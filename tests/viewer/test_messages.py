@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from illumcli.viewer.messages import coalesced
 
 
@@ -24,6 +26,12 @@ def test_moves_add_up_and_the_last_value_counts():
         {"type": "set", "path": "b", "value": 3},
         {"type": "view", "layer": "depth", "camera": "top", "stamp": 6},
     ]
+
+
+@pytest.mark.parametrize("first", ["left", [1], [[1], 2], 10**400, None])
+def test_what_is_no_motion_stays_apart(first):
+    messages = [{"type": "move", "orbit": first}, {"type": "move", "orbit": [0.5, 0.5]}]
+    assert coalesced(messages) == messages
 
 
 def test_others_stay_apart():

@@ -156,8 +156,6 @@ def test_a_switch_of_the_model_brings_other_controls(page):
     answers = page.settled()
     assert types(answers)[0] == "scene"
     assert answers[0]["edits"] == {}
-    page.tell(type="model", material="clay", model="ward")
-    assert types(page.settled())[0] == "scene"
 
 
 def test_all_motions_count_though_pictures_are_skipped(page, scene):
@@ -199,7 +197,14 @@ def test_values_under_the_mouse(page):
              '{"type": "set", "path": {}, "value": 1}', '{"type": "restore"}',
              '{"type": "view", "width": 3}', '{"type": "pick", "x": "left", "y": 0}',
              '{"type": "move", "orbit": [NaN, 0]}', '{"type": "set", "path": "camera.fov", "value": NaN}',
-             '{"type": "set", "path": "", "value": 1}'],
+             '{"type": "set", "path": "", "value": 1}', '{"type": "view", "width": 1e999, "height": 3}',
+             '{"type": "pick", "x": -Infinity, "y": 0}',
+             '{"type": "lobes", "of": ["clay"], "theta": 0, "phi": 0}',
+             '{"type": "set", "path": "ambient.color.0.1.2", "value": 5}',
+             pytest.param("[" * 100000, id="deep"),
+             pytest.param(f'{{"type": "view", "layer": {"[" * 900}{"]" * 900}}}', id="deep layer"),
+             pytest.param(f'{{"type": "set", "path": "seed", "value": {"[" * 900}{"]" * 900}}}', id="deeper"),
+             pytest.param(f'{{"type": "view", "exposure": {"9" * 4000}}}', id="long number")],
 )  # fmt: skip
 def test_messages_that_make_no_sense_are_told_and_change_nothing(page, text):
     page.session.receive(text)
@@ -375,6 +380,13 @@ def test_edits_are_saved_as_a_scene(page, scene):
     page.tell(type="save", file=str(target), replace=True)
     assert page.next()["type"] == "saved"
     assert load(target).scene == load(scene).scene
+
+
+def test_a_name_that_the_disk_refuses_is_told(page):
+    page.tell(type="save", file=f"{'long' * 500}.yaml")
+    problem = page.next()
+    assert (problem["type"], problem["from"]) == ("problem", "save")
+    assert "name too long" in problem["lines"][0]
 
 
 def test_an_edit_that_only_a_render_can_refuse_is_not_blamed_on_the_file(page):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,10 @@ def dollied(camera: Camera, amount: float) -> Camera:
         return camera.model_copy(update={"extent": float(f"{extent:.{DIGITS}g}"), "fit": None})
     target = np.asarray(camera.target, np.float64)
     return _placed(camera, target - factor * (target - camera.position), target)
+
+
+MOTIONS: Mapping[str, Callable[..., Camera]] = {"orbit": orbited, "pan": panned, "dolly": dollied}
+"""How the mouse moves a camera."""
 
 
 def placement(camera: Camera) -> Mapping[str, object]:

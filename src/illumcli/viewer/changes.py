@@ -14,7 +14,7 @@ from illumcli.render_graph.needs import layers
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
 from illumcli.schema.messages import suggestion
-from illumcli.viewer.cameras import dollied, orbited, panned, placement
+from illumcli.viewer.cameras import MOTIONS, placement
 from illumcli.viewer.edits import Edits, after_reset, after_set, overrides_of
 from illumcli.viewer.messages import Message
 from illumcli.viewer.window import Window, camera_path
@@ -23,6 +23,8 @@ LARGEST = 8192
 """Pixels of a picture's side, at most."""
 STOPS = 64
 """Exposure, at most [stops]."""
+FARTHEST = 100.0
+"""A motion of one message, at most [heights of the picture]."""
 Load = Callable[[Sequence[str]], SceneFile]
 """Loads the scene with the overrides of edits; raises InputError."""
 
@@ -41,8 +43,8 @@ def changed(window: Window, message: Message, load: Load, camera: Camera) -> Win
     ------
     InputError
         A value that the scene cannot have.
-    ValueError, TypeError, LookupError
-        A message that lacks something, or has something of another type.
+    Exception
+        One of `messages.MISUNDERSTOOD`.
     """
     edits = window.edits
     match message["type"]:
@@ -50,9 +52,6 @@ def changed(window: Window, message: Message, load: Load, camera: Camera) -> Win
             return _looking(window, message)
         case "set":
             edits = after_set(window.original, window.now, edits, str(message["path"]), message["value"])
-        case "model":
-            name = f"materials.{message['material']}.model"
-            edits = after_set(window.original, window.now, edits, name, message["model"])
         case "reset":
             path = message.get("path")
             edits = after_reset(window.original, window.now, edits, None if path is None else str(path))
@@ -173,12 +172,8 @@ def _plain(value: Any) -> Any:
 
 def _moved(camera: Camera, message: Message) -> Camera:
     """The camera after the motion of a message."""
-    kind = next((kind for kind in MOVES if kind in message), "orbit")
+    kind = next((kind for kind in MOTIONS if kind in message), "orbit")
     motion = message[kind] if isinstance(message[kind], list) else [message[kind]]
     if not all(math.isfinite(each) and abs(each) <= FARTHEST for each in motion):
         raise ValueError("a motion is a few heights of the picture")
-    return MOVES[kind](camera, *motion) if any(motion) else camera
-
-
-FARTHEST = 100.0
-MOVES: Mapping[str, Callable[..., Camera]] = {"orbit": orbited, "pan": panned, "dolly": dollied}
+    return MOTIONS[kind](camera, *motion) if any(motion) else camera

@@ -1,13 +1,28 @@
-"""Messages of a page: which ones take the place of earlier ones."""
+"""Messages of a page: how they are read, and which ones take the place of earlier ones."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
+from illumcli.viewer.cameras import MOTIONS
+
 Message: TypeAlias = Mapping[str, Any]
 
-MOVES = ("orbit", "pan", "dolly")
+MISUNDERSTOOD = (
+    LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError,
+)  # fmt: skip
+"""What a message raises that lacks something, or has something of another type, size or depth."""
+
+
+def message_of(text: str | bytes) -> Message:
+    """The message of a text; one of an unknown type if it is none."""
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        message = None
+    return message if isinstance(message, dict) else {"type": "unknown"}
 
 
 def coalesced(messages: Iterable[Message]) -> list[Message]:
@@ -32,13 +47,18 @@ def _joined(first: Message, second: Message) -> Message | None:
     if kind == "set" and first.get("path") == second.get("path"):
         return second
     if kind == "move":
-        for move in MOVES:
-            if move in first and move in second:
-                return {**second, move: _sum(first[move], second[move])}
+        for motion in MOTIONS:
+            if motion in first and motion in second:
+                total = _sum(first[motion], second[motion])
+                return None if total is None else {**second, motion: total}
     return None
 
 
 def _sum(first: Any, second: Any) -> Any:
-    if isinstance(first, list) and isinstance(second, list):
-        return [a + b for a, b in zip(first, second, strict=True)]
-    return first + second
+    """The sum of two motions; None if one of them is no motion."""
+    try:
+        if isinstance(first, list) and isinstance(second, list):
+            return [a + b for a, b in zip(first, second, strict=True)]
+        return first + second
+    except MISUNDERSTOOD:
+        return None

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
+import reprlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from threading import Condition
 from typing import Any
 
-from illumcli.errors import IllumError, InputError, known
+from illumcli.errors import InputError, known
 from illumcli.layers import FIXED
 from illumcli.rays.viewpoints import Camera
 from illumcli.viewer.answers import picture_answer, pixel_answer, scene_answer
 from illumcli.viewer.changes import changed, reread
 from illumcli.viewer.controls import controls
 from illumcli.viewer.lobes import LobePanel
-from illumcli.viewer.messages import Message, coalesced
+from illumcli.viewer.messages import MISUNDERSTOOD, Message, coalesced, message_of
 from illumcli.viewer.pace import Pace
 from illumcli.viewer.pictures import Picture, Renderer
 from illumcli.viewer.quality import FEW_RAYS, FEWEST_RAYS, Coarse
@@ -85,12 +86,9 @@ class Session:
 
     def receive(self, text: str | bytes) -> None:
         """Take a message of the page."""
-        try:
-            message = json.loads(text)
-        except ValueError:
-            message = None
+        message = message_of(text)
         with self._news:
-            self._pending.append(message if isinstance(message, dict) else {"type": "unknown"})
+            self._pending.append(message)
             self._news.notify()
 
     def close(self) -> None:
@@ -190,13 +188,10 @@ class Session:
             is_change |= message.get("type") not in QUESTIONS
             try:
                 is_told = self._apply(message) and is_told
-            except IllumError as error:
-                lines = str(error).splitlines()
-                self._tell_problem(lines, "save" if message.get("type") == "save" else "edit")
+            except Exception as error:
+                origin = "save" if message.get("type") == "save" else "edit"
+                self._tell_problem(_problem(message, error), origin)
                 is_told = False
-            except (LookupError, TypeError, ValueError) as error:
-                text = json.dumps(message)[:80]
-                self._tell_problem([f"message: not understood: {text}: {error}"], "edit")
         if not is_told:
             self._tell_controls(self._window)
         if is_change and before == self._version == self._complete:
@@ -286,6 +281,15 @@ class Session:
 
     def _tell(self, answer: Mapping[str, Any]) -> None:
         self._send(json.dumps(answer))
+
+
+def _problem(message: Message, error: Exception) -> list[str]:
+    """Why a message was refused; raises what is a fault of the program."""
+    if (fault := known(error)) is not None:
+        return str(fault).splitlines()
+    if isinstance(error, MISUNDERSTOOD):
+        return [f"message: not understood: {reprlib.repr(message)}: {error}"]
+    raise error
 
 
 def _stamp(message: Message) -> dict[str, Any]:

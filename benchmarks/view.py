@@ -1,11 +1,11 @@
 """How long does it take from a change to a picture, in the live view?
 
-One window of 640 x 360 on `illum view`, over its socket: each change of a drag is sent when the picture of
-the one before is there, a switch of the model after the full picture, and counts until the first picture that
-has it, coarse or full. Wall seconds of the client;
-processor seconds of the server, all threads, pictures that were begun and given up included. Reference: the
-limits that the view is built for, 60 ms for a material and 200 ms for a camera on two free cores. With
-`--minutes`, then random use for so long: what the server keeps in memory, and problems that it tells.
+One window of 640 x 360 on `illum view`, over its socket. Each change of a drag is sent when the picture of
+the one before has come, a switch of the model after the full picture. A change is timed until the first
+picture that has it, coarse or full: wall seconds of the client, and processor seconds of all threads of the
+server, including pictures that were begun and given up. Reference: the limits that the view is built for, 60
+ms for a material and 200 ms for a camera on two free cores. With `--minutes`, random use follows for so long:
+what the server keeps in memory, and the problems that it reports.
 
     PYTHONPATH=src python benchmarks/view.py [SCENE] [--mesh MESH] [--minutes M] [--small]
 """

@@ -18,3 +18,13 @@ def test_the_page_names_files_of_the_package(root):
     for name in named:
         if not name.startswith(("docs/", "src/")):
             assert (root / "src" / "illumcli" / name).exists(), name
+
+
+def test_the_page_tells_what_every_folder_holds(root):
+    table = (root / "docs" / "architecture.md").read_text().partition("| folder | holds |")[2]
+    named = set(
+        re.findall(
+            r"`(\w+)`", "".join(line.split(" | ")[0] for line in table.splitlines() if line[:1] == "|")
+        )
+    )
+    assert {path.parent.name for path in (root / "src" / "illumcli").glob("*/__init__.py")} - named == set()

@@ -49,9 +49,10 @@ and `rgl` stand in files; the tests compare the lookup with values known beforeh
 
 ![Sixty teapots: a column per family of models, a row per parameter](gallery.png)
 
-The columns, from the left: Lambert, Oren-Nayar, Minnaert; Phong, Blinn-Phong; Strauss; Cook-Torrance as
-copper and as plastic; Cook-Torrance's distributions; Ward; Ashikhmin-Shirley; Kajiya-Kay, Poulin-Fournier,
-Lafortune; principled; Fujii, EON, metallic-roughness. The values stand in
+The columns, from the left: Lambert, Oren-Nayar, Minnaert, Lommel-Seeliger; Phong, Blinn-Phong; Strauss;
+Cook-Torrance with laws of Fresnel and as plastic; its distributions of facets; Ward; Ashikhmin-Shirley;
+Kajiya-Kay, Poulin-Fournier, Lafortune; principled; Fujii, EON, Burley, metallic-roughness; `generated`;
+`formula`. The values stand in
 [scenes/gallery.yaml](../scenes/gallery.yaml). One command renders it, on the teapot or on any mesh; other
 scenes show one thing each:
 

@@ -139,3 +139,10 @@ def test_ci_tries_the_lowest_versions_that_are_allowed():
     lowest = subprocess.run([ROOT / ".ci" / "lowest"], capture_output=True, text=True, check=True).stdout
     assert sorted(lowest.split()) == sorted(each.replace(">=", "==") for each in wanted)
     assert (ROOT / ".ci" / "lowest.txt").read_text() == lowest
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_to_files_of_the_repository(page):
+    """Readers of the repository have no site."""
+    linked = re.findall(r"\]\(([^)#\s:]+)[)#]", page.read_text())
+    assert [name for name in linked if not (page.parent / name).exists()] == []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+SCENES = ROOT / "scenes"
 
 MOVED = {
     "CHANGELOG.md": "changelog.md",
@@ -65,7 +66,7 @@ def with_links(text: str, path: Path) -> str:
         target = (path.parent / file).resolve()
         if ":" in file or not target.is_relative_to(ROOT):
             return match[0]
-        if target.is_dir():
+        if target.is_dir() and target != SCENES:
             return words
         page = place(target.relative_to(ROOT).as_posix())
         if page == "models.md" and anchor:
@@ -79,6 +80,8 @@ def place(file: str) -> str:
     """Where a file of the repository is on the site: a page, a picture, or a copy to look at."""
     if file.startswith("docs/"):
         return file.removeprefix("docs/")
+    if file == "scenes":
+        return "gallery.md"
     if re.fullmatch(r"scenes/[\w-]+\.yaml", file):
         return f"gallery/{Path(file).stem}.md"
     return MOVED.get(file, COPIES + file)
@@ -86,7 +89,7 @@ def place(file: str) -> str:
 
 def scenes() -> list[Path]:
     """The scenes of the repository."""
-    return sorted((ROOT / "scenes").glob("*.yaml"))
+    return sorted(SCENES.glob("*.yaml"))
 
 
 def pictures() -> dict[str, bytes]:

@@ -11,14 +11,8 @@ from chromium import Page
 
 
 @contextmanager
-def served(path):
-    """The server of a scene's page, which runs in a thread."""
-    pytest.importorskip("websockets", reason="needs websockets")
-    from illumcli.viewer.pictures import Renderer
-    from illumcli.viewer.server import Viewer
-    from illumcli.viewer.session import Session
-
-    viewer = Viewer(lambda send: Session(Renderer(path), send))
+def running(viewer):
+    """A server that runs in a thread."""
     thread = threading.Thread(target=viewer.run)
     thread.start()
     try:
@@ -26,6 +20,18 @@ def served(path):
     finally:
         viewer.stop()
         thread.join()
+
+
+@contextmanager
+def served(path):
+    """The server of a scene's page, which runs in a thread."""
+    pytest.importorskip("websockets", reason="needs websockets")
+    from illumcli.viewer.pictures import Renderer
+    from illumcli.viewer.server import Viewer
+    from illumcli.viewer.session import Session
+
+    with running(Viewer(lambda send: Session(Renderer(path), send))) as viewer:
+        yield viewer
 
 
 def control(path, part):

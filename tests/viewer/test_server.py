@@ -6,6 +6,7 @@ import http.client
 import json
 import os
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from websockets.sync.client import connect
 from illumcli.errors import IllumError, InputError
 from illumcli.viewer import server
 from illumcli.viewer.server import Viewer
+from viewing import running
 
 
 def get(url, path="", **headers):
@@ -156,11 +158,30 @@ def test_a_message_that_is_too_large_ends_the_window_alone(viewer):
 def test_a_port_in_use_and_addresses_of_everyone_are_refused(viewer):
     port = urlsplit(viewer.url).port
     with pytest.raises(
-        IllumError, match=f"127.0.0.1:{port} cannot be listened at: .*; choose another --port"
+        IllumError, match=f"127.0.0.1:{port} cannot be listened at: .*; choose another --host or --port"
     ):
         Viewer(None, port=port)
-    with pytest.raises(InputError, match="give one address of this machine"):
-        Viewer(None, host="0.0.0.0")
+    for host in ("0.0.0.0", "0", "::", "0::0", ""):
+        with pytest.raises(InputError, match="give one address of this machine"):
+            Viewer(None, host=host)
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "header"),
+    [("Studio", 8000, "studio:8000"), ("127.0.0.1", 80, "127.0.0.1"), ("::1", 8000, "[::1]:8000")],
+)
+def test_the_page_is_served_under_the_name_that_browsers_send(host, port, header):
+    assert server.host_header(host, port) == header
+
+
+def test_an_address_of_ipv6(scene):
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("needs IPv6")
+    with running(Viewer(None, host="::1")) as viewer:
+        assert viewer.is_local
+        assert get(viewer.url)[0] == 200
 
 
 def illum(*words, **options):

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import logging
 import secrets
+import socket
 from collections.abc import Callable
 from http import HTTPStatus
+from ipaddress import ip_address
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -30,7 +32,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-EVERYWHERE = ("", "0.0.0.0", "::")
+HTTP_PORT = 80
 LARGEST = 1 << 20
 """Bytes of a message of the page, at most."""
 
@@ -53,31 +55,33 @@ class Viewer:
             raise InputError(
                 "illum view needs websockets; install it: pip install 'illumcli[view]'"
             ) from None
-        if host in EVERYWHERE:
-            raise InputError(f"--host {host}: give one address of this machine; the page's own has it in it")
         self._session = session
         self._token = secrets.token_urlsafe(18)
         quiet = logging.Logger("illum view")  # connections that break off are no news
         quiet.addHandler(logging.NullHandler())
         try:
-            self._server: Server = serve(
-                self._connected,
-                host,
-                port,
-                process_request=self._requested,
-                compression=None,
-                max_size=LARGEST,
-                server_header=None,
-                logger=quiet,
-            )
+            listener = _listener(host, port)
         except OSError as error:
             fact = f"{host}:{port} cannot be listened at: {error.strerror or error}"
-            raise IllumError(f"{fact}; choose another --port") from None
-        number = self._server.socket.getsockname()[1]
-        name = f"[{host}]" if ":" in host else host
-        self._hosts = {f"{name}:{number}", *([f"localhost:{number}"] if host == "127.0.0.1" else [])}
-        self.url = f"http://{name}:{number}/{self._token}/"
+            raise IllumError(f"{fact}; choose another --host or --port") from None
+        bound = listener.getsockname()
+        self._server: Server = serve(
+            self._connected,
+            sock=listener,
+            process_request=self._requested,
+            compression=None,
+            max_size=LARGEST,
+            server_header=None,
+            logger=quiet,
+        )
+        self.is_local = ip_address(bound[0]).is_loopback
+        """True if this machine alone can reach the page."""
+        names = [host, "localhost"] if host == "127.0.0.1" else [host]
+        self._hosts = [host_header(name, bound[1]) for name in names]
+        self._origins = [f"http://{each}" for each in self._hosts]
+        self.url = f"{self._origins[0]}/{self._token}/"
         """The address of the page."""
+        self._files = {path.name: path for path in PAGE.iterdir() if path.suffix in TYPES}
 
     def run(self) -> None:
         """Serve until `stop` or an exception."""
@@ -89,10 +93,10 @@ class Viewer:
 
     def _requested(self, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request; None opens the socket of a window."""
-        if request.headers.get_all("Host") not in [[host] for host in self._hosts]:
+        if request.headers.get_all("Host") not in [[each] for each in self._hosts]:
             return _answer(HTTPStatus.FORBIDDEN, b"The header Host names another server.\n")
         origins = request.headers.get_all("Origin")
-        if origins not in [[], *([f"http://{host}"] for host in self._hosts)]:
+        if origins not in [[], *([each] for each in self._origins)]:
             return _answer(HTTPStatus.FORBIDDEN, b"Pages of other sites are refused.\n")
         _, token, *rest = request.path.partition("?")[0].split("/", 2)
         if not secrets.compare_digest(token.encode(), self._token.encode()) or not rest:
@@ -103,9 +107,8 @@ class Viewer:
             if not origins:
                 return _answer(HTTPStatus.FORBIDDEN, b"A socket needs the header Origin.\n")
             return None
-        name = rest[0] or "index.html"
-        path = PAGE / name
-        if "/" in name or "\\" in name or path.suffix not in TYPES or not path.is_file():
+        path = self._files.get(rest[0] or "index.html")
+        if path is None:
             return _answer(HTTPStatus.NOT_FOUND, b"There is no such file.\n")
         return _answer(HTTPStatus.OK, path.read_bytes(), TYPES[path.suffix])
 
@@ -134,6 +137,28 @@ class Viewer:
         finally:
             session.close()
             rendering.join()
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    """A socket that listens at an address of this machine.
+
+    Raises
+    ------
+    InputError
+        It is no single address.
+    OSError
+        It cannot be listened at.
+    """
+    family, _, _, _, address = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM)[0]
+    if not host or ip_address(address[0]).is_unspecified:
+        raise InputError(f"--host {host}: give one address of this machine; the page's own has it in it")
+    return socket.create_server(address, family=family)
+
+
+def host_header(host: str, port: int) -> str:
+    """The header Host that a browser sends to an address."""
+    name = f"[{host}]" if ":" in host else host.lower()
+    return name if port == HTTP_PORT else f"{name}:{port}"
 
 
 def _answer(status: HTTPStatus, body: bytes, kind: str = "text/plain") -> Response:

@@ -208,6 +208,22 @@ def test_a_signal_ends_the_command_in_the_middle_of_a_picture(scene, tmp_path, n
     assert list(folder.iterdir()) == []
 
 
+def test_a_page_for_other_machines_saves_beside_the_scene_alone(scene, tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing
+        except OSError:
+            pytest.skip("needs a network card")
+        host = probe.getsockname()[0]
+    with illum(scene, "--host", host) as run:
+        with window(run.stdout.readline().strip()) as socket_of_page:
+            until_full(socket_of_page)
+            socket_of_page.send(json.dumps({"type": "save", "file": str(tmp_path.parent / "new.yaml")}))
+            problem = json.loads(socket_of_page.recv(timeout=60))
+        run.terminate()
+    assert f"saves in {tmp_path} or below alone" in problem["lines"][0]
+
+
 def test_a_faulty_scene_and_a_missing_package_are_told_in_a_line(scene, tmp_path):
     (tmp_path / "websockets.py").write_text("raise ImportError\n")
     with illum(scene, "-q", env={**os.environ, "PYTHONPATH": str(tmp_path)}) as run:

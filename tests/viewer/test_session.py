@@ -382,6 +382,22 @@ def test_edits_are_saved_as_a_scene(page, scene):
     assert load(target).scene == load(scene).scene
 
 
+def test_a_page_that_is_open_to_others_saves_beside_the_scene_alone(opened, scene, tmp_path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "link.yaml").symlink_to(tmp_path.parent / "linked.yaml")
+    page = opened(Renderer(scene, threads=1, saves_anywhere=False))
+    page.settled()
+    page.tell(type="save", file=str(tmp_path / "deep" / "new.yaml"))
+    assert page.next()["type"] == "saved"
+    for target in ("../new.yaml", "deep/../../new.yaml", "link.yaml"):
+        page.tell(type="save", file=str(tmp_path / target), replace=True)
+        problem = page.until(type="problem")[-1]
+        assert problem["from"] == "save"
+        assert f"saves in {tmp_path} or below alone" in problem["lines"][0]
+    assert not (tmp_path.parent / "new.yaml").exists()
+    assert not (tmp_path.parent / "linked.yaml").exists()
+
+
 def test_a_name_that_the_disk_refuses_is_told(page):
     page.tell(type="save", file=f"{'long' * 500}.yaml")
     problem = page.next()

@@ -26,7 +26,7 @@ from illumcli.cli._printing import say
     default="127.0.0.1",
     show_default=True,
     help="The address to listen at. With another one, whoever knows the page's address can use it from "
-    "elsewhere.",
+    "elsewhere, and saves in the scene's folder or below alone.",
 )
 @click.option("--no-browser", is_flag=True, help="Open no browser; the address is printed.")
 @threads_option
@@ -56,7 +56,11 @@ def view(
     from illumcli.viewer.session import Session
 
     Renderer(scene, overrides, threads).loaded()  # faults of the scene are told before a page opens
-    viewer = Viewer(lambda send: Session(Renderer(scene, overrides, threads), send), host, port)
+    viewer = Viewer(
+        lambda send: Session(Renderer(scene, overrides, threads, saves_anywhere=viewer.is_local), send),
+        host,
+        port,
+    )
     click.echo(viewer.url)
     if not quiet:
         say("Ctrl-C ends the view")

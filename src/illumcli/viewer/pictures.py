@@ -26,7 +26,7 @@ from illumcli.scene.scene_file import SceneFile
 from illumcli.schema.sources import folders
 from illumcli.viewer.edits import overrides_of
 from illumcli.viewer.quality import Coarse, coarse_scene
-from illumcli.viewer.saving import command_text, save
+from illumcli.viewer.saving import command_text, refuse_elsewhere, save
 from illumcli.viewer.watching import Watch
 from illumcli.viewer.window import Window
 
@@ -104,11 +104,20 @@ class Renderer:
         A scene or mesh file.
     given : sequence of str
         Overrides as `-D` gives them, before all edits.
+    saves_anywhere : bool
+        False to save in the scene's folder or below alone.
     """
 
-    def __init__(self, path: Path, given: Sequence[str] = (), threads: int | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        given: Sequence[str] = (),
+        threads: int | None = None,
+        saves_anywhere: bool = True,
+    ) -> None:
         self.path = path
         self.given = tuple(given)
+        self._saves_anywhere = saves_anywhere
         self._threads = threads
         self._images = HeldImages()
         self._worker = Worker(self._images)
@@ -158,6 +167,8 @@ class Renderer:
 
     def save(self, target: Path, window: Window, replace: bool = False) -> None:
         """Write the scene of a window with its edits; see `saving.save`."""
+        if not self._saves_anywhere:
+            refuse_elsewhere(target, self.path.parent)
         overrides = (*self.given, *overrides_of(window.edits))
         save(target, self.path, overrides, self._worker.shared(self.path).text, replace)
 

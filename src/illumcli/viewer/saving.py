@@ -28,6 +28,15 @@ def command_text(path: Path, overrides: Sequence[str], words: Sequence[str] = ()
     return shlex.join(["illum", "render", scene, *changes, *words])
 
 
+def refuse_elsewhere(target: Path, folder: Path) -> None:
+    """Raise InputError if a file is not in a folder or below; links are followed."""
+    if not target.resolve().is_relative_to(folder.resolve()):
+        fact = (
+            f"{target}: the page is open to other machines, so it saves in {folder.resolve()} or below alone"
+        )
+        raise InputError(f"{fact}; give a name there")
+
+
 def save(target: Path, path: Path, overrides: Sequence[str], text: SceneText, replace: bool = False) -> None:
     """Write a scene or mesh with overrides as a scene of its own, whole or not at all.
 

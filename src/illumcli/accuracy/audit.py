@@ -15,7 +15,7 @@ Transactions on Graphics 31(6): two buffers. Not followed: their halves are part
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -149,7 +149,9 @@ class Audit(Record):
         """The error of the picture, of which every tile was taken; see `measured`."""
         return self.measured(shared, run)[0]
 
-    def measured(self, shared: Mapping[str, Any], run: Run) -> tuple[AuditedError, Draws]:
+    def measured(
+        self, shared: Mapping[str, Any], run: Run, advance: Callable[[int], None] = lambda _: None
+    ) -> tuple[AuditedError, Draws]:
         """The error of the picture, of which every tile was taken, and the draws that state it.
 
         Pixels that determine how many are audited do not state the error.
@@ -158,8 +160,11 @@ class Audit(Record):
         ----------
         shared : mapping
             The buffers of the whole scene.
+        advance : callable
+            Called with 0 before each part; an exception that it raises ends the audit.
         """
         buffers = dict(shared)
+        advance(0)
         chances = pixel_chances(self.picture.values) * self.picture.is_inside
         chances /= chances.sum()
 
@@ -173,6 +178,7 @@ class Audit(Record):
         rays = min(int(RAYS * more), MOST_RAYS)
 
         # The audit itself.
+        advance(0)
         wanted = number * (pilot.standard_error / pilot.rmse / self.precision) ** 2
         number = int(min(max(wanted, number), max(self._budget() // (2 * rays), number)))
         draws = self._draws(chances, number, rays, "main", buffers, run)

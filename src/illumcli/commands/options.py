@@ -43,6 +43,8 @@ class RenderOptions(Value):
     """Go on with other scenes or variants after one that failed."""
     audit: bool = True
     """Measure the error of reconstructed layers."""
+    audit_precision: float | None = None
+    """Relative standard error of the measured error; by default the audit's own."""
     target_error: float | None = None
     """RMSE that sample counts are chosen for; by default the scene's counts."""
     frames: str | None = None

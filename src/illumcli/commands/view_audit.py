@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from illumcli.arrays import Floats
@@ -27,13 +28,24 @@ def audit_of(work: Work, plan: Plan) -> Audit | None:
     from illumcli.accuracy.audit import Audit, audited_layer
 
     layer = audited_layer(plan)
-    return Audit.of(plan, layer, work.scene.seed) if layer is not None else None
+    if layer is None:
+        return None
+    audit, precision = Audit.of(plan, layer, work.scene.seed), work.job.options.audit_precision
+    return audit if precision is None else replace(audit, precision=precision)
 
 
-def measured(audit: Audit, shared: Buffers, run: Run) -> tuple[AuditedError, Draws]:
-    """The error of a picture, and the draws that state it; adds to the run's statistics."""
+def measured(
+    audit: Audit, shared: Buffers, run: Run, advance: Callable[[int], None]
+) -> tuple[AuditedError, Draws]:
+    """The error of a picture, and the draws that state it; adds to the run's statistics.
+
+    Parameters
+    ----------
+    advance : callable
+        Called now and then with 0; an exception that it raises ends the audit.
+    """
     start, auditing = time.perf_counter(), Run(threads=run.threads)
-    error, draws = audit.measured(shared, auditing)
+    error, draws = audit.measured(shared, auditing, advance)
     rays = sum(auditing.stats.rays.values())
     run.stats.add({"audit": time.perf_counter() - start}, {"audit": rays})
     return error, draws

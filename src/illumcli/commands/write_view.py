@@ -82,7 +82,7 @@ def write_view(
         developed: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
         if audit is not None and is_held:
             held = list(developed)
-            error, draws = measured(audit, shared, run)
+            error, draws = measured(audit, shared, run, advance)
             developed = bands_with_errors(held, audit.pixel_errors(draws), develop)
         for band in developed:
             start = time.perf_counter()
@@ -94,7 +94,7 @@ def write_view(
 
         # Measure the error of reconstructed obscurance, and write it beside the layer.
         if audit is not None and not is_held:
-            error, _ = measured(audit, shared, run)
+            error, _ = measured(audit, shared, run, advance)
         if error is not None:
             for target, writer in zip(targets, writers, strict=True):
                 for name in _room(target, stated):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from illumcli.images.reader import read_image
+from illumcli.viewer import session as sessions
 from viewing import ViewPage, control, served
 
 keys = pytest.importorskip("selenium.webdriver.common.keys", reason="needs selenium").Keys
@@ -173,6 +174,28 @@ def test_a_colour_that_is_left_out_looks_it(page):
     page.drawn()
     page.wait(f"({numbers}).join() === ',,'", fields)
     assert page("document.querySelector('#reset').disabled")
+
+
+def test_the_error_of_a_reconstructed_picture_stays_beside_the_full_one(
+    open_page, own_viewer, scene, monkeypatch
+):
+    monkeypatch.setattr(sessions, "LONG", 0.0)
+    scene.write_text(scene.read_text().replace("samples: 1", "samples: 4"))
+    page = open_page(own_viewer.url)
+    assert page.fact("stage") == "full"
+    before = page.fact("error")
+    assert before.startswith("reconstructed: error ± 0.0")
+    page.set(control("materials.clay.exponent", "[type=number]"), 60)
+    page.drawn()
+    assert page.fact("error") == before.replace("reconstructed", "earlier picture")
+    page.set("#layer", "normal")
+    page.drawn()
+    assert page.fact("error") == ""
+    page.open("obscurance")
+    page.set("#layer", "beauty")
+    page.one(control("obscurance.reconstruct", "[type=checkbox]")).click()
+    page.drawn()
+    assert page.fact("error").startswith("error ± 0.0")
 
 
 def test_a_broken_file_keeps_the_picture_until_it_is_mended(open_page, own_viewer, scene):

@@ -11,7 +11,7 @@ from illumcli.images.reader import read_image
 from illumcli.progress import no_progress
 from illumcli.viewer.changes import changed, reread
 from illumcli.viewer.pictures import Renderer
-from illumcli.viewer.quality import Coarse
+from illumcli.viewer.quality import Coarse, Reconstructed, reconstructed
 
 
 class Shot:
@@ -27,8 +27,8 @@ class Shot:
         camera = self.last.camera if self.last else scene.named_cameras()[self.window.camera]
         self.window = changed(self.window, message, self.renderer.loaded, camera)
 
-    def picture(self, coarse=None, progress=no_progress):
-        self.last = self.renderer.picture(self.window, coarse, progress)
+    def picture(self, quality=None, progress=no_progress):
+        self.last = self.renderer.picture(self.window, quality, progress)
         return self.last
 
 
@@ -74,6 +74,68 @@ def test_those_of_many_samples_reconstructed_and_of_a_camera_of_its_own_size(sce
     assert shot.last.error > 0
     shot.tell(type="view", width=72, height=40)
     shot.picture(Coarse(2, 4))
+    assert_rendered(shot)
+
+
+def test_reconstructed_pictures_are_those_of_render_and_leave_the_full_ones_as_they_are(shot):
+    shot.tell(type="set", path="film.samples", value=2)
+    quality = reconstructed(shot.window.scene, "main")
+    assert quality == Reconstructed(2)
+    for message in (
+        {"type": "set", "path": "materials.clay.diffuse", "value": [0.1, 0.5, 0.3]},
+        {"type": "move", "orbit": [0.1, 0]},
+    ):
+        picture = shot.picture(quality)
+        given = (*shot.window.overrides, "obscurance.samples=2", "obscurance.reconstruct=true")
+        rendered = illum.render(shot.renderer.path, given, cache=False, threads=1).pictures["main"]
+        assert picture.layers()["beauty"].tobytes() == rendered["beauty"].tobytes()
+        assert picture.error > 0
+        assert_rendered(shot)
+        shot.tell(**message)
+
+
+@pytest.mark.parametrize(
+    ("film", "obscurance", "rays"),
+    [(1, "{samples: 64}", 4), (4, "{samples: 16}", 1), (9, "{samples: 2}", 1), (1, "{samples: 7}", None),
+     (4, "{samples: 16, reconstruct: true}", None), (4, "null", None)],
+)  # fmt: skip
+def test_few_rays_of_a_pixel_are_those_of_its_samples(scene, film, obscurance, rays):
+    shot = Shot(scene, [f"film.samples={film}", f"obscurance={obscurance}"])
+    quality = reconstructed(shot.window.scene, "main")
+    assert quality == (None if rays is None else Reconstructed(rays))
+
+
+def test_obscurance_rays_of_the_full_picture_are_known_before_it(shot):
+    shot.picture(Coarse(2, 4))
+    most = 96 * 54 * 4
+    assert shot.renderer.obscurance_rays(shot.window) == most
+    shot.picture(Reconstructed(1))
+    assert shot.renderer.obscurance_rays(shot.window) == most
+    assert 0 < shot.picture().report.rays["obscurance"] <= most
+    for message, rays in (
+        ({"type": "set", "path": "materials.clay.diffuse", "value": [0.1, 0.5, 0.3]}, 0),
+        ({"type": "set", "path": "lights.key.position", "value": [-2, 5, 3]}, 0),
+        ({"type": "view", "layer": "normal"}, 0),
+        ({"type": "view", "layer": "beauty"}, 0),
+        ({"type": "move", "orbit": [0.1, 0]}, most),
+        ({"type": "view", "layer": "normal"}, 0),
+    ):
+        shot.tell(**message)
+        shot.picture(Coarse(2, 4))
+        assert shot.renderer.obscurance_rays(shot.window) == rays, message
+
+
+def test_a_reconstructed_picture_gives_way_during_its_audit(shot):
+    shot.tell(type="set", path="film.samples", value=2)
+    calls = []
+
+    def stop(what, done, total):
+        calls.append(done)
+        if calls.count(total) == 2:  # the picture is complete
+            raise Enough
+
+    with pytest.raises(Enough):
+        shot.picture(Reconstructed(1), stop)
     assert_rendered(shot)
 
 
@@ -149,6 +211,16 @@ def test_layers_that_were_seen_cast_no_ray_again_until_the_camera_moves(shot):
     shot.tell(type="move", orbit=[0.1, 0])
     shot.picture(Coarse(2, 4))
     assert len(shot.renderer._lasting) == 5  # the coarse picture, and four full ones of before
+    shot.picture()
+    assert len(shot.renderer._lasting) == 2
+
+
+def test_reconstructed_buffers_stay_until_the_full_picture_is_there(shot):
+    shot.picture(Coarse(2, 4))
+    shot.picture(Reconstructed(1))
+    shot.tell(type="set", path="materials.clay.diffuse", value=[0.1, 0.5, 0.3])
+    shot.picture(Coarse(2, 4))
+    assert set(shot.picture(Reconstructed(1)).report.rays) <= {"audit"}
     shot.picture()
     assert len(shot.renderer._lasting) == 2
 

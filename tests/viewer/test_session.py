@@ -12,8 +12,10 @@ from threading import Event, Thread
 import pytest
 
 from illumcli.scene.load import load
+from illumcli.viewer import session as sessions
 from illumcli.viewer import watching
 from illumcli.viewer.pictures import Renderer
+from illumcli.viewer.quality import Reconstructed
 from illumcli.viewer.session import Session
 
 PATIENCE = 15
@@ -233,6 +235,80 @@ def test_a_picture_in_progress_gives_way_to_a_newer_message(opened, scene):
     answers = page.settled()
     assert types(answers).count("full") == 1
     assert answers[-1]["stamp"] == 2
+
+
+@pytest.fixture
+def _slow(monkeypatch):
+    """All obscurance rays take long."""
+    monkeypatch.setattr(sessions, "LONG", 0.0)
+
+
+FEW = "film.samples=4"  # so that one ray of each sample is few
+
+
+@pytest.mark.usefixtures("_slow")
+def test_what_takes_long_is_reconstructed_before(opened, scene):
+    page = opened(Renderer(scene, [FEW], threads=1))
+    *_, middle, full = pictures(page.settled())
+    assert (middle["stage"], full["stage"]) == ("reconstructed", "full")
+    assert (middle["width"], middle["height"]) == (96, 54)
+    assert middle["error"] > 0
+    stated = {"stage": "reconstructed", "error": middle["error"], "is_earlier": False}
+    assert middle["stated"] == full["stated"] == stated
+    assert full["error"] is None
+
+    # The obscurance of these is known.
+    page.tell(type="set", path="materials.clay.diffuse", value=[0.1, 0.2, 0.3])
+    answers = page.settled()
+    assert types(answers) == ["values", "coarse", "full"]
+    assert [picture["stated"] for picture in pictures(answers)] == [stated | {"is_earlier": True}] * 2
+    page.tell(type="set", path="lights.key.position", value=[-2, 5, 3])
+    assert "reconstructed" not in types(page.settled())
+
+    # An error is that of one layer.
+    page.tell(type="view", layer="normal")
+    answers = pictures(page.settled())
+    assert types(answers)[-2:] == ["coarse", "full"]
+    assert [picture["stated"] for picture in answers] == [None] * len(answers)
+
+    page.tell(type="move", orbit=[0.1, 0])
+    page.tell(type="view", layer="beauty")
+    last = pictures(page.settled())
+    assert types(last)[-2:] == ["reconstructed", "full"]
+    assert last[-1]["stated"] == {**stated, "error": last[-2]["error"]}
+
+
+@pytest.mark.parametrize("given", ["obscurance.samples=1", "obscurance.reconstruct=true", "obscurance=null"])
+@pytest.mark.usefixtures("_slow")
+def test_what_has_few_rays_or_is_reconstructed_already_has_no_stage_between(opened, scene, given):
+    page = opened(Renderer(scene, [FEW, given], threads=1))
+    full = page.settled()[-1]
+    page.tell(type="move", orbit=[0.1, 0])
+    assert "reconstructed" not in types(page.settled())
+    if full["error"] is not None:
+        assert full["stated"] == {"stage": "full", "error": full["error"], "is_earlier": False}
+
+
+def test_what_takes_no_time_has_no_stage_between(opened, scene):
+    assert "reconstructed" not in types(opened(Renderer(scene, [FEW], threads=1)).settled())
+
+
+@pytest.mark.usefixtures("_slow")
+def test_a_reconstructed_picture_in_progress_gives_way_too(opened, scene):
+    begun = Event()
+
+    class Slow(Renderer):
+        def picture(self, window, quality, progress):
+            while isinstance(quality, Reconstructed) and not window.edits:
+                begun.set()
+                progress("main", 0, 1)
+            return super().picture(window, quality, progress)
+
+    page = opened(Slow(scene, [FEW], threads=1))
+    assert begun.wait(PATIENCE)
+    page.tell(type="set", path="materials.clay.exponent", value=5)
+    answers = types(page.settled())
+    assert answers.count("full") == answers.count("reconstructed") == 1
 
 
 def test_a_closed_window_ends_at_once(opened, scene):

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from illumcli.records import Value
 from illumcli.schema.docs import summary
 from illumcli.schema.families import members, tag_of
 from illumcli.viewer.changes import layer_names
 from illumcli.viewer.control import Control
 from illumcli.viewer.pictures import Picture
+from illumcli.viewer.quality import stage
 from illumcli.viewer.window import Window
 
 
@@ -58,11 +60,33 @@ def _models() -> list[dict[str, str]]:
     return [{"name": tag_of(model), "title": summary(model)} for model in members("illumcli.models")]
 
 
-def picture_answer(picture: Picture, stamp: float | None) -> bytes:
-    """A picture with its header, for a frame of bytes."""
+class Stated(Value):
+    """An error that was stated of a picture."""
+
+    version: int
+    """Number of the change that the picture follows."""
+    stage: str
+    layer: str
+    error: float
+
+
+def picture_answer(picture: Picture, stamp: float | None, version: int, stated: Stated | None) -> bytes:
+    """A picture with its header, for a frame of bytes.
+
+    Parameters
+    ----------
+    version : int
+        Number of the change that it follows.
+    stated : Stated, optional
+        The error that was stated last, of this picture or one before.
+    """
+    known = None
+    if stated is not None and stated.layer == picture.window.layer:
+        is_earlier = stated.version != version
+        known = {"stage": stated.stage, "error": stated.error, "is_earlier": is_earlier}
     header = {
         "type": "picture",
-        "stage": "full" if picture.coarse is None else "coarse",
+        "stage": stage(picture.quality),
         "layer": picture.window.layer,
         "camera": picture.window.camera,
         "width": picture.size[0],
@@ -70,6 +94,7 @@ def picture_answer(picture: Picture, stamp: float | None) -> bytes:
         "seconds": picture.seconds,
         "rays": picture.rays,
         "error": picture.error,
+        "stated": known,
         "stamp": stamp,
     }
     text = json.dumps(header).encode()

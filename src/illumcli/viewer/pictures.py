@@ -11,27 +11,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.cache.recorder import Cache
 from illumcli.commands.held_images import HeldImage, HeldImages
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.report import Report
 from illumcli.commands.unit import Worker
-from illumcli.commands.work import work_of
+from illumcli.commands.work import Work, work_of
 from illumcli.images.jpeg import jpeg_bytes
 from illumcli.progress import Progress
 from illumcli.rays.viewpoints import Camera
 from illumcli.records import Record
+from illumcli.render_graph.execute import Run
+from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.needs import layers
+from illumcli.render_graph.pipeline import place_and_cull, plan_view
 from illumcli.scene.load import load, read_text
 from illumcli.scene.scene_file import SceneFile
 from illumcli.schema.sources import folders
 from illumcli.viewer.edits import overrides_of
-from illumcli.viewer.quality import Coarse, coarse_scene
+from illumcli.viewer.quality import Coarse, Quality, scene_of, stage
 from illumcli.viewer.saving import command_text, refuse_elsewhere, save
 from illumcli.viewer.watching import Watch
 from illumcli.viewer.window import Window
 
 PICKED = ("object_id", "material_id")
-"""Layers of full pictures that say what is under the mouse."""
+"""Layers of whole pictures that say what is under the mouse."""
+TRACED = ("obscurance", "raw_obscurance")
+"""Buffers whose rays are those of obscurance."""
+AUDIT_PRECISION = 0.1
+"""Relative standard error of the stated error of a reconstructed picture that the full one follows: at the
+renderer's own precision the audit takes as long as the picture."""
 BEHIND = 36
 """Grey behind pictures with an alpha channel, of 255."""
 
@@ -40,8 +49,7 @@ class Picture(Record):
     """A picture of a window."""
 
     window: Window
-    coarse: Coarse | None
-    """How coarse it is; None for the full picture."""
+    quality: Quality
     image: HeldImage
     report: Report
     seconds: float
@@ -66,6 +74,14 @@ class Picture(Record):
         """Its root mean square error, where one was measured."""
         errors = self.report.audited_error.get(self.window.camera)
         return None if errors is None else float(errors["rmse"])
+
+    @property
+    def ray_seconds(self) -> float | None:
+        """Seconds that each of its obscurance rays took; None if it cast none."""
+        report = self.report
+        names = [name for name in TRACED if report.rays.get(name)]
+        rays, seconds = (sum(part[name] for name in names) for part in (report.rays, report.seconds))
+        return seconds / rays / report.threads if rays else None
 
     def layers(self) -> dict[str, NDArray[Any]]:
         """Layer -> (H, W, C), as ``illum render`` writes them."""
@@ -121,8 +137,8 @@ class Renderer:
         self._threads = threads
         self._images = HeldImages()
         self._worker = Worker(self._images)
-        self._lasting: dict[tuple[bool, str], frozenset[str]] = {}
-        """Keys of what pictures leave in memory, by whether they are full, and by layer."""
+        self._lasting: dict[tuple[str, str], frozenset[str]] = {}
+        """Keys of what pictures leave in memory, by their stage and layer."""
         self._watch = Watch()
         self._files = 0
         """Number of the files of the scene that are watched."""
@@ -177,7 +193,7 @@ class Renderer:
         """True if files have changed since they were read."""
         return self._watch.have_changed()
 
-    def picture(self, window: Window, coarse: Coarse | None, progress: Progress) -> Picture:
+    def picture(self, window: Window, quality: Quality, progress: Progress) -> Picture:
         """The picture of a window.
 
         Raises
@@ -186,30 +202,55 @@ class Renderer:
             What ``illum render`` would say.
         """
         start = time.perf_counter()
-        scene = window.scene if coarse is None else coarse_scene(window.scene, window.camera, coarse)
-        options = RenderOptions(
-            pattern="{camera}.exr",
-            only=tuple(dict.fromkeys((window.layer, *PICKED))) if coarse is None else (window.layer,),
-            threads=self._threads,
-            force=True,
-            cache=False,
-            audit=coarse is None,
-        )
-        job = RenderJob(self.path, options, cameras=(window.camera,))
+        work = self._work(window, quality)
         files = self._worker.shared(self.path).files
-        work = replace(work_of(job, replace(window.now, scene=scene), files), images=self._images)
         if files.count != self._files:  # looking for what files name takes a while
             self._watch.add(files.paths())
             self._files = files.count
 
-        # Coarse and full pictures of several layers take turns: what each reads again stays in memory, until
-        # the camera moves.
-        memory, is_full = self._worker.shared(self.path).memory, coarse is None
+        # Pictures of several stages and layers take turns: what each reads again stays in memory, until the
+        # camera moves. A full picture has no need of a reconstructed one.
+        memory, kind = self._worker.shared(self.path).memory, stage(quality)
         memory.kept = frozenset().union(*self._lasting.values())
         self._images.images.clear()
         _, report = self._worker.run(work, progress)
-        if "hits" in report.rays:
-            self._lasting = {place: keys for place, keys in self._lasting.items() if place[0] != is_full}
-        self._lasting[is_full, window.layer] = memory.asked
+        gone = {kind} if "hits" in report.rays else set()
+        if quality is None:
+            gone.add("reconstructed")
+        self._lasting = {place: keys for place, keys in self._lasting.items() if place[0] not in gone}
+        self._lasting[kind, window.layer] = memory.asked
         (image,) = self._images.images
-        return Picture(window, coarse, image, report, time.perf_counter() - start)
+        return Picture(window, quality, image, report, time.perf_counter() - start)
+
+    def obscurance_rays(self, window: Window) -> int:
+        """The obscurance rays that the full picture of a window would cast now, at most; to be asked after
+        another picture of it, so that its meshes are in memory.
+
+        Raises
+        ------
+        IllumError
+            As of `picture`.
+        """
+        work = self._work(window, None)
+        run = Run(cache=Cache(None, self._worker.shared(self.path).memory))
+        graph = place_and_cull(work.graph, work.outputs, run)
+        plan = plan_view(graph, work.outputs, graph.views[0], run.cache, look=True)
+        rays = expected_rays(work.scene, [plan.view], plan.computed)
+        return sum(rays.get(name, 0) for name in TRACED)
+
+    def _work(self, window: Window, quality: Quality) -> Work:
+        """The work of a picture of a window."""
+        is_coarse = isinstance(quality, Coarse)
+        options = RenderOptions(
+            pattern="{camera}.exr",
+            only=(window.layer,) if is_coarse else tuple(dict.fromkeys((window.layer, *PICKED))),
+            threads=self._threads,
+            force=True,
+            cache=False,
+            audit=not is_coarse,
+            audit_precision=None if quality is None else AUDIT_PRECISION,
+        )
+        job = RenderJob(self.path, options, cameras=(window.camera,))
+        loaded = replace(window.now, scene=scene_of(window.scene, window.camera, quality))
+        work = work_of(job, loaded, self._worker.shared(self.path).files)
+        return replace(work, images=self._images)

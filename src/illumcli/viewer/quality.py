@@ -1,6 +1,8 @@
-"""Coarse pictures: of fewer pixels, samples and rays than the scene asks for."""
+"""How good pictures are: coarse ones, whole ones whose obscurance is reconstructed, and the scene's own."""
 
 from __future__ import annotations
+
+from typing import TypeAlias
 
 from illumcli.records import Value
 from illumcli.scene.spec import Scene
@@ -9,6 +11,8 @@ from illumcli.viewer.window import camera_path, with_values
 FEWEST_RAYS, FEW_RAYS = 4, 8
 """Obscurance rays of a sample of a coarse picture, while something moves and at rest; its obscurance is
 reconstructed."""
+PIXEL_RAYS = 4
+"""Obscurance rays of a pixel of a whole picture that is reconstructed, about: at least one of each sample."""
 
 
 class Coarse(Value):
@@ -20,16 +24,45 @@ class Coarse(Value):
     """Of each sample's obscurance, if the scene has any."""
 
 
-def coarse_scene(scene: Scene, camera: str, coarse: Coarse) -> Scene:
-    """The scene with one sample for each pixel of a smaller picture of a camera, and few obscurance rays."""
-    view = scene.named_cameras()[camera]
-    path = camera_path(scene, camera)
-    scene = scene if scene.cameras or scene.camera else scene.model_copy(update={"camera": view})
-    values: dict[str, object] = {"film.adaptive": False, f"{path}.samples": 1}
-    for name in ("width", "height"):
-        pixels = getattr(view, name) or getattr(scene.film, name)
-        values[f"{path}.{name}"] = max(1, round(pixels / coarse.divisor))
+class Reconstructed(Value):
+    """All pixels and samples of the scene, with obscurance that is reconstructed from few rays."""
+
+    rays: int
+    """Of each sample's obscurance."""
+
+
+Quality: TypeAlias = Coarse | Reconstructed | None
+"""How good a picture is; None: as the scene asks for it."""
+
+
+def stage(quality: Quality) -> str:
+    """What the page calls a picture of this quality."""
+    return "full" if quality is None else type(quality).__name__.lower()
+
+
+def reconstructed(scene: Scene, camera: str) -> Reconstructed | None:
+    """The quality between coarse and full; None where it would save few rays."""
+    samples = scene.named_cameras()[camera].samples or scene.film.samples
+    rays = max(1, PIXEL_RAYS // samples)
+    settings = scene.obscurance
+    if settings is None or settings.reconstruct or settings.samples < 2 * rays:
+        return None
+    return Reconstructed(rays)
+
+
+def scene_of(scene: Scene, camera: str, quality: Quality) -> Scene:
+    """The scene whose picture from a camera has this quality."""
+    if quality is None:
+        return scene
+    values: dict[str, object] = {}
+    if isinstance(quality, Coarse):  # one sample for each pixel of a smaller picture
+        view = scene.named_cameras()[camera]
+        path = camera_path(scene, camera)
+        scene = scene if scene.cameras or scene.camera else scene.model_copy(update={"camera": view})
+        values |= {"film.adaptive": False, f"{path}.samples": 1}
+        for name in ("width", "height"):
+            pixels = getattr(view, name) or getattr(scene.film, name)
+            values[f"{path}.{name}"] = max(1, round(pixels / quality.divisor))
     if scene.obscurance is not None:
-        values["obscurance.samples"] = coarse.rays
-        values["obscurance.reconstruct"] = True
+        values |= {"obscurance.samples": quality.rays, "obscurance.reconstruct": True}
     return with_values(scene, values)

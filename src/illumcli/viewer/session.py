@@ -13,14 +13,14 @@ from typing import Any
 from illumcli.errors import InputError, known
 from illumcli.layers import FIXED
 from illumcli.rays.viewpoints import Camera
-from illumcli.viewer.answers import picture_answer, pixel_answer, scene_answer
+from illumcli.viewer.answers import Stated, picture_answer, pixel_answer, scene_answer
 from illumcli.viewer.changes import changed, reread
 from illumcli.viewer.controls import controls
 from illumcli.viewer.lobes import LobePanel
 from illumcli.viewer.messages import MISUNDERSTOOD, Message, coalesced, message_of
 from illumcli.viewer.pace import Pace
 from illumcli.viewer.pictures import Picture, Renderer
-from illumcli.viewer.quality import FEW_RAYS, FEWEST_RAYS, Coarse
+from illumcli.viewer.quality import FEW_RAYS, FEWEST_RAYS, Coarse, Quality, reconstructed, stage
 from illumcli.viewer.watching import PERIOD
 from illumcli.viewer.window import Window
 
@@ -30,6 +30,8 @@ LINGER = 0.15
 """Seconds without a message after which a drag counts as resting, so that pictures become finer."""
 TRACED, SHADED = 0.12, 0.04
 """Seconds for a coarse picture whose rays are cast anew, and for one that casts few or none."""
+LONG = 1.0
+"""Seconds of obscurance rays from which on a picture of fewer, reconstructed, comes before the full one."""
 GEOMETRY = {"hits", "obscurance", "raw_obscurance"}
 """Buffers whose rays are many; those of a light that moves are few."""
 
@@ -47,7 +49,9 @@ class Session:
 
     A message that changes the picture ends whatever is being rendered, at its next batch of rays. Then come a
     coarse picture, at once, and finer ones up to the full picture. Coarse pictures are as large as the times
-    of the last ones allow; whether a change casts many rays is known from its last time.
+    of the last ones allow; whether a change casts many rays is known from its last time. Where the obscurance
+    rays of the full picture take long, by the speed of those cast last, a whole picture with reconstructed
+    obscurance comes before it, and states its error.
 
     Parameters
     ----------
@@ -68,6 +72,7 @@ class Session:
         self._window: Window | None = None
         self._version, self._complete = 0, 0
         self._picture: Picture | None = None
+        self._stated: Stated | None = None
         self._stamp: float | None = None
         self._is_dragging = False
         self._faulty: int | None = None
@@ -82,6 +87,8 @@ class Session:
         self._moving, self._resting = Pace(TRACED), Pace(SHADED)
         self._is_warm = False
         self._coarse: Coarse | None = None
+        self._ray_seconds = 0.0
+        """What an obscurance ray took last."""
         self._lobes = LobePanel()
 
     def receive(self, text: str | bytes) -> None:
@@ -128,14 +135,14 @@ class Session:
 
         if window is None:
             return
-        for coarse in self._stages(window):
-            self._show(window, coarse, go_on)
+        for quality in self._stages(window):
+            self._show(window, quality, go_on)
             if self._is_dragging:
                 self._wait(LINGER)
             go_on()
 
-    def _stages(self, window: Window) -> Iterator[Coarse | None]:
-        """How coarse the pictures are that follow a change."""
+    def _stages(self, window: Window) -> Iterator[Quality]:
+        """The qualities of the pictures that follow a change."""
         if window.layer in FIXED and FIXED[window.layer].per_pixel:  # it is made of complete pictures
             yield None
             return
@@ -147,26 +154,32 @@ class Session:
         yield moving if self._coarse is None or self._causes & self._traced else self._coarse
         if self._coarse != resting:
             yield resting
+        middle = reconstructed(window.scene, window.camera)
+        if middle and self._renderer.obscurance_rays(window) * self._ray_seconds > LONG:
+            yield middle
         yield None
 
-    def _show(self, window: Window, coarse: Coarse | None, go_on: Callable[..., None]) -> None:
+    def _show(self, window: Window, quality: Quality, go_on: Callable[..., None]) -> None:
         """Render a picture, send it, and note its time."""
         start = time.perf_counter()
-        picture = self._picture = self._renderer.picture(window, coarse, go_on)
-        if coarse is None:
+        picture = self._picture = self._renderer.picture(window, quality, go_on)
+        if quality is None:
             self._complete = self._version
-        self._send(picture_answer(picture, self._stamp))
+        if picture.error is not None:
+            self._stated = Stated(self._version, stage(quality), window.layer, picture.error)
+        self._send(picture_answer(picture, self._stamp, self._version, self._stated))
         if self._faulty is not None and self._faulty < self._version and not self._is_unread:
             self._faulty = None
             self._tell({"type": "solved"})
-        if coarse is None:
+        self._ray_seconds = picture.ray_seconds or self._ray_seconds
+        if not isinstance(quality, Coarse):
             return
         is_traced = bool(GEOMETRY & picture.report.rays.keys())
         self._traced = self._traced | self._causes if is_traced else self._traced - self._causes | {"move"}
         if self._is_warm:  # nothing was read from files
             pace = self._moving if is_traced else self._resting
-            pace.add(coarse.divisor, time.perf_counter() - start)
-        self._causes, self._coarse, self._is_warm = set(), coarse, True
+            pace.add(quality.divisor, time.perf_counter() - start)
+        self._causes, self._coarse, self._is_warm = set(), quality, True
 
     # --- messages -------------------------------------------------------------------------------------------
 

@@ -29,7 +29,7 @@ live.on("lost", () => notices.showLost(true));
 live.on("picture", (message) => picture.show(message));
 picture.onpaint = (header) => {
   status.showPicture(header, (header.stamp ?? 0) >= session.asked);
-  if (header.stage === "full") point(pointed);
+  if (header.stage !== "coarse") point(pointed);
 };
 live.on("same", ({ stamp }) => {
   if (picture.header && stamp >= session.asked) status.showPicture(picture.header, true);

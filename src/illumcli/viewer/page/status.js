@@ -19,13 +19,13 @@ export class Status {
    * Facts of the picture on the screen; its latency runs from an input to the first picture that follows it.
    * `isNewest` is false where another one is to follow the last input.
    */
-  showPicture({ stage, width, height, seconds, rays, error, stamp }, isNewest) {
+  showPicture({ stage, width, height, seconds, rays, stated, stamp }, isNewest) {
     if (isNewest) this.root.dataset.stage = stage;
     this.#put("stage", stage);
     this.#put("size", `${width} × ${height}`);
     this.#put("seconds", seconds < 1 ? `${shown(1000 * seconds, 3)} ms` : `${shown(seconds, 3)} s`);
     this.#put("rays", `${counted(rays ?? 0)} rays`);
-    this.#put("error", error === null || error === undefined ? "" : `error ± ${shown(error, 2)}`);
+    this.#showError(stage, stated);
     if (!stamp || stamp === this.#stamp) return;
     this.#stamp = stamp;
     const latency = performance.now() - stamp;
@@ -39,6 +39,14 @@ export class Status {
     this.#put("place", place);
     const channels = pixel?.layers[layer] ?? {};
     this.#put("value", Object.entries(channels).map(([name, value]) => `${name} ${shown(value)}`).join("  "));
+  }
+
+  /** The error that was stated last, and of which picture, if it is not the one on the screen. */
+  #showError(stage, stated) {
+    const isOwn = stated && !stated.is_earlier && stated.stage === stage;
+    const of = !stated || isOwn ? "" : stated.is_earlier ? "earlier picture: " : `${stated.stage}: `;
+    this.#put("error", stated ? `${of}error ± ${shown(stated.error, 2)}` : "");
+    $('[data-fact="error"]', this.root).classList.toggle("earlier", Boolean(stated?.is_earlier));
   }
 
   #put(name, text) {

@@ -4,8 +4,9 @@ One window of 640 x 360 on `illum view`, over its socket. Each change of a drag 
 the one before has come, a switch of the model after the full picture. A change is timed until the first
 picture that has it, coarse or full: wall seconds of the client, and processor seconds of all threads of the
 server, including pictures that were begun and given up. Reference: the limits that the view is built for, 60
-ms for a material and 200 ms for a camera on two free cores. With `--minutes`, random use follows for so long:
-what the server keeps in memory, and the problems that it reports.
+ms for a material and 200 ms for a camera on two free cores. Then single changes follow at the film's own
+size: wall seconds to the first picture of each stage, and the stated error. With `--minutes`, random use
+follows for so long: what the server keeps in memory, and the problems that it reports.
 
     PYTHONPATH=src python benchmarks/view.py [SCENE] [--mesh MESH] [--minutes M] [--small]
 """
@@ -31,6 +32,7 @@ from websockets.sync.client import ClientConnection, connect
 from _bench import ROOT, SMALL, header
 
 CHANGES = 4 if SMALL else 200
+RELEASED = 1 if SMALL else 5
 MODELS = ("lambert", "phong", "ward", "oren_nayar", "cook_torrance", "blinn_phong")
 SIZE = {"width": 64, "height": 36} if SMALL else {"width": 640, "height": 360}
 
@@ -133,6 +135,23 @@ def measured(window: Window, pid: int, make: Callable[[int], dict[str, Any]]) ->
     return f"{median(walls):10.0f} {max(walls):10.0f} {cpu:10.0f} {median(widths):10.0f} {median(rays):12.0f}"
 
 
+def released(window: Window, make: Callable[[int], dict[str, Any]]) -> str:
+    """Change after change, each until its full picture: median seconds to each stage, and the error."""
+    seconds: dict[str, list[float]] = {}
+    error = None
+    for number in range(RELEASED):
+        window.tell(**make(number) | {"dragging": False})
+        began, stage = time.perf_counter(), None
+        while stage != "full":
+            about = window.picture()
+            if about.get("stage") not in (None, stage):
+                stage = about["stage"]
+                seconds.setdefault(stage, []).append(time.perf_counter() - began)
+            error = about.get("error") or error
+    stages = ", ".join(f"{stage} {median(times):.2f} s" for stage, times in seconds.items())
+    return f"{stages}; error {'not stated' if error is None else f'{error:.2g}'}"
+
+
 def used(window: Window, pid: int, minutes: float, seed: int = 0) -> None:
     """Random use: values of all controls, moves, models, layers, resets; memory at ten times."""
     draw, begun = random.Random(seed), time.monotonic()
@@ -191,6 +210,14 @@ def main() -> None:
             print(f"{subject.name:12s} {columns}")
             for name, make in changes(window).items():
                 print(f"{name:12s} {measured(window, pid, make)}", flush=True)
+            width, height = (SIZE["width"], SIZE["height"]) if SMALL else window.scene["film"]
+            window.tell(type="view", width=width, height=height)
+            window.picture("full")
+            print(f"released at {width} x {height}")
+            for name, make in changes(window).items():
+                print(f"{name:12s} {released(window, make)}", flush=True)
+            window.tell(type="view", **SIZE)
+            window.picture("full")
             if said.minutes:
                 used(window, pid, said.minutes)
             for line in dict.fromkeys(window.problems):

@@ -5,12 +5,10 @@ Run it after a change to a model; a test compares the page with what this makes 
 
 from __future__ import annotations
 
-import inspect
-import sys
 from pathlib import Path
 
+import illumcli as illum
 from illumcli.commands.models import CLAIMS, page
-from illumcli.schema.families import member
 from illumcli.schema.sources import tags
 
 PAGE = Path(__file__).with_name("models.md")
@@ -84,11 +82,9 @@ def text() -> str:
 
 
 def _row(name: str) -> str:
-    Model = member(PACKAGE, name)
-    first = inspect.cleandoc(sys.modules[Model.__module__].__doc__ or "").partition("\n\n")[0]
-    what = " ".join(first.partition(": ")[2].rstrip(".").split())
-    kept = ", ".join(claim for claim in CLAIMS if getattr(Model, claim))
-    return f"| [{name}](#{name}) | {what} | {kept} |"
+    model = illum.models(name)
+    kept = ", ".join(claim for claim, holds in model.claims.items() if holds)
+    return f"| [{name}](#{name}) | {model.text.rstrip('.')} | {kept} |"
 
 
 if __name__ == "__main__":

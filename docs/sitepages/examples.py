@@ -32,7 +32,7 @@ class Examples:
     def of(self, part: Part, fact: Fact) -> str:
         """An example of a key's value; empty if there is none."""
         found = [text for text in self._found[part.name, fact.key] if len(text) <= LONGEST]
-        return min(found, key=lambda text: (f"`{text}`" in fact.default, len(text)), default="") or made(
+        return min(found, key=lambda text: (f"`{text}`" in fact.default, len(text)), default="") or example(
             part, fact
         )
 
@@ -115,7 +115,7 @@ WRITTEN = {
 """Examples of keys, by description or for all, where no scene has one and the schema does not tell one."""
 
 
-def made(part: Part, fact: Fact) -> str:
+def example(part: Part, fact: Fact) -> str:
     """A value that the key takes, where no scene has one."""
     name = f"{part.name}.{fact.key}"
     if written := WRITTEN.get(name) or WRITTEN.get(fact.key):

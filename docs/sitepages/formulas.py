@@ -16,7 +16,6 @@ GREEK = {
     "pi": "π", "Lambda": "Λ",
 }  # fmt: skip
 FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "ln", "max", "min")
-VECTORS = "nlvhrtbskwx"
 COSINE = re.compile(r"([nvrl])_([lvhsw])")
 """Names that are dot products: n_l reads "n dot l"."""
 WORDS = ("where", "or", "otherwise")

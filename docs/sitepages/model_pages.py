@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 import runpy
-import sys
 import textwrap
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import illumcli as illum
 from illumcli.commands.schema_generator import schema_of
 from illumcli.models._base import CLAIMS
 from illumcli.schema.families import members, tag_of
@@ -102,19 +101,19 @@ def overview() -> str:
 def page(cls: Any, examples: Examples) -> str:
     """The page of one model."""
     tag = tag_of(cls)
-    name, _, what, body, references = parts_of(inspect.cleandoc(sys.modules[cls.__module__].__doc__ or ""))
+    model = illum.models(tag)
     lines = [
         f"(model-{tag.replace('_', '-')})=",
-        f"# {name} (`{tag}`)",
+        f"# {model.title} (`{tag}`)",
         "",
-        f"```{{index}} ! {name.partition(',')[0]}\n```",
+        f"```{{index}} ! {model.title.partition(',')[0]}\n```",
         "",
-        f"{what[0].upper()}{what[1:]}.",
+        f"{model.text[0].upper()}{model.text[1:]}",
         "",
     ]
     for figure in figures(tag):
         lines += [f"![{figure.text}]({figure.file})", ""]
-    lines += ["## Formula", "", *map(paragraph, body)]
+    lines += ["## Formula", "", *map(paragraph, model.formula.split("\n\n")[1:])]
     lines += ["## Claims", ""]
     lines += [
         f"- {'**yes**' if getattr(cls, claim) else 'no'}, {claim}: {text}" for claim, text in CLAIMS.items()
@@ -123,7 +122,7 @@ def page(cls: Any, examples: Examples) -> str:
     own = facts.parts_below(schema, lambda title, part: title not in ELSEWHERE and part.tag not in FACETS)
     lines += ["", "## Parameters", "", *keys(facts.part_of(schema), schema.get("$defs", {}), examples)]
     lines += sections(schema.get("$defs", {}), own.values(), examples)
-    lines += ["## References", "", *(f"- {escaped(each)}" for each in references), ""]
+    lines += ["## References", "", *(f"- {escaped(each)}" for each in model.sources), ""]
     lines += [
         "## Try it",
         "",
@@ -133,24 +132,6 @@ def page(cls: Any, examples: Examples) -> str:
         "```",
     ]
     return "\n".join(lines) + "\n"
-
-
-class Doc(NamedTuple):
-    """A model's docstring, taken apart."""
-
-    name: str
-    colon: str
-    what: str
-    body: list[str]
-    references: list[str]
-
-
-def parts_of(doc: str) -> Doc:
-    """The name, the first sentence, the paragraphs and the references of a docstring."""
-    text, _, references = doc.partition("\nReferences\n----------\n")
-    first, *body = text.strip().split("\n\n")
-    name, colon, what = " ".join(first.split()).rstrip(".").partition(": ")
-    return Doc(name, colon, what, body, references.splitlines())
 
 
 def paragraph(text: str) -> str:

@@ -81,7 +81,15 @@ class LoadedScene:
     ) -> Rendering:
         """The pictures of all cameras, with overrides, at a frame; by default the scene's first.
 
-        At a frame, the texts of overrides may be formulas of `frame` and `time`, as those of `-D`.
+        Parameters
+        ----------
+        overrides : mapping or sequence of str
+            ``{"materials.clay.sigma": 0.3}``, or the texts of `-D`; at a frame these may be formulas of
+            `frame` and `time`.
+        frame : int, optional
+            Of an animation.
+        options
+            See `Options`.
 
         Raises
         ------

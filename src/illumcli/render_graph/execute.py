@@ -43,8 +43,8 @@ from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, within
 from illumcli.visibility.reconstruction import MARGIN
 
 Result = TypeVar("Result")
-STEP = 0.02
-"""Time to wait for a tile before looking whether the run shall end [seconds]."""
+POLL_INTERVAL = 0.02
+"""Between two looks whether a tile is computed or the run shall end [seconds]."""
 
 
 class Band(Record):
@@ -186,7 +186,7 @@ def bands(
 
 def _result(future: Future[Result], done: Callable[[int], None]) -> Result:
     """What a thread computed; waits in short steps, so that an interrupt or `done` can end it."""
-    while not wait([future], timeout=STEP, return_when=FIRST_COMPLETED).done:
+    while not wait([future], timeout=POLL_INTERVAL, return_when=FIRST_COMPLETED).done:
         done(0)
     return future.result()
 

@@ -54,7 +54,7 @@ class Plan(Value):
     """The nodes that run for the replicates of an adaptive picture whose error is asked for."""
     rows: tuple[int, int] | None = None
     """The rows of the picture that are computed, from the first to before the second; by default all."""
-    uncached: int = 0
+    uncached_nodes: int = 0
     """How many nodes run per tile where nothing is cached. The size of tiles depends on it, not on what is
     cached: buffers of tiles that are in memory fit the tiles of the next variant."""
 
@@ -103,7 +103,7 @@ class Plan(Value):
 
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
-        min_samples = min_tile_samples(self.uncached)
+        min_samples = min_tile_samples(self.uncached_nodes)
         if side is None:
             fitted = reconstructs(self.graph.scene)
             count = TILES_WITH_MARGINS if fitted else TILES
@@ -231,7 +231,7 @@ def schedule(
     if view.adaptive is None:
         (before,) = _ordered(graph, tile, [["hits", "object_pixels"] if around else []])
         plan = Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
-        return replace(plan, uncached=uncached)
+        return replace(plan, uncached_nodes=uncached)
 
     # An adaptive picture: first what decides, at the centres of pixels.
     own = sampled_outputs(outputs)
@@ -259,7 +259,7 @@ def schedule(
         decided_by=decided_by,
         all_samples=all_samples,
         replicates=replicates,
-        uncached=uncached,
+        uncached_nodes=uncached,
     )
 
 

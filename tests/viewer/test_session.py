@@ -16,7 +16,7 @@ from illumcli.viewer import session as sessions
 from illumcli.viewer import watching
 from illumcli.viewer.pictures import Renderer
 from illumcli.viewer.quality import Reconstructed
-from illumcli.viewer.session import Session
+from illumcli.viewer.session import MOST, Session
 
 PATIENCE = 15
 
@@ -202,6 +202,9 @@ def test_values_under_the_mouse(page):
              '{"type": "set", "path": "", "value": 1}', '{"type": "view", "width": 1e999, "height": 3}',
              '{"type": "pick", "x": -Infinity, "y": 0}',
              '{"type": "lobes", "of": ["clay"], "theta": 0, "phi": 0}',
+             '{"type": "lobes", "of": [{"model": "phong"}], "theta": 0, "phi": Infinity}',
+             '{"type": "lobes", "of": [{"model": "phong"}], "theta": NaN, "phi": 0}',
+             pytest.param(json.dumps({"type": "lobes", "of": [{}] * 99, "theta": 0, "phi": 0}), id="many"),
              '{"type": "set", "path": "ambient.color.0.1.2", "value": 5}',
              pytest.param("[" * 100000, id="deep"),
              pytest.param(f'{{"type": "view", "layer": {"[" * 900}{"]" * 900}}}', id="deep layer"),
@@ -394,6 +397,24 @@ def test_a_scene_that_is_faulty_from_the_beginning_shows_once_it_is_mended(opene
     page.tell(type="view", layer="depth")
     scene.write_text(text)
     assert types(page.until(stage="full"))[0] == "scene"
+
+
+def test_a_flood_of_messages_waits_outside(scene):
+    session = Session(Renderer(scene, threads=1), Queue().put)
+
+    def flood():
+        for _ in range(MOST + 10):
+            session.receive('{"type": "pick", "x": 0, "y": 0}')
+
+    thread = Thread(target=flood, daemon=True)
+    thread.start()
+    while len(session._pending) < MOST:
+        assert thread.is_alive()
+    thread.join(timeout=0.1)
+    assert (thread.is_alive(), len(session._pending)) == (True, MOST)
+    session.close()
+    thread.join(timeout=PATIENCE)
+    assert not thread.is_alive()
 
 
 def test_the_panel_of_brdfs_is_answered_with_its_own_stamp(page):

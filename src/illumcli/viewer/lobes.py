@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -70,13 +71,26 @@ class LobePanel:
         self._kept: dict[str, Specimen] = {}
 
     def answer(self, loaded: SceneFile, message: Mapping[str, Any]) -> dict[str, Any]:
-        """The data of the models that the message names; the reason in place of one that cannot be shown."""
+        """The data of the models that the message names; the reason in place of one that cannot be shown.
+
+        Raises
+        ------
+        InputError
+            Too many models.
+        Exception
+            One of `messages.MISUNDERSTOOD`.
+        """
+        theta, phi = float(message["theta"]), float(message["phi"])
+        if not (math.isfinite(theta) and math.isfinite(phi)):
+            raise ValueError("theta and phi are angles in degrees")
         lit = Lit(
-            float(np.clip(message["theta"], 0, 89.9)),
-            float(message["phi"]),
+            min(max(theta, 0.0), 89.9),
+            phi,
             bool(message.get("log")),
             bool(message.get("cosine")),
         )
+        if len(message["of"]) > KEPT:
+            raise InputError(f"{len(message['of'])} BRDFs are too many; choose {KEPT} at most")
         shown = [self._shown(loaded, of, lit) for of in message["of"]]
         top = _top([curves for _, curves in shown if curves is not None], lit.log)
         theta, phi = np.radians([lit.theta, lit.phi])

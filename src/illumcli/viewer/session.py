@@ -34,8 +34,8 @@ LONG = 1.0
 """Seconds of obscurance rays from which on a picture of fewer, reconstructed, comes before the full one."""
 GEOMETRY = {"hits", "obscurance", "raw_obscurance"}
 """Buffers whose rays are many; those of a light that moves are few."""
-
-
+MOST = 256
+"""Messages that wait, at most; a page that sends more has to wait itself."""
 QUESTIONS = ("pick", "lobes", "save", "command")
 """Messages that do not change what is shown."""
 
@@ -92,17 +92,18 @@ class Session:
         self._lobes = LobePanel()
 
     def receive(self, text: str | bytes) -> None:
-        """Take a message of the page."""
+        """Take a message of the page; wait first while `MOST` are not read."""
         message = message_of(text)
         with self._news:
+            self._news.wait_for(lambda: len(self._pending) < MOST or self._is_closed)
             self._pending.append(message)
-            self._news.notify()
+            self._news.notify_all()
 
     def close(self) -> None:
         """End `run`."""
         with self._news:
             self._is_closed = True
-            self._news.notify()
+            self._news.notify_all()
 
     def run(self) -> None:
         """Answer messages and render until the session is closed."""
@@ -194,6 +195,7 @@ class Session:
             self._read()
         with self._news:
             messages, self._pending = self._pending, []
+            self._news.notify_all()
         if not messages or self._window is None:
             return
         before, is_told, is_change = self._version, True, False

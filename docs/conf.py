@@ -8,6 +8,7 @@ root_doc = "index"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "sphinx_design"]
 nb_execution_mode = "off"
 autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
 autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 default_role = "literal"
 myst_enable_extensions = ["colon_fence"]

@@ -102,10 +102,10 @@ def bake(
 
     Parameters
     ----------
-    mesh : path, mapping, Scene or mesh
+    mesh : path-like, mapping, Scene or mesh
         A mesh or scene file, a scene as `load` takes it, or a mesh: a mapping with arrays `vertices` and
         `faces`, or an object that has both, such as trimesh's.
-    outputs : path or sequence of path
+    outputs : path-like or sequence of path-like
         Files as `-o` of ``illum ao-bake`` names them.
     overrides : mapping or sequence of str
         Of a scene, as `render` takes them.

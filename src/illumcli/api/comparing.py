@@ -78,7 +78,7 @@ def compare(
 
     Parameters
     ----------
-    reference, test : path, array, Picture or Rendering
+    reference, test : path-like, array, Picture or Rendering
         Arrays are (H, W) or (H, W, C), floats of linear light or uint8 of display values. Of a rendering, its
         first picture.
     layers : sequence of str or str

@@ -54,7 +54,7 @@ class LoadedScene:
 
     Parameters
     ----------
-    scene : path, mapping, Scene or mesh
+    scene : path-like, mapping, Scene or mesh
         A scene or mesh file; or the keys of a scene, whose paths start in the current folder. A mesh, here
         or in a scene, is a mapping with arrays `vertices` and `faces`, or an object that has both, such as
         trimesh's.
@@ -164,7 +164,7 @@ def load(scene: AnyScene) -> LoadedScene:
 
     Parameters
     ----------
-    scene : path, mapping, Scene or mesh
+    scene : path-like, mapping, Scene or mesh
         As `LoadedScene` takes it.
 
     Raises
@@ -202,7 +202,7 @@ def render(
 
     Parameters
     ----------
-    scene : path, mapping, Scene or mesh
+    scene : path-like, mapping, Scene or mesh
         As `load` takes it.
     overrides : mapping or sequence of str
         ``{"materials.clay.sigma": 0.3}``, or the texts of `-D`.

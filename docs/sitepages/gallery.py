@@ -140,7 +140,7 @@ def _entry(scene: Path, folder: Path, draft: bool) -> Entry:
     frame = keys["frames"]["last"] // 2 if "frames" in keys else 0
     frames = ["--frames", f"{frame}:{frame}"] if "frames" in keys else []
     small = ["-D", DRAFT] if draft else []
-    report = _render(scene, folder / "{scene}.{camera}.{layer}.png", [*frames, *small])
+    report = _render(scene, folder, "", [*frames, *small])
     return Entry(
         title=title,
         idea=idea[:1].upper() + idea[1:],
@@ -158,14 +158,14 @@ def _error(scene: Path, folder: Path, frames: Sequence[str], film: dict[str, Any
     sizes = {"width": 1280, "height": 720}
     small = [f"film.{key}={max(film.get(key, usual) // 4, 1)}" for key, usual in sizes.items()]
     words = [*frames, "--only", "beauty", "--only", "error", "-D", small[0], "-D", small[1]]
-    report = _render(scene, folder / "{scene}.{camera}.{layer}.small.png", words)
+    report = _render(scene, folder, ".small", words)
     return max((error["rms"] for error in report["standard_error"].values()), default=None)
 
 
-def _render(scene: Path, pattern: Path, words: Sequence[str]) -> dict[str, Any]:
-    """The report of a render, which is the old one where pictures are kept."""
-    kind = ".small" if "small" in pattern.suffixes[-2] else ""
-    report = pattern.with_name(f"{scene.stem}{kind}.report.json")
+def _render(scene: Path, folder: Path, kind: str, words: Sequence[str]) -> dict[str, Any]:
+    """The report of a render, which is the old one where pictures are kept; `kind` is part of file names."""
+    pattern = folder / f"{{scene}}.{{camera}}.{{layer}}{kind}.png"
+    report = folder / f"{scene.stem}{kind}.report.json"
     command = ["render", str(scene), "-o", str(pattern), "--report", str(report), *words]
     try:
         run(command)

@@ -379,6 +379,8 @@ def test_meshes_textures_and_extended_scenes_are_watched(opened, scene, tmp_path
     ):
         path.write_text(path.read_text().replace(old, new))
         assert types(page.until(stage="full"))[0] == "scene", path
+    page.tell(type="set", path="materials.clay.exponent", value=5)
+    page.settled()
     (tmp_path / "mesh.obj").write_text("v 0 0\n")
     (problem,) = (answer for answer in page.until(type="problem") if answer["type"] == "problem")
     assert "mesh.obj" in problem["lines"][0]
@@ -415,6 +417,26 @@ def test_a_flood_of_messages_waits_outside(scene):
     session.close()
     thread.join(timeout=PATIENCE)
     assert not thread.is_alive()
+
+
+def test_a_machine_that_has_no_memory_to_read_the_scene_may_have_it_later(opened, scene, monkeypatch):
+    monkeypatch.setattr(watching, "PERIOD", 0.02)
+
+    class Tight(Renderer):
+        def read(self):
+            loaded = super().read()
+            if "version: 1 " in scene.read_text():
+                raise MemoryError
+            return loaded
+
+    page = opened(Tight(scene, threads=1))
+    page.settled()
+    text = scene.read_text()
+    scene.write_text(text.replace("version: 1", "version: 1 "))
+    (problem,) = page.until(type="problem")
+    assert (problem["from"], problem["lines"][0][:13]) == ("file", "out of memory")
+    scene.write_text(text)
+    assert "solved" in types(page.until(stage="full"))
 
 
 def test_the_panel_of_brdfs_is_answered_with_its_own_stamp(page):

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Condition
 from typing import Any
 
-from illumcli.errors import InputError, known
+from illumcli.errors import known
 from illumcli.layers import FIXED
 from illumcli.rays.viewpoints import Camera
 from illumcli.viewer.answers import Stated, picture_answer, pixel_answer, scene_answer
@@ -79,6 +79,8 @@ class Session:
         """The change whose problem the page shows."""
         self._is_unread = False
         """True if the file of the scene is faulty."""
+        self._version_read = 0
+        """The change that was made last by files."""
 
         # What the page knows of the controls, and what the pictures of changes cost.
         self._told: dict[str, Any] = {}
@@ -117,7 +119,8 @@ class Session:
                 if (fault := known(error)) is None:
                     raise
                 is_edited = self._window is not None and bool(self._window.edits)
-                self._tell_problem(str(fault).splitlines(), "edit" if is_edited else "file")
+                is_new = self._version == self._version_read
+                self._tell_problem(str(fault).splitlines(), "edit" if is_edited and not is_new else "file")
             self._complete = self._version
             while self._complete == self._version and not self._is_closed:
                 self._wait(PERIOD)
@@ -263,13 +266,16 @@ class Session:
         left out."""
         try:
             original = self._renderer.read()
-        except InputError as error:
-            self._tell_problem(error.problems, "file")
+        except Exception as error:
+            if (fault := known(error)) is None:
+                raise
+            self._tell_problem(str(fault).splitlines(), "file")
             self._is_unread = True
             return
         self._is_unread = False
         self._window, problems = reread(self._window, original, self._renderer.loaded)
         self._version += 1
+        self._version_read = self._version
         self._is_warm = False
         self._told.clear()
         self._tell_controls(self._window)

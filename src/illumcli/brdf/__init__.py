@@ -177,7 +177,15 @@ def _refuse_table(path: Path) -> None:
 def write_merl_of(
     models: Mapping[str, Counted], path: Path, force: bool = False
 ) -> tuple[list[Path], list[str]]:
-    """Write one model as a MERL table, as `write_merl`."""
+    """Write one model as a MERL table, as `write_merl`.
+
+    Raises
+    ------
+    InputError
+        Not one model, or one with a grain.
+    OutputError
+        A different file exists and `force` is not given.
+    """
     from illumcli.brdf.merl_table import merl_table
     from illumcli.measured_files import merl
 
@@ -197,7 +205,13 @@ def write_merl_of(
 
 
 def described(names: Sequence[str], overrides: Sequence[str] = ()) -> dict[str, IlluminationModel]:
-    """The models by name, with their parameters; models named twice get the number of their place."""
+    """The models by name, with their parameters; models named twice get the number of their place.
+
+    Raises
+    ------
+    InputError
+        Models or parameters do not exist, or values are out of range; all problems at once.
+    """
     # Parse the overrides; all problems are raised at once.
     problems: list[str] = []
     unreadable: list[Problem] = []

@@ -35,7 +35,7 @@ class BakeKeywords(TypedDict, total=False):
     sampler: str
     """`spiral`, by default, `owen` or `random`."""
     faces: str
-    """Back faces occlude, `count`, by default; are transparent, `ignore`; or end the ray, `one-sided`."""
+    """Back faces occlude, `count`, by default; are transparent, `ignore`; or end the ray, `one_sided`."""
     method: str
     """`vertex`, by default, or `fit`, by least squares to samples of the surface."""
     occluders: Sequence[str] | str

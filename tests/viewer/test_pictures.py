@@ -111,7 +111,10 @@ def test_obscurance_rays_of_the_full_picture_are_known_before_it(shot):
     assert shot.renderer.obscurance_rays(shot.window) == most
     shot.picture(Reconstructed(1))
     assert shot.renderer.obscurance_rays(shot.window) == most
-    assert 0 < shot.picture().report.rays["obscurance"] <= most
+    full = shot.picture()
+    assert 0 < full.report.rays["obscurance"] <= most
+    assert 0 < full.ray_seconds * full.report.rays["obscurance"] <= full.seconds
+    assert shot.picture().ray_seconds is None
     for message, rays in (
         ({"type": "set", "path": "materials.clay.diffuse", "value": [0.1, 0.5, 0.3]}, 0),
         ({"type": "set", "path": "lights.key.position", "value": [-2, 5, 3]}, 0),

@@ -292,6 +292,17 @@ def test_what_has_few_rays_or_is_reconstructed_already_has_no_stage_between(open
         assert full["stated"] == {"stage": "full", "error": full["error"], "is_earlier": False}
 
 
+def test_long_is_many_rays_at_the_speed_of_the_last_ones(opened, scene):
+    class Many(Renderer):
+        def obscurance_rays(self, window):
+            return 10**9 if "materials.clay.exponent" in window.edits else 1
+
+    page = opened(Many(scene, [FEW], threads=1))
+    assert "reconstructed" not in types(page.settled())
+    page.tell(type="set", path="materials.clay.exponent", value=5)
+    assert "reconstructed" in types(page.settled())
+
+
 def test_what_takes_no_time_has_no_stage_between(opened, scene):
     assert "reconstructed" not in types(opened(Renderer(scene, [FEW], threads=1)).settled())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import http.client
 import json
 import os
@@ -11,6 +12,7 @@ import struct
 import subprocess
 import sys
 import threading
+import weakref
 from urllib.parse import urlsplit
 
 import pytest
@@ -22,7 +24,9 @@ from websockets.sync.client import connect
 
 from illumcli.errors import IllumError, InputError
 from illumcli.viewer import server
+from illumcli.viewer.pictures import Renderer
 from illumcli.viewer.server import Viewer
+from illumcli.viewer.session import Session
 from viewing import running
 
 
@@ -143,6 +147,24 @@ def test_a_window_shows_and_ends_with_its_socket(viewer):
     for each in remaining:
         each.join(timeout=60)
     assert not sessions()
+
+
+def test_the_memory_of_a_closed_window_is_free(scene):
+    renderers = []
+
+    def session(send):
+        renderer = Renderer(scene, threads=1)
+        renderers.append(weakref.ref(renderer))
+        return Session(renderer, send)
+
+    gc.disable()
+    try:
+        with running(Viewer(session)) as viewer, window(viewer.url) as socket:
+            until_full(socket)
+            assert renderers[0]() is not None
+        assert renderers[0]() is None
+    finally:
+        gc.enable()
 
 
 def test_a_message_that_is_too_large_ends_the_window_alone(viewer):

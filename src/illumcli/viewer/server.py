@@ -11,6 +11,7 @@ import logging
 import secrets
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
@@ -117,10 +118,8 @@ class Viewer:
         from websockets.exceptions import ConnectionClosed
 
         def send(message: str | bytes) -> None:
-            try:
+            with suppress(ConnectionClosed):  # then the session is closed below
                 connection.send(message)
-            except ConnectionClosed:
-                session.close()
 
         def render() -> None:
             try:

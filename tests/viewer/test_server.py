@@ -71,7 +71,10 @@ def test_the_page_and_its_files_are_served_safely(viewer):
     assert status == 200
     assert body == (server.PAGE / "index.html").read_bytes()
     assert headers["Content-Type"] == "text/html; charset=utf-8"
-    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    policy = headers["Content-Security-Policy"].split("; ")
+    assert {"default-src 'self'", "frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'"} <= {
+        *policy
+    }
     assert headers["Referrer-Policy"] == "no-referrer"
     assert headers["Cache-Control"] == "no-store"
     for path in server.PAGE.iterdir():

@@ -10,9 +10,7 @@ from illumcli.viewer.cameras import MOTIONS
 
 Message: TypeAlias = Mapping[str, Any]
 
-MISUNDERSTOOD = (
-    LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError,
-)  # fmt: skip
+MISUNDERSTOOD = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, RecursionError)
 """What a message raises that lacks something, or has something of another type, size or depth."""
 
 

@@ -120,6 +120,8 @@ class Renderer:
         A scene or mesh file.
     given : sequence of str
         Overrides as `-D` gives them, before all edits.
+    threads : int or None
+        By default one for each core.
     saves_anywhere : bool
         False to save in the scene's folder or below alone.
     """

@@ -66,7 +66,8 @@ def inserted(text: str, diff: str) -> str:
 def copy(tmp_path_factory) -> Path:
     """A copy of the package and the shared tests, with all examples in it."""
     folder = tmp_path_factory.mktemp("contributing")
-    for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/visibility/test_samplers.py",
+    for name in ("src/illumcli", "tests/models", "tests/conftest.py", "tests/chromium.py",
+                 "tests/visibility/test_samplers.py",
                  "tests/geometry/shapes/test_all_shapes.py",
                  "tests/test_layers.py", "tests/render_graph/test_polygons.py", "tests/planned.py",
                  "tests/quadrature.py", "tests/rgl_files.py", "scenes", "pyproject.toml"):  # fmt: skip

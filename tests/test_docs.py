@@ -44,9 +44,15 @@ def place_files(page: Path, folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder as a reader of the pages has it: the scenes, a mesh and a measurement of their own."""
-    path = tmp_path_factory.mktemp("reader")
+def cache(tmp_path_factory):
+    """The folder of the cache, for all pages."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder as a reader of a page has it: the scenes, a mesh and a measurement of their own."""
+    path = tmp_path / "reader"
     shutil.copytree(ROOT / "scenes", path / "scenes")
     (path / "bunny.obj").write_text(TRIANGLE)
     (path / "paint_rgb.bsdf").write_bytes(rgl_files.tensor_file(rgl_files.noise()))
@@ -69,10 +75,10 @@ def view_answers(line, folder, environment):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_command_runs(page, folder):
+def test_every_command_runs(page, folder, cache):
     place_files(page, folder)
     for line in commands(page):
-        environment = {**os.environ, "ILLUM_CACHE": str(folder / "cache")}
+        environment = {**os.environ, "ILLUM_CACHE": str(cache)}
         if line.startswith("illum view "):
             view_answers(line, folder, environment)
             continue

@@ -282,6 +282,7 @@ def shape(random: Random) -> dict[str, Any]:
             {"shape": "cone", "segments": count, "rings": 2, "caps": random.random() < 0.7},
             {"shape": "torus", "segments": count, "sides": random.randint(4, 8)},
             {"shape": "teapot", "resolution": 2},
+            {"shape": "text", "text": "iA", "depth": random.choice([0, 0.3])},
             {"shape": "parametric", "x": "u - 1", "y": "0.3 * sin(3 * u) * v", "z": "1 - v", "u": [0, 2],
              "v": [0, 2], "resolution": [random.randint(2, 6), 3], "flip": random.random() < 0.5},
             {"shape": "implicit", "f": "x**2 + y**2 + z**2 - 0.7 + 0.2 * sin(4 * x)", "resolution": 6},

@@ -41,6 +41,13 @@ def test_it_recovers_when_the_machine_is_free_again():
     assert after(pace, PIXELS, lambda pixels: 1e-7 * pixels)[-1] == 1
 
 
+def test_a_little_too_slow_is_no_reason_to_change():
+    pace = Pace(0.1)
+    before = after(pace, PIXELS, lambda pixels: 0.09)[-1]
+    assert set(after(pace, PIXELS, lambda pixels: 0.12)) == {before}
+    assert after(pace, PIXELS, lambda pixels: 0.2)[-1] > before
+
+
 def test_small_pictures_are_whole():
     assert Pace(0.1).divisor(96 * 54) == 1
 

@@ -45,6 +45,15 @@ def saved(path, *overrides, name="new.yaml"):
     return path.parent / name
 
 
+def test_a_link_to_nothing_is_followed_only_if_asked(scene):
+    link = scene.with_name("link.yaml")
+    link.symlink_to(scene.with_name("new.yaml"))
+    with pytest.raises(OutputError, match="link to nothing; replace it, or give another name"):
+        saved(scene, name="link.yaml")
+    save(link, scene, (), read_text(scene), replace=True)
+    assert load(scene.with_name("new.yaml")).scene == load(scene).scene
+
+
 def test_only_what_was_changed_is_in_it(scene):
     new = saved(scene, "materials.clay.exponent=80", "film.samples=9")
     assert new.read_text() == (

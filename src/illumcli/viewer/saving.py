@@ -10,7 +10,7 @@ from typing import Any
 
 from illumcli.errors import InputError, OutputError
 from illumcli.files.atomic import os_errors_as_output_errors, write_text
-from illumcli.files.outputs import refuse_empty_link, refuse_unwritable
+from illumcli.files.outputs import refuse_unwritable
 from illumcli.mesh_files import is_mesh_file
 from illumcli.scene.access import file_problems, readable_folders
 from illumcli.scene.extend import SceneReader, kind_of, merged, moved
@@ -67,7 +67,8 @@ def save(target: Path, path: Path, overrides: Sequence[str], text: SceneText, re
     content = saved_text(target, path, overrides, text)
     with os_errors_as_output_errors(str(target)):
         if not replace:
-            refuse_empty_link(target)
+            if target.is_symlink() and not target.exists():
+                raise OutputError(f"{target}: is a link to nothing; replace it, or give another name")
             if target.is_file() and target.read_bytes() != content.encode():
                 raise OutputError(f"{target}: a different file is there; replace it, or give another name")
         refuse_unwritable(target)

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import weakref
+from contextlib import contextmanager
 from urllib.parse import urlsplit
 
 import pytest
@@ -22,6 +23,7 @@ pytest.importorskip("websockets", reason="needs websockets")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from illumcli.cli.view import view
 from illumcli.errors import IllumError, InputError
 from illumcli.viewer import server
 from illumcli.viewer.pictures import Renderer
@@ -209,9 +211,17 @@ def test_an_address_of_ipv6(scene):
         assert get(viewer.url)[0] == 200
 
 
+@contextmanager
 def illum(*words, **options):
+    """A command that runs; it is killed if the test fails meanwhile."""
     command = [sys.executable, "-m", "illumcli", "view", *map(str, words), "--no-browser"]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    ) as run:
+        try:
+            yield run
+        finally:
+            run.kill()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -233,20 +243,17 @@ def test_a_signal_ends_the_command_in_the_middle_of_a_picture(scene, tmp_path, n
     assert list(folder.iterdir()) == []
 
 
-def test_a_page_for_other_machines_saves_beside_the_scene_alone(scene, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing
-        except OSError:
-            pytest.skip("needs a network card")
-        host = probe.getsockname()[0]
-    with illum(scene, "--host", host) as run:
-        with window(run.stdout.readline().strip()) as socket_of_page:
-            until_full(socket_of_page)
-            socket_of_page.send(json.dumps({"type": "save", "file": str(tmp_path.parent / "new.yaml")}))
-            problem = json.loads(socket_of_page.recv(timeout=60))
-        run.terminate()
-    assert f"saves in {tmp_path} or below alone" in problem["lines"][0]
+def test_a_page_for_other_machines_saves_beside_the_scene_alone(scene, tmp_path, monkeypatch):
+    windows = []
+
+    def run(viewer):
+        viewer.is_local = False
+        windows.append(viewer._session(print))
+
+    monkeypatch.setattr(Viewer, "run", run)
+    view.main([str(scene), "--no-browser", "-q"], standalone_mode=False)
+    with pytest.raises(InputError, match=f"saves in {tmp_path} or below alone"):
+        windows[0]._renderer.save(tmp_path.parent / "new.yaml", ())
 
 
 def test_a_faulty_scene_and_a_missing_package_are_told_in_a_line(scene, tmp_path):

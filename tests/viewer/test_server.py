@@ -249,6 +249,7 @@ def test_a_page_for_other_machines_saves_beside_the_scene_alone(scene, tmp_path,
     def run(viewer):
         viewer.is_local = False
         windows.append(viewer._session(print))
+        viewer.stop()
 
     monkeypatch.setattr(Viewer, "run", run)
     view.main([str(scene), "--no-browser", "-q"], standalone_mode=False)

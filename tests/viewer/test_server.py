@@ -246,12 +246,17 @@ def test_a_signal_ends_the_command_in_the_middle_of_a_picture(scene, tmp_path, n
 def test_a_page_for_other_machines_saves_beside_the_scene_alone(scene, tmp_path, monkeypatch):
     windows = []
 
-    def run(viewer):
-        viewer.is_local = False
-        windows.append(viewer._session(print))
-        viewer.stop()
+    class Far:
+        is_local = False
+        url = "http://illum.example/token/"
 
-    monkeypatch.setattr(Viewer, "run", run)
+        def __init__(self, session, host, port):
+            self.session = session
+
+        def run(self):
+            windows.append(self.session(print))
+
+    monkeypatch.setattr(server, "Viewer", Far)
     view.main([str(scene), "--no-browser", "-q"], standalone_mode=False)
     with pytest.raises(InputError, match=f"saves in {tmp_path} or below alone"):
         windows[0]._renderer.save(tmp_path.parent / "new.yaml", ())

@@ -171,7 +171,8 @@ def test_a_render_that_is_stopped_can_be_repeated(at):
 
 
 INTERRUPTED = """
-import illumcli, os, tempfile
+import illumcli, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore it
 loaded = illumcli.load("s.yaml")
 size = {"film.width": 500, "film.height": 500, "obscurance.samples": 512}
 try:

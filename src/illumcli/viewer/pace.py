@@ -7,8 +7,6 @@ from statistics import median
 
 DIVISORS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """What width and height are divided by; few, so that pictures of one size follow each other."""
-UNKNOWN = 1 << 16
-"""Pixels of the first picture, at most, as long as none was measured."""
 FEWEST = 1 << 14
 """Pixels of a picture, at least, however long it takes: smaller ones show nothing."""
 SLACK = 1.5
@@ -24,10 +22,13 @@ class Pace:
     ----------
     seconds : float
         What a picture may take.
+    most : int
+        Pixels of a picture, at most, as long as none was measured.
     """
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, most: int) -> None:
         self._seconds = seconds
+        self._most = most
         self._divisor: float | None = None
         self._times: deque[float] = deque(maxlen=MEASURED)
 
@@ -42,7 +43,7 @@ class Pace:
         allowed = [each for each in DIVISORS if pixels / each**2 >= FEWEST] or [DIVISORS[0]]
         before = self._divisor
         if before is None:
-            self._divisor = next((each for each in allowed if pixels / each**2 <= UNKNOWN), allowed[-1])
+            self._divisor = next((each for each in allowed if pixels / each**2 <= self._most), allowed[-1])
         elif self._times:
             time = median(self._times)
             fitting = [each for each in allowed if time * (before / each) ** 2 <= self._seconds]

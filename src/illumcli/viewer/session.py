@@ -86,7 +86,7 @@ class Session:
         self._told: dict[str, Any] = {}
         self._causes: set[str] = set()
         self._traced = {"move"}
-        self._moving, self._resting = Pace(TRACED), Pace(SHADED)
+        self._moving, self._resting = Pace(TRACED, 1 << 16), Pace(SHADED, 1 << 18)
         self._is_warm = False
         self._coarse: Coarse | None = None
         self._ray_seconds = 0.0

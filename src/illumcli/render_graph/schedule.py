@@ -54,9 +54,6 @@ class Plan(Value):
     """The nodes that run for the replicates of an adaptive picture whose error is asked for."""
     rows: tuple[int, int] | None = None
     """The rows of the picture that are computed, from the first to before the second; by default all."""
-    uncached_nodes: int = 0
-    """How many nodes run per tile where nothing is cached. The size of tiles depends on it, not on what is
-    cached: buffers of tiles that are in memory fit the tiles of the next variant."""
 
     @property
     def buffers(self) -> set[str]:
@@ -100,6 +97,15 @@ class Plan(Value):
     def samples_per_pixel(self) -> int:
         """About how many samples a pixel has; of an adaptive picture a quarter of all, which is many."""
         return self.view.samples if self.all_samples is None else max(1, self.view.stands_for // 4)
+
+    @cached_property
+    def uncached_nodes(self) -> int:
+        """How many nodes run per tile where nothing is cached. The size of tiles depends on it, not on what
+        is cached: buffers of tiles that are in memory fit the tiles of the next variant."""
+        if not any(node.inputs for node in self.graph.loaders.values()):
+            return len(self.tile)
+        needed = needed_buffers(self.graph, self.outputs, [self.view])
+        return len(once_and_tile(self.graph.without_loaders().topological_order(needed))[1])
 
     def tile_side(self, view: View, side: int | None = None) -> int:
         """Pixels along a tile's side: `side` or the default; whole blocks if a layer has errors by block."""
@@ -224,14 +230,11 @@ def schedule(
     all_samples : Plan, optional
         For the pixels of an adaptive picture that need all samples; by default from the same graph.
     """
-    needed = needed_buffers(graph, outputs, [view])
-    once, tile = once_and_tile(graph.topological_order(needed))
-    uncached = len(once_and_tile(graph.without_loaders().topological_order(needed))[1])
+    once, tile = once_and_tile(graph.topological_order(needed_buffers(graph, outputs, [view])))
     around = any(SURROUNDINGS in node.inputs.values() for node in tile)
     if view.adaptive is None:
         (before,) = _ordered(graph, tile, [["hits", "object_pixels"] if around else []])
-        plan = Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
-        return replace(plan, uncached_nodes=uncached)
+        return Plan(graph, tuple(outputs), view, tuple(once), tuple(tile), lookup, before)
 
     # An adaptive picture: first what decides, at the centres of pixels.
     own = sampled_outputs(outputs)
@@ -254,12 +257,7 @@ def schedule(
         known |= {node.output for node in once}
     plan = Plan(graph, tuple(outputs), view.centres(), tuple(once), tuple(tile), lookup, before)
     return replace(
-        plan,
-        edges_by=edges_by,
-        decided_by=decided_by,
-        all_samples=all_samples,
-        replicates=replicates,
-        uncached_nodes=uncached,
+        plan, edges_by=edges_by, decided_by=decided_by, all_samples=all_samples, replicates=replicates
     )
 
 

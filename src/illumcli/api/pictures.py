@@ -18,7 +18,6 @@ from illumcli.commands.image_store import ImageFiles
 from illumcli.commands.targets import image_set
 from illumcli.film.develop import Target
 from illumcli.images.format import RESERVED
-from illumcli.layers import Layer
 from illumcli.records import Record
 from illumcli.schema.messages import suggestion
 
@@ -86,15 +85,9 @@ class Picture(Mapping[str, NDArray[Any]]):
 
         Light is sRGB with the scene's exposure, data are scaled to 0..255; an alpha comes last.
         """
-        image = self._image
-        chosen = image.target.layers[0].name if layer is None else layer
+        chosen = self._image.target.layers[0].name if layer is None else layer
         self[chosen]  # the error of another name
-        target = self._png(next(each for each in image.target.layers if each.name == chosen))
-        pixels: NDArray[np.uint8] = image.work.development.encoded(target, self._layers, (0, 0), image.space)
-        return pixels
-
-    def _png(self, layer: Layer, path: Path = Path("picture.png")) -> Target:
-        return replace(self._image.target, path=path, layers=(layer,))
+        return self._image.display(chosen, self._layers)
 
     def write(self, target: Target) -> None:
         """Write the file of an image set with its pixels."""
@@ -108,9 +101,9 @@ class Picture(Mapping[str, NDArray[Any]]):
 
     def _repr_png_(self) -> bytes:
         with tempfile.TemporaryDirectory() as folder:
-            target = self._png(self._image.target.layers[0], Path(folder) / "picture.png")
-            self.write(target)
-            return target.path.read_bytes()
+            path, target = Path(folder) / "picture.png", self._image.target
+            self.write(replace(target, path=path, layers=target.layers[:1]))
+            return path.read_bytes()
 
 
 class Rendering(Record, Mapping[str, NDArray[Any]]):

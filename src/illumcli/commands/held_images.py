@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -45,6 +46,13 @@ class HeldImage(Record):
             layer.name: self._layer(layer, [numbers[name] for name in self.work.development.names(layer)])
             for layer in self.target.layers
         }
+
+    def display(self, layer: str, layers: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
+        """(H, W, C) one of its `layers` in 8 bits, as a PNG of it holds them."""
+        (chosen,) = (each for each in self.target.layers if each.name == layer)
+        target = replace(self.target, path=Path("picture.png"), layers=(chosen,))
+        pixels: NDArray[np.uint8] = self.work.development.encoded(target, layers, (0, 0), self.space)
+        return pixels
 
     def _layer(self, layer: Layer, numbers: list[int]) -> NDArray[Any]:
         values = np.ascontiguousarray(self.pixels[..., numbers])

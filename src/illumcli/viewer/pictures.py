@@ -94,10 +94,7 @@ class Picture(Record):
 
     def pixels(self) -> NDArray[np.uint8]:
         """(H, W, 1 or 3), as a PNG shows the layer, in front of grey."""
-        image = self.image
-        (layer,) = (each for each in image.target.layers if each.name == self.window.layer)
-        target = replace(image.target, path=Path("picture.png"), layers=(layer,))
-        pixels = image.work.development.encoded(target, self.layers(), (0, 0), image.space)
+        pixels = self.image.display(self.window.layer, self.layers())
         if pixels.shape[-1] not in (2, 4):
             return pixels
         colors, alpha = pixels[..., :-1], pixels[..., -1:]

@@ -28,11 +28,9 @@ obscurance is reconstructed, where a sample costs much more than its rays."""
 
 def views(scene: Scene) -> list[View]:
     """The scene's cameras with their films."""
-    film = scene.film
     cameras = []
     for name, camera in scene.named_cameras().items():
-        count = camera.samples or film.samples
-        width, height = camera.width or film.width, camera.height or film.height
+        width, height, count = scene.film_of(name)
         cameras.append(View(name, camera, width, height, count, adaptive(scene, count)))
     return cameras
 

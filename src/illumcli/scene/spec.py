@@ -456,6 +456,11 @@ class Scene(Description):
         """The cameras by name, at least one."""
         return self.cameras or {"main": self.camera or Perspective()}
 
+    def film_of(self, camera: str) -> tuple[int, int, int]:
+        """Width, height [pixels] and samples per pixel of a camera's picture: its own, or those of `film`."""
+        own, film = self.named_cameras()[camera], self.film
+        return own.width or film.width, own.height or film.height, own.samples or film.samples
+
     def named_lights(self) -> dict[str, AnyLight]:
         """The lights by name: their own, or their type and number."""
         return {l.name or f"{dict(l)['light']}{i + 1}": l for i, l in enumerate(self.lights)}

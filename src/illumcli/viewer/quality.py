@@ -42,7 +42,7 @@ def stage(quality: Quality) -> str:
 
 def reconstructed(scene: Scene, camera: str) -> Reconstructed | None:
     """The quality between coarse and full; None where it would save few rays."""
-    samples = scene.named_cameras()[camera].samples or scene.film.samples
+    _, _, samples = scene.film_of(camera)
     rays = max(1, PIXEL_RAYS // samples)
     settings = scene.obscurance
     if settings is None or settings.reconstruct or settings.samples < 2 * rays:
@@ -60,8 +60,7 @@ def scene_of(scene: Scene, camera: str, quality: Quality) -> Scene:
         path = camera_path(scene, camera)
         scene = scene if scene.cameras or scene.camera else scene.model_copy(update={"camera": view})
         values |= {"film.adaptive": False, f"{path}.samples": 1}
-        for name in ("width", "height"):
-            pixels = getattr(view, name) or getattr(scene.film, name)
+        for name, pixels in zip(("width", "height"), scene.film_of(camera), strict=False):
             values[f"{path}.{name}"] = max(1, round(pixels / quality.divisor))
     if scene.obscurance is not None:
         values |= {"obscurance.samples": quality.rays, "obscurance.reconstruct": True}

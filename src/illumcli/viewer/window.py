@@ -9,7 +9,6 @@ from typing import Any
 from illumcli.records import Value
 from illumcli.scene.scene_file import SceneFile
 from illumcli.scene.spec import Scene
-from illumcli.scene.yaml_text import flow
 from illumcli.schema.description import Description
 from illumcli.viewer.edits import Edits, overrides_of
 
@@ -39,8 +38,7 @@ class Window(Value):
     @property
     def overrides(self) -> tuple[str, ...]:
         """The texts of `-D` with which ``illum render`` makes this picture."""
-        chosen = (f"{path}={flow(value)}" for path, value in self._values().items())
-        return (*overrides_of(self.edits), *chosen)
+        return (*overrides_of(self.edits), *overrides_of(self._values()))
 
     @property
     def film(self) -> tuple[int, int]:
@@ -50,8 +48,7 @@ class Window(Value):
     @property
     def own_film(self) -> tuple[int, int]:
         """Width and height that the scene asks for [pixels]."""
-        camera, film = self.now.scene.named_cameras()[self.camera], self.now.scene.film
-        return camera.width or film.width, camera.height or film.height
+        return self.now.scene.film_of(self.camera)[:2]
 
     @property
     def choices(self) -> tuple[Any, ...]:

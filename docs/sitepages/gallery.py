@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import OpenImageIO
-import yaml
 
 from illumcli.errors import OutputError
+from illumcli.scene.load import load, read_frames, read_text
 from sitepages.drawing import SOURCE, digest_of, run
 from sitepages.source import ROOT, scenes
 
@@ -80,7 +80,7 @@ def pages(folder: Path, draft: bool) -> dict[str, str | bytes]:
     written: dict[str, str | bytes] = {}
     head = HEAD
     for scene in scenes():
-        key = f"{sources} {inputs} {digest_of(_texts(scene))} {draft}"
+        key = f"{sources} {inputs} {digest_of(read_text(scene).files)} {draft}"
         entry = _remembered(scene, folder, key, draft)
         names = [Path(picture).name for picture in entry.pictures]
         written |= {f"gallery/{Path(each).name}": Path(each).read_bytes() for each in entry.pictures}
@@ -91,13 +91,6 @@ def pages(folder: Path, draft: bool) -> dict[str, str | bytes]:
     names = "\n".join(f"gallery/{scene.stem}" for scene in scenes())
     written["gallery.md"] = f"{head}::::\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
     return written
-
-
-def _texts(scene: Path) -> list[Path]:
-    """A scene, and the scenes that it extends."""
-    bases = yaml.safe_load(scene.read_text()).get("extends", [])
-    bases = [bases] if isinstance(bases, str) else bases
-    return [scene, *(path for base in bases for path in _texts(scene.parent / base))]
 
 
 def _page(scene: Path, entry: Entry, names: Sequence[str]) -> str:
@@ -134,11 +127,10 @@ def _remembered(scene: Path, folder: Path, key: str, draft: bool) -> Entry:
 
 def _entry(scene: Path, folder: Path, draft: bool) -> Entry:
     """A scene, rendered below a folder unless its pictures are kept."""
-    text = scene.read_text()
-    title, _, idea = text.partition("\n")[0].lstrip("# ").partition(": ")
-    keys = yaml.safe_load(text)
-    frame = keys["frames"]["last"] // 2 if "frames" in keys else 0
-    frames = ["--frames", f"{frame}:{frame}"] if "frames" in keys else []
+    title, _, idea = scene.read_text().partition("\n")[0].lstrip("# ").partition(": ")
+    numbers = read_frames(scene)
+    middle = 0 if numbers is None else numbers.last // 2
+    frames = [] if numbers is None else ["--frames", f"{middle}:{middle}"]
     small = ["-D", DRAFT] if draft else []
     report = _render(scene, folder, "", [*frames, *small])
     return Entry(
@@ -149,14 +141,14 @@ def _entry(scene: Path, folder: Path, draft: bool) -> Entry:
         seconds=report["total_seconds"],
         threads=report["threads"],
         rays=sum(report["rays"].values()),
-        error=None if draft else _error(scene, folder, frames, keys.get("film", {})),
+        error=None if draft else _error(scene, folder, frames),
     )
 
 
-def _error(scene: Path, folder: Path, frames: Sequence[str], film: dict[str, Any]) -> float | None:
+def _error(scene: Path, folder: Path, frames: Sequence[str]) -> float | None:
     """The error of a picture, from one of a quarter of its size, whose pixels have as many samples."""
-    sizes = {"width": 1280, "height": 720}
-    small = [f"film.{key}={max(film.get(key, usual) // 4, 1)}" for key, usual in sizes.items()]
+    film = load(scene).scene.film
+    small = [f"film.width={max(film.width // 4, 1)}", f"film.height={max(film.height // 4, 1)}"]
     words = [*frames, "--only", "beauty", "--only", "error", "-D", small[0], "-D", small[1]]
     report = _render(scene, folder, ".small", words)
     return max((error["rms"] for error in report["standard_error"].values()), default=None)

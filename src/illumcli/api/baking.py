@@ -137,6 +137,8 @@ def bake(
     both = {"texture": (size, size)} if isinstance(size, int) else {}
     given = chosen(BakeChoices, {**keywords, **both}, ("occluders", "what"))
     settings = BakeSettings(**_settings(given))
+    if settings.method == "fit" and settings.beyond_fit is not None:
+        raise InputError(f"{settings.beyond_fit} works with method='vertex'; leave it out, or the method")
     named = (outputs,) if isinstance(outputs, str | os.PathLike) else outputs
     with tempfile.TemporaryDirectory(prefix="illum-") as folder:
         own = Path(folder)
@@ -158,27 +160,20 @@ def _settings(given: BakeChoices) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Options that exclude each other, or a value that is none of them.
+        Options that exclude each other, or an unknown channel.
     """
     if given.samples is not None and given.target_error is not None:
         raise InputError("samples and target_error exclude each other; give one")
-    of_vertices = {
-        "target_error": given.target_error is not None,
-        "reconstruct": bool(given.reconstruct),
-        "what": tuple(given.what) != ("ao",),
-    }
-    for name, is_given in of_vertices.items():
-        if is_given and given.method == "fit":
-            raise InputError(f"{name} works with method='vertex'; leave it out, or the method")
     unknown = [word for word in given.what if word not in whats()]
     if unknown:
         raise InputError(f"what: no '{unknown[0]}'; {suggestion(unknown[0], whats())}")
     falloff = {"falloff": given.falloff} if isinstance(given.falloff, str) else given.falloff
     is_reconstructed = given.target_error is not None if given.reconstruct is None else given.reconstruct
-    settings = {name: value for name, value in given if name not in ("threads", "strict")}
+    settings = {
+        name: value for name, value in given if value is not None and name not in ("threads", "strict")
+    }
     return {
         **settings,
-        "samples": 256 if given.samples is None else given.samples,
         "reconstruct": is_reconstructed,
         "falloff": falloff,
         "occluders": tuple(given.occluders),

@@ -33,6 +33,16 @@ class BakeSettings(Value):
     unwrap: str | None = None  # make uv for objects that have none (`missing`), or for all (`all`)
     seed: int = 0
 
+    @property
+    def beyond_fit(self) -> str | None:
+        """The first of these settings that the method `fit` does not have; None if it has all."""
+        settings = {
+            "target_error": self.target_error is not None,
+            "reconstruct": self.reconstruct,
+            "what": self.what != ("ao",),
+        }
+        return next((name for name, is_beyond in settings.items() if is_beyond), None)
+
     def obscurance(self) -> Obscurance:
         """The settings as a scene describes them.
 

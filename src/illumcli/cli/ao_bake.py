@@ -111,31 +111,35 @@ class _TextureSize(click.ParamType):
         return size
 
 
+_BEYOND_FIT = {
+    "target_error": "--target-error works with --method vertex; give --samples",
+    "reconstruct": "--reconstruct works with --method vertex",
+    "what": "--method fit computes ao alone; --what works with --method vertex",
+}
+
+
 def _settings(options: dict[str, Any]) -> BakeSettings:
     """The `BakeSettings` among the options of the command."""
     from illumcli.baking.settings import BakeSettings
 
     _refuse_contradictions(options)
     falloff = {name: options.pop(name) for name in ("falloff", "max_distance", "tau", "exponent")}
-    options["samples"] = options["samples"] or 256
+    options["samples"] = options["samples"] or BakeSettings.samples
     if options["reconstruct"] is None:
         options["reconstruct"] = options["target_error"] is not None
     options["falloff"] = {name: value for name, value in falloff.items() if value is not None}
     options["faces"] = options["faces"].replace("-", "_")
     options["occluders"] = options["occluders"] or ("scene",)
-    return taken(BakeSettings, options)
+    settings = taken(BakeSettings, options)
+    if settings.method == "fit" and settings.beyond_fit is not None:
+        raise click.UsageError(_BEYOND_FIT[settings.beyond_fit])
+    return settings
 
 
 def _refuse_contradictions(options: dict[str, Any]) -> None:
     if options["samples"] is not None and options["target_error"] is not None:
         raise click.UsageError("--samples and --target-error exclude each other; give one")
     _refuse_foreign_parameters(options)
-    if options["target_error"] is not None and options["method"] == "fit":
-        raise click.UsageError("--target-error works with --method vertex; give --samples")
-    if options["reconstruct"] and options["method"] == "fit":
-        raise click.UsageError("--reconstruct works with --method vertex")
-    if options["what"] != ("ao",) and options["method"] == "fit":
-        raise click.UsageError("--method fit computes ao alone; --what works with --method vertex")
 
 
 def _refuse_foreign_parameters(options: dict[str, Any]) -> None:

@@ -116,11 +116,9 @@ class Session:
             except Superseded:
                 continue
             except Exception as error:
-                if (fault := known(error)) is None:
-                    raise
                 is_edited = self._window is not None and bool(self._window.edits)
                 is_new = self._version == self._version_read
-                self._tell_problem(str(fault).splitlines(), "edit" if is_edited and not is_new else "file")
+                self._tell_problem(_problem(error), "edit" if is_edited and not is_new else "file")
             self._complete = self._version
             while self._complete == self._version and not self._is_closed:
                 self._wait(PERIOD)
@@ -208,7 +206,7 @@ class Session:
                 is_told = self._apply(message) and is_told
             except Exception as error:
                 origin = "save" if message.get("type") == "save" else "edit"
-                self._tell_problem(_problem(message, error), origin)
+                self._tell_problem(_refusal(message, error), origin)
                 is_told = False
         if not is_told:
             self._tell_controls(self._window)
@@ -267,9 +265,7 @@ class Session:
         try:
             original = self._renderer.read()
         except Exception as error:
-            if (fault := known(error)) is None:
-                raise
-            self._tell_problem(str(fault).splitlines(), "file")
+            self._tell_problem(_problem(error), "file")
             self._is_unread = True
             return
         self._is_unread = False
@@ -304,13 +300,18 @@ class Session:
         self._send(json.dumps(answer))
 
 
-def _problem(message: Message, error: Exception) -> list[str]:
+def _problem(error: Exception) -> list[str]:
+    """What an error says to a user; raises it again if it is a fault of the program."""
+    if (fault := known(error)) is None:
+        raise error
+    return str(fault).splitlines()
+
+
+def _refusal(message: Message, error: Exception) -> list[str]:
     """Why a message was refused; raises what is a fault of the program."""
-    if (fault := known(error)) is not None:
-        return str(fault).splitlines()
-    if isinstance(error, MISUNDERSTOOD):
+    if known(error) is None and isinstance(error, MISUNDERSTOOD):
         return [f"message: not understood: {reprlib.repr(message)}: {error}"]
-    raise error
+    return _problem(error)
 
 
 def _stamp(message: Message) -> dict[str, Any]:

@@ -31,8 +31,8 @@ class Examples:
 
     def of(self, part: Part, fact: Fact) -> str:
         """An example of a key's value; empty if there is none."""
-        found = [text for text in self._found[part.name, fact.key] if len(text) <= LONGEST]
-        return min(found, key=lambda text: (f"`{text}`" in fact.default, len(text)), default="") or example(
+        texts = [text for text in self._found[part.name, fact.key] if len(text) <= LONGEST]
+        return min(texts, key=lambda text: (f"`{text}`" in fact.default, len(text)), default="") or example(
             part, fact
         )
 

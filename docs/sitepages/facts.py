@@ -66,17 +66,17 @@ def part_of(schema: Schema) -> Part:
 def parts_below(schema: Schema, wanted: Callable[[str, Part], bool]) -> dict[str, Part]:
     """Title -> description, of those wanted that a description refers to, in the order of its keys."""
     definitions = schema.get("$defs", {})
-    found: dict[str, Part] = {}
+    parts: dict[str, Part] = {}
 
     def visit(part: Schema) -> None:
         for title in references(part):
             below = part_of(definitions[title])
-            if title not in found and wanted(title, below):
-                found[title] = below
+            if title not in parts and wanted(title, below):
+                parts[title] = below
                 visit(below.schema["properties"])
 
     visit(schema["properties"])
-    return found
+    return parts
 
 
 def references(schema: Any) -> Iterator[str]:

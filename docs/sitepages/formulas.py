@@ -88,7 +88,7 @@ def _math(text: str) -> str:
 
 
 def _tokens(text: str) -> list[Token]:
-    found: list[Token] = []
+    tokens: list[Token] = []
     place, spaced = 0, False
     while place < len(text):
         match = TOKEN.match(text, place)
@@ -96,9 +96,9 @@ def _tokens(text: str) -> list[Token]:
             raise FormulaError(text)
         place = match.end()
         if match.lastgroup != "space":
-            found.append(Token(str(match.lastgroup), match[0], spaced))
+            tokens.append(Token(str(match.lastgroup), match[0], spaced))
         spaced = match.lastgroup == "space"
-    return found
+    return tokens
 
 
 class _Parser:

@@ -94,8 +94,8 @@ def scenes() -> list[Path]:
 
 def pictures() -> dict[str, bytes]:
     """Name -> content of the pictures below `docs`."""
-    found = sorted(path for pattern in PICTURES for path in DOCS.rglob(pattern))
-    return {path.relative_to(DOCS).as_posix(): path.read_bytes() for path in found}
+    paths = sorted(path for pattern in PICTURES for path in DOCS.rglob(pattern))
+    return {path.relative_to(DOCS).as_posix(): path.read_bytes() for path in paths}
 
 
 def linked_files(pages: Mapping[str, str]) -> dict[str, bytes]:

@@ -160,8 +160,8 @@ class Brdf(Drawing):
     def albedo(self, angles: ArrayLike) -> NDArray[np.float64]:
         """(..., 3) the share of light from these angles of incidence that leaves the surface [degrees]."""
         angles = _angles(angles)
-        found = [albedo(self._look, float(angle))[0] for angle in angles.ravel()]
-        return np.reshape(found, (*angles.shape, 3))
+        shares = [albedo(self._look, float(angle))[0] for angle in angles.ravel()]
+        return np.reshape(shares, (*angles.shape, 3))
 
     def slice(self, angle: float, times_cos: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(K,) angles of view in the plane of incidence [degrees], those on the light's side negative, and
@@ -231,8 +231,8 @@ def brdf(
     alone = isinstance(model, str | Mapping | IlluminationModel)
     names, texts = _named([model] if alone else model)  # type: ignore[list-item,arg-type]
     settings = _plot(plot)
-    found = looks(names, (*texts, *override_texts(overrides, Path())), settings.labels)
-    return (Brdf if alone else Brdfs)(found, settings)
+    drawn = looks(names, (*texts, *override_texts(overrides, Path())), settings.labels)
+    return (Brdf if alone else Brdfs)(drawn, settings)
 
 
 def _plot(keywords: PlotKeywords) -> Plot:

@@ -112,8 +112,8 @@ def models(name: str | None = None) -> Model | Models:
     """
     if not isinstance(name, str | None):
         raise InputError(f"model: must be a name, is of type {type(name).__name__}")
-    found = Models(map(_model, data(name)))
-    return found if name is None else found[0]
+    records = Models(map(_model, data(name)))
+    return records if name is None else records[0]
 
 
 def _model(entry: Mapping[str, Any]) -> Model:

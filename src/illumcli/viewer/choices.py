@@ -21,8 +21,8 @@ def tags_in(annotation: Any) -> tuple[str, ...]:
     family = _family(annotation)
     if family is not None:
         return tags(family.package)
-    found = dict(choices(annotation))
-    return tuple(found) if found and all(map(_is_description, found.values())) else ()
+    classes = dict(choices(annotation))
+    return tuple(classes) if classes and all(map(_is_description, classes.values())) else ()
 
 
 def class_of(annotation: Any, tag: str) -> type[Description]:
@@ -38,10 +38,10 @@ def class_of(annotation: Any, tag: str) -> type[Description]:
     family = _family(annotation)
     if family is not None:
         return member(family.package, tag)
-    found = dict(choices(annotation))
-    if tag not in found:
-        raise LookupError(f"there are: {', '.join(found)}")
-    cls: type[Description] = split(found[tag])[0]
+    classes = dict(choices(annotation))
+    if tag not in classes:
+        raise LookupError(f"there are: {', '.join(classes)}")
+    cls: type[Description] = split(classes[tag])[0]
     return cls
 
 

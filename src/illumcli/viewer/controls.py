@@ -35,7 +35,7 @@ class Spot(NamedTuple):
         return self._replace(path=f"{self.path}.{name}", words=(*self.words, name.replace("_", " ")))
 
 
-class Found(NamedTuple):
+class Controlled(NamedTuple):
     """A control, and what it controls."""
 
     control: Control
@@ -65,11 +65,11 @@ def controls(original: SceneFile, now: SceneFile) -> tuple[Control, ...]:
 
     return tuple(
         replace(each, help=f"{each.help} {VARIES}".strip()) if varies(each) else each
-        for each in (found.control for found in controlled(original.scene, now.scene))
+        for each in (entry.control for entry in controlled(original.scene, now.scene))
     )
 
 
-def controlled(before: Scene, now: Scene) -> Iterator[Found]:
+def controlled(before: Scene, now: Scene) -> Iterator[Controlled]:
     """The controls of a scene, with the parts that they control; `before` is the scene of the file."""
     # Materials, lights and objects by name.
     for name, material in {**before.materials, **now.materials}.items():  # in the order of the file
@@ -80,9 +80,9 @@ def controlled(before: Scene, now: Scene) -> Iterator[Found]:
     for number, (name, light) in enumerate(now.named_lights().items()):
         spot = Spot(f"lights.{light.name or number}", f"lights.{name}")
         annotation = _annotation_of_parts("lights")
-        for found in _of_value(spot, {}, annotation, light, lights.get(name, ABSENT)):
-            if found.control.path != f"{spot.path}.name":  # by which the other paths call it
-                yield found
+        for entry in _of_value(spot, {}, annotation, light, lights.get(name, ABSENT)):
+            if entry.control.path != f"{spot.path}.name":  # by which the other paths call it
+                yield entry
     things = dict(zip(before.object_names(), before.objects, strict=True))
     for number, (name, thing) in enumerate(zip(now.object_names(), now.objects, strict=True)):
         spot = Spot(f"objects.{thing.name or number}", f"objects.{name}")
@@ -108,7 +108,7 @@ def _annotation_of_parts(name: str) -> Any:
     return parts[1] if name == "materials" else parts[0]
 
 
-def _of_object(spot: Spot, scene: Scene, thing: Object, old: Mapping[str, Any]) -> Iterator[Found]:
+def _of_object(spot: Spot, scene: Scene, thing: Object, old: Mapping[str, Any]) -> Iterator[Controlled]:
     """The rate of an object, materials that are described in place, and parameters that differ on it."""
     for name in ("material", "fallback"):
         material = getattr(thing, name)
@@ -123,7 +123,7 @@ def _of_object(spot: Spot, scene: Scene, thing: Object, old: Mapping[str, Any]) 
     yield from _of_field(spot.at("shading"), Object, "shading", thing.shading, old.get("shading", ABSENT))
 
 
-def _of_description(spot: Spot, now: Description, before: Any) -> Iterator[Found]:
+def _of_description(spot: Spot, now: Description, before: Any) -> Iterator[Controlled]:
     """The controls of the fields of a description; what stands there before may be something else."""
     cls = type(now)
     for name in cls.model_fields:
@@ -132,21 +132,23 @@ def _of_description(spot: Spot, now: Description, before: Any) -> Iterator[Found
             yield from _of_field(spot.at(name), cls, name, getattr(now, name), old)
 
 
-def _of_field(spot: Spot, cls: type[Description], name: str, value: Any, before: Any) -> Iterator[Found]:
+def _of_field(spot: Spot, cls: type[Description], name: str, value: Any, before: Any) -> Iterator[Controlled]:
     return _of_value(spot, schema_of_field(cls, name), field_annotation(cls, name), value, before)
 
 
-def _of_value(spot: Spot, schema: Schema, annotation: Any, value: Any, before: Any) -> Iterator[Found]:
+def _of_value(spot: Spot, schema: Schema, annotation: Any, value: Any, before: Any) -> Iterator[Controlled]:
     """The control of a value, and those of the values in it."""
     is_part = holds_descriptions(annotation)
     if not is_part:
         if not isinstance(value, Mapping):
-            yield Found(_leaf(spot, schema, value, before), annotation, value)
+            yield Controlled(_leaf(spot, schema, value, before), annotation, value)
     elif without_null(schema)[1]:
-        yield Found(_switch(spot, schema, value, before), annotation, value)
+        yield Controlled(_switch(spot, schema, value, before), annotation, value)
     if is_part and isinstance(value, Description):
         for tag in tag_value(type(value)):
-            yield Found(_choice(spot.at(tag), schema, tags_in(annotation), value, before), annotation, value)
+            yield Controlled(
+                _choice(spot.at(tag), schema, tags_in(annotation), value, before), annotation, value
+            )
 
     # The parts of a description, a list of descriptions, or a mapping of values by name. Those of a curve are
     # no parts of the scene, whose text has the curve in its own words.

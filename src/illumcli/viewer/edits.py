@@ -18,7 +18,7 @@ from illumcli.schema.annotations import split
 from illumcli.schema.description import Description, as_json
 from illumcli.schema.families import member
 from illumcli.viewer.choices import class_of, holds_descriptions
-from illumcli.viewer.controls import ABSENT, Found, controlled
+from illumcli.viewer.controls import ABSENT, Controlled, controlled
 from illumcli.viewer.switching import switched
 
 MODELS = "illumcli.models"
@@ -65,8 +65,8 @@ def after_reset(original: SceneFile, now: SceneFile, edits: Edits, path: str | N
     if path is None:
         return {}
     steps = tuple(path.split("."))
-    found = _control_at(original.scene, now.scene, path)
-    if found is not None and _is_tag(found):
+    entry = _control_at(original.scene, now.scene, path)
+    if entry is not None and _is_tag(entry):
         new = after_reset(original, now, edits, ".".join(steps[:-1]))
         if steps[0] == "materials" and len(steps) == 3:
             removed = {path for path, value in edits.items() if value is None}
@@ -140,14 +140,14 @@ def _meant(before: Scene, now: Scene, path: str, value: Any) -> tuple[str, Any]:
     """The path and value that the setting of a control means."""
     if not isinstance(value, str | bool):
         return path, value
-    found = _control_at(before, now, path)
-    if found is None:
+    entry = _control_at(before, now, path)
+    if entry is None:
         return path, value
-    kind = found.control.kind
-    if kind == "switch" and holds_descriptions(found.annotation):
-        return path, switched(None, split(found.annotation)[0], _reach(now)) if value else None
-    if _is_tag(found):
-        return path.rpartition(".")[0], _chosen(found, value, _reach(now))
+    kind = entry.control.kind
+    if kind == "switch" and holds_descriptions(entry.annotation):
+        return path, switched(None, split(entry.annotation)[0], _reach(now)) if value else None
+    if _is_tag(entry):
+        return path.rpartition(".")[0], _chosen(entry, value, _reach(now))
     if kind in ("switch", "choice"):
         return path, value
     problems: list[Problem] = []
@@ -157,24 +157,24 @@ def _meant(before: Scene, now: Scene, path: str, value: Any) -> tuple[str, Any]:
     return path, change.value.plain()
 
 
-def _control_at(before: Scene, now: Scene, path: str) -> Found | None:
+def _control_at(before: Scene, now: Scene, path: str) -> Controlled | None:
     """The control of a path; None if there is none."""
     return next((each for each in controlled(before, now) if each.control.path == path), None)
 
 
-def _is_tag(found: Found) -> bool:
+def _is_tag(entry: Controlled) -> bool:
     """True if a control chooses which description stands there."""
-    return found.control.kind == "choice" and isinstance(found.part, Description)
+    return entry.control.kind == "choice" and isinstance(entry.part, Description)
 
 
-def _chosen(found: Found, tag: Any, reach: float) -> dict[str, Any]:
+def _chosen(entry: Controlled, tag: Any, reach: float) -> dict[str, Any]:
     """The keys of the description that a tag chooses."""
     try:
-        return switched(found.part, class_of(found.annotation, str(tag)), reach)
+        return switched(entry.part, class_of(entry.annotation, str(tag)), reach)
     except LookupError as error:
-        raise InputError(f"{found.control.path}: no choice '{tag}'; {error}") from None
+        raise InputError(f"{entry.control.path}: no choice '{tag}'; {error}") from None
     except InputError as error:
-        raise InputError([f"{found.control.path}: {problem}" for problem in error.problems]) from None
+        raise InputError([f"{entry.control.path}: {problem}" for problem in error.problems]) from None
 
 
 def _reach(scene: Scene) -> float:

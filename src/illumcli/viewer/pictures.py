@@ -89,8 +89,8 @@ class Picture(Record):
 
     def channels(self, layer: str) -> list[str]:
         """The names of a layer's channels, without the layer's."""
-        (found,) = (each for each in self.image.target.layers if each.name == layer)
-        return [name.rpartition(".")[2] for name in self.image.work.development.names(found)]
+        (chosen,) = (each for each in self.image.target.layers if each.name == layer)
+        return [name.rpartition(".")[2] for name in self.image.work.development.names(chosen)]
 
     def pixels(self) -> NDArray[np.uint8]:
         """(H, W, 1 or 3), as a PNG shows the layer, in front of grey."""

@@ -106,9 +106,9 @@ export class Controls {
       el("span", { class: "label", title: control.label }, control.label),
       ...field.parts, reset);
     for (const input of inputs(row)) input.setAttribute("aria-description", control.help ?? "");
-    const made = { control, row, field };
-    this.#rows.set(control.path, made);
-    return made;
+    const entry = { control, row, field };
+    this.#rows.set(control.path, entry);
+    return entry;
   }
 
   #lightSwitch({ name }) {
@@ -126,11 +126,11 @@ export class Controls {
 
   #show(paths) {
     for (const path of paths) {
-      const made = this.#rows.get(path);
-      if (!made) continue;
+      const entry = this.#rows.get(path);
+      if (!entry) continue;
       const value = this.session.values.get(path);
-      made.field.show(value);
-      made.row.classList.toggle("changed", !isEqual(value, made.control.original));
+      entry.field.show(value);
+      entry.row.classList.toggle("changed", !isEqual(value, entry.control.original));
     }
     for (const [name, { badge, reset }] of this.#groups) {
       const count = this.#changed(name).length;

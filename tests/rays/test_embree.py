@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from illumcli.compiled import SWITCH
 from illumcli.errors import IllumError
 from illumcli.rays import embree_library as library
 from illumcli.rays import embree_upload as upload
 from illumcli.rays.embree import Interrupted, Tracer
 from illumcli.rays.packet_loop import missing
-from illumcli.rays.ray_loop import SWITCH
 from illumcli.rays.single_ray_loop import SingleRayLoop
 
 F = np.float32

@@ -7,9 +7,10 @@ import os
 import numpy as np
 import pytest
 
+from illumcli.compiled import SWITCH
 from illumcli.rays import packet_loop
 from illumcli.rays.packet_loop import PacketLoop, missing, native_widths
-from illumcli.rays.ray_loop import NO_LIMIT, SWITCH, ray_loop, ray_loop_name, why_no_packets
+from illumcli.rays.ray_loop import NO_LIMIT, ray_loop, ray_loop_name, why_no_packets
 from illumcli.rays.single_ray_loop import SingleRayLoop
 
 F = np.float32

@@ -8,8 +8,8 @@ import pytest
 from illumcli.baking.bake import bake_mesh
 from illumcli.baking.settings import BakeSettings
 from illumcli.cache.store import Store
+from illumcli.compiled import SWITCH
 from illumcli.rays.embree_library import embree_library
-from illumcli.rays.ray_loop import SWITCH
 from illumcli.render_graph import build_geometry
 from metamorphic.pictures import close, pictures, same
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from illumcli.compiled import SWITCH
 from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.rays.packet_loop import missing
-from illumcli.rays.ray_loop import SWITCH
 from illumcli.schema.families import members
 from illumcli.visibility.falloffs.exponential import Exponential
 from illumcli.visibility.falloffs.step import Step

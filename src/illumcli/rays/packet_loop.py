@@ -1,7 +1,6 @@
 """Ray queries in packets of rays: a C loop (`packets.c`) that calls the Embree library of embreex.
 
-The loop is a shared library beside this file. An installation compiles it if there is a C compiler
-(`hatch_build.py`). Its results have the same bits as those of embreex's loop, which is used without it.
+Its results have the same bits as those of embreex's loop, which is used without it (`illumcli.compiled`).
 
 Embree's incoherent mode traverses each ray of a packet alone. Its coherent mode takes half of the time for
 camera rays, but which of two triangles at almost the same distance is hit then depends on the other rays. So
@@ -11,15 +10,14 @@ the loop notes rays that met two such triangles, and these are traced again, alo
 from __future__ import annotations
 
 import ctypes
-import os
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, take_rows
+from illumcli.compiled import compiled_library
 from illumcli.rays.embree_library import embree_library, loaded_library
 from illumcli.rays.embree_tree import EmbreeTree, native_widths
 from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
@@ -27,7 +25,6 @@ from illumcli.rays.ray_loop import NO_LIMIT, RAYS_PER_CALL, Closest, InstancedMe
 
 INTERFACE = 4
 """Version of the interface of `packets.c`; a library with another one is not used."""
-LIBRARY = Path(__file__).with_name("_packets.dll" if os.name == "nt" else "_packets.so")
 
 _NO_LIMIT = np.asarray(NO_LIMIT)
 
@@ -105,15 +102,12 @@ class _Hits(ctypes.Structure):
 @cache
 def packet_library() -> ctypes.CDLL | None:
     """The compiled loop, a ctypes.CDLL; None if it is missing or has another interface."""
-    try:
-        library = ctypes.CDLL(str(LIBRARY))
-        if library.illum_interface() != INTERFACE:
-            return None
-        library.illum_occluded.argtypes = [ctypes.POINTER(_Rays), ctypes.c_void_p]
-        library.illum_closest.argtypes = [ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)]
-        library.illum_patterns.argtypes = [ctypes.POINTER(_Patterns), ctypes.POINTER(_PatternResults)]
-    except (OSError, AttributeError):
+    library = compiled_library(__file__, "packets", INTERFACE)
+    if library is None:
         return None
+    library.illum_occluded.argtypes = [ctypes.POINTER(_Rays), ctypes.c_void_p]
+    library.illum_closest.argtypes = [ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)]
+    library.illum_patterns.argtypes = [ctypes.POINTER(_Patterns), ctypes.POINTER(_PatternResults)]
     for function in (library.illum_occluded, library.illum_closest, library.illum_patterns):
         function.restype = None
     return library

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, repeat_rows
+from illumcli.compiled import SWITCH, are_switched_off
 from illumcli.rays.pattern_rays import PatternRays, PatternResults
 from illumcli.records import Record
 
@@ -19,8 +19,6 @@ PATTERN_RAYS_PER_CALL = 1 << 17
 arrays of 2^14 rays would fit into the processor's cache. In long batches Embree's own data stay there."""
 NO_LIMIT = F(1e37)
 """Ray length that is passed to Embree for an unlimited ray."""
-SWITCH = "ILLUM_PACKETS"
-"""Environment variable; 0 turns packets off."""
 
 
 class Closest(Record):
@@ -109,7 +107,7 @@ def ray_loop(
 
 def why_no_packets() -> str | None:
     """Why rays are not traced in packets; None if they are."""
-    if os.environ.get(SWITCH) == "0":
+    if are_switched_off():
         return f"{SWITCH}=0"
     from illumcli.rays.packet_loop import missing
 

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats
 from illumcli.records import Record
+from illumcli.visibility.compiled_fits import fit_loop
 from illumcli.visibility.object_pixels import FittedPixels, ObjectPixels, joined
 from illumcli.visibility.regression import (
     COUNT,
@@ -142,21 +143,23 @@ def pyramid(planes: NDArray[np.float32]) -> list[Cells]:
     """
     shape = planes.shape[2:]
     levels = [Cells.empty((shape[0] >> k, shape[1] >> k), border) for k, border in enumerate(BORDERS)]
-    for strip in strips(Area(0, shape[0], 0, shape[1]), 2):
-        each = planes[:, :, strip.top : strip.bottom].astype(np.float64)
-        sums = np.empty((MOMENTS, *strip.shape))
-        moments(each[0], each[1], each[2:], _sum_places, sums)
-        levels[0].within(strip)[...] = sums
-        _sum_cells(sums, levels[1].within(strip.coarser(0)))
-    for fine, coarse in pairwise(levels[1:]):
+    everything = Area(0, shape[0], 0, shape[1])
+    loop = fit_loop()
+    if loop is not None:
+        loop.cell_moments(planes, levels[0].within(everything))
+    else:
+        for strip in strips(everything):
+            each = planes[:, :, strip.top : strip.bottom].astype(np.float64)
+            moments(each[0], each[1], each[2:], _sum_places, levels[0].within(strip))
+    for fine, coarse in pairwise(levels):
         everything = Area(0, coarse.shape[0], 0, coarse.shape[1])
         _sum_cells(fine.within(everything.finer()), coarse.within(everything))
     return levels
 
 
-def strips(area: Area, multiple: int = 1) -> Iterator[Area]:
-    """Strips of rows of an area, each of a multiple of so many rows."""
-    step = max(STRIP // max(area.right - area.left, 1) // multiple, 1) * multiple
+def strips(area: Area) -> Iterator[Area]:
+    """Strips of rows of an area."""
+    step = max(STRIP // max(area.right - area.left, 1), 1)
     for top in range(area.top, area.bottom, step):
         yield Area(top, min(top + step, area.bottom), area.left, area.right)
 
@@ -210,10 +213,19 @@ class Fit(Record):
     square: NDArray[np.float64]  # (rows, columns) sum of the squared residuals over the window
     count: NDArray[np.float64]  # (rows, columns) pixels in the window
 
+    @classmethod
+    def of(cls, planes: Planes) -> Fit:
+        """The fits whose values are (11, rows, columns)."""
+        return cls(planes[: 1 + FEATURES], *planes[1 + FEATURES :])
+
 
 def fit(cells: Cells, radius: int, area: Area) -> Fit:
     """The polynomial of least squares in the window around each cell of an area."""
     out = np.zeros((FEATURES + 5, *area.shape))
+    loop = fit_loop()
+    if loop is not None:
+        loop.window_fits(cells.within(area), radius, out)
+        return Fit.of(out)
     for strip in strips(area):
         held = cells.within(strip)
         sums = window_sums(cells.within(strip, radius), radius)
@@ -232,7 +244,7 @@ def fit(cells: Cells, radius: int, area: Area) -> Fit:
             few = (each.reshape(len(each), -1).take(which, axis=1) for each in (sums, own))
             for plane, values in zip(place[:-1], _solved(*few), strict=True):
                 plane.reshape(-1)[which] = values
-    return Fit(out[: 1 + FEATURES], out[-4], out[-3], out[-2], out[-1])
+    return Fit.of(out)
 
 
 def _solved(sums: Planes, own: Planes) -> Planes:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,8 @@ def row(path: Path, rays: int, seeds: int, truth: list[np.ndarray]) -> str:
     """Figures of one mesh at one number of rays."""
     raw, error, stated, inside, covered, audits, seconds = [], [], [], [], [], [], []
     for seed in range(seeds):
-        sampler, closed = caster(path, seed=seed)
+        plain, closed = caster(path, seed=seed)
+        sampler = replace(plain, is_dithered=True)
         counts = RayCounts(closed, np.full(len(closed), rays))
         values = sampler.estimate("values", counts, 0).values
         law = sampler.errors(counts, 1 << 20).law

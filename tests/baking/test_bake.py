@@ -680,6 +680,22 @@ def test_errors_at_a_hollow_edge_keep_falling_with_the_rays(text_mesh, tmp_path)
     assert rmse(64 << 8) < rmse(64) / 25  # as N^-3/4 is 64; sixteen starts gave 3.6
 
 
+def test_only_results_are_dithered_and_audits_stay_independent(tmp_path):
+    loaded = mesh_alone(wavy(tmp_path), ())
+    surfaces, _ = surfaces_of(loaded.scene, loaded)
+    points = vertex_points(surfaces).points
+    occluders = occluders_of(loaded.scene.object_names(), points.geometry, BakeSettings(), {})
+    counts = RayCounts(np.arange(len(points.key)), np.full(len(points.key), 16))
+
+    def values(is_dithered, replicate):
+        measure = Measure(Method(1, Step(), 1.0))
+        sampler = BakeSampler(points, occluders, measure, 0, 1, no_progress, is_dithered=is_dithered)
+        return sampler.estimate("values", counts, replicate).values.w.tobytes()
+
+    assert values(True, 0) != values(False, 0)
+    assert values(True, 3) == values(False, 3)
+
+
 def test_points_of_a_smooth_surface_start_one_packet_at_one_place(tmp_path):
     loaded = mesh_alone(wavy(tmp_path), ())
     surfaces, _ = surfaces_of(loaded.scene, loaded)

@@ -67,3 +67,22 @@ def test_dither_spreads_over_small_neighbourhoods():
         block = draws.reshape(64, 64)[10:14, 20:24].ravel()
         gaps = np.diff(np.sort(block), append=np.sort(block)[0] + 1)
         assert gaps.max() < 4 / 16
+
+
+@pytest.mark.parametrize("samples", [16, 64])
+def test_consecutive_spirals_fill_the_disc_together(samples):
+    # shares of the disc beyond random chords: 32 spirals in a row are half as far off as independent ones
+    rng = np.random.default_rng(2)
+    angle, distance = 2 * np.pi * rng.random(300), 2 * rng.random(300) - 1
+    share = (np.arccos(distance) - distance * np.sqrt(1 - distance**2)) / np.pi
+
+    def off(draws):
+        radius = np.sqrt((np.arange(samples) + draws[1][:, None]) / samples)
+        turn = 2 * np.pi * (np.arange(samples) * sampling.GOLDEN + draws[0][:, None])
+        along = radius[..., None] * np.cos(turn[..., None] - angle)
+        return np.sqrt(np.mean(np.square((along > distance).mean(axis=(0, 1)) - share)))
+
+    number = np.arange(32)
+    together = np.mean([off(sampling.spiral_draws(key, number)) for key in range(8)])
+    apart = np.mean([off(rng.random((2, 32))) for _ in range(8)])
+    assert together < 0.6 * apart

@@ -48,7 +48,13 @@ def _channels_of(
     """The channels of one measure, and what they took."""
     settings, clock = context.settings, context.clock
     sampler = BakeSampler(
-        points, context.occluders, measure, settings.seed, context.threads, context.progress
+        points,
+        context.occluders,
+        measure,
+        settings.seed,
+        context.threads,
+        context.progress,
+        is_dithered=settings.reconstruct,
     )
 
     # open points need no rays

@@ -50,6 +50,13 @@ class Points(Record):
         """(M,) indices of the points in an order that keeps neighbours together."""
         return compact(self.position)
 
+    @cached_property
+    def rank(self) -> NDArray[np.int64]:
+        """(M,) place of each point in that order."""
+        rank = np.empty(len(self.order), np.int64)
+        rank[self.order] = np.arange(len(rank))
+        return rank
+
     def hemispheres(
         self, index: NDArray[np.int64], offset: Floats, samples: int, sampler: str, side: Side = 1
     ) -> Hemispheres:

@@ -3,7 +3,9 @@
 The noise of w differs from point to point, w itself follows the surface. So w of a point is taken from a
 first-order polynomial of the normal and the position, fitted by least squares to the raw values of the points
 around it. Points are grouped into cells; a window is a cell and its nearest cells of the same object whose
-normals agree, so that no value crosses a hard edge.
+normals agree, so that no value crosses a hard edge. The k-th nearest of K cells, counted from 0, has the
+weight 1 - k / K. On a surface k grows like the square of the distance, so this is Epanechnikov's kernel,
+which has the least error.
 
 Each cell takes the window of the least risk, by Stein's unbiased estimate from the standard errors of the raw
 values; where no window promises less than the raw values they stay. Of dense points, as texels are, the
@@ -12,6 +14,10 @@ another order of the points, and the mean taken, which smooths the steps between
 
 References
 ----------
+Epanechnikov, V. A. (1969). Non-parametric estimation of a multivariate probability density. Theory of
+Probability and Its Applications 14(1).
+Fan, J. et al. (1997). Local polynomial regression: optimal kernels and asymptotic minimax efficiency. Annals
+of the Institute of Statistical Mathematics 49(1).
 Stein, C. M. (1981). Estimation of the mean of a multivariate normal distribution. Annals of Statistics 9(6).
 Li, T.-M., Wu, Y.-T. and Chuang, Y.-Y. (2012). SURE-based optimization for adaptive sampling and
 reconstruction. ACM Transactions on Graphics 31(6).
@@ -93,8 +99,8 @@ def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, thread
             best = chosen_fits(list(pool.map(values.fits, values.blocks())), cells)
             fitted = pool.map(partial(values.fitted, best), values.blocks())
             for block, at_points in zip(values.blocks(), fitted, strict=True):
-                is_point = cells.filled[block]
-                index = cells.points[block][is_point]
+                is_point = cells.filled[block].T
+                index = cells.points[block].T[is_point]
                 hidden[index] += at_points.hidden[is_point]
                 risk[index] += at_points.risk[is_point]
                 if bent is not None and at_points.bent is not None:
@@ -129,16 +135,16 @@ class ChosenFits(Record):
 class Fitted(Record):
     """Values at the points of B cells."""
 
-    hidden: NDArray[np.float64]  # (B, size)
-    risk: NDArray[np.float64]  # (B, size)
-    bent: NDArray[np.float64] | None  # (3, B, size)
+    hidden: NDArray[np.float64]  # (size, B)
+    risk: NDArray[np.float64]  # (size, B)
+    bent: NDArray[np.float64] | None  # (3, size, B)
 
 
 class Directions(Record):
     """Mean unoccluded directions, and their moments."""
 
     bent: Vectors  # (M, 3)
-    moments: NDArray[np.float64]  # (3, 7, C + 1) of each component: sum, and sums of products with features
+    moments: NDArray[np.float64]  # (C + 1, 3, 7) of each component: sum, and sums of products with features
 
 
 class CellValues:
@@ -147,21 +153,26 @@ class CellValues:
     def __init__(self, cells: Cells, features: Planes, raw: RawValues, is_dense: bool) -> None:
         self._cells, self._features, self._raw, self._is_dense = cells, features, raw, is_dense
         # moments of every cell, and of an empty one that stands for neighbours that are not there
-        self._moments = np.zeros((MOMENTS, len(cells.points) + 1))
+        self._moments = np.zeros((len(cells.points) + 1, MOMENTS))
         for block in self.blocks():
-            index, share = cells.points[block], cells.filled[block].astype(np.float64)
-            moments(share, raw.hidden[index], features[:, index], _sum_rows, self._moments[:, block])
+            index, share = self._points(block)
+            moments(share, raw.hidden[index], features[:, index], _sum_points, self._moments[block].T)
         self._directions = None if raw.bent is None else self._with_moments(raw.bent)
 
+    def _points(self, block: slice) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """(size, B) points of the cells of a block, and 1 where there is one, else 0."""
+        cells = self._cells
+        return cells.points[block].T.copy(), cells.filled[block].T.astype(np.float64, order="C")
+
     def _with_moments(self, bent: Vectors) -> Directions:
-        out = np.zeros((3, 1 + FEATURES, len(self._cells.points) + 1))
+        out = np.zeros((len(self._cells.points) + 1, 3, 1 + FEATURES))
         for block in self.blocks():
-            index, share = self._cells.points[block], self._cells.filled[block].astype(np.float64)
-            for sums, component in zip(out, bent.T, strict=True):
+            index, share = self._points(block)
+            for axis, component in enumerate(bent.T):
                 weighted = share * component[index]
-                _sum_rows(weighted, sums[0, block])
+                _sum_points(weighted, out[block, axis, 0])
                 for number, feature in enumerate(self._features, 1):
-                    _sum_rows(weighted * feature[index], sums[number, block])
+                    _sum_points(weighted * feature[index], out[block, axis, number])
         return Directions(bent, out)
 
     def blocks(self) -> list[slice]:
@@ -171,67 +182,69 @@ class CellValues:
 
     def fits(self, block: slice) -> Fits:
         """The polynomials of a block in each of the windows."""
-        index, near = self._cells.points[block], self._cells.near[block]
-        share = self._cells.filled[block].astype(np.float64)
+        (index, share), near = self._points(block), self._cells.near[block]
         hidden, features = self._raw.hidden[index], self._features[:, index]
-        coefficients = np.empty((len(WINDOWS), 1 + FEATURES, len(index)))
-        residual, leverage = (np.empty((len(WINDOWS), len(index))) for _ in range(2))
-        noise = np.zeros(len(index))
-        sums = np.zeros((MOMENTS, len(index)))
+        coefficients = np.empty((len(WINDOWS), 1 + FEATURES, len(near)))
+        residual, leverage = (np.empty((len(WINDOWS), len(near))) for _ in range(2))
+        noise = np.zeros(len(near))
+        # sums over the nearest cells, and the same weighted by how many are nearer
+        sums, by_rank = np.zeros((len(near), MOMENTS)), np.zeros((len(near), MOMENTS))
         first = 0
         for number, window in enumerate(WINDOWS):
             for k in range(first, window):
-                sums += self._moments.take(near[:, k], axis=1)
+                of_cell = self._moments.take(near[:, k], axis=0)
+                sums += of_cell
+                by_rank += k * of_cell
             first = window
-            of_window = polynomials(sums[:, :, None].copy())
-            coefficients[number] = of_window.coefficients()[:, :, 0]
+            of_window = polynomials((sums - by_rank / window).T[:, None].copy())
+            coefficients[number] = of_window.coefficients()[:, 0]
             off = of_window.at(features) - hidden
-            _sum_rows(share * np.square(off), residual[number])
+            _sum_points(share * np.square(off), residual[number])
             if number == 0 and self._is_dense:
                 noise = _noise(off, share)
-            _sum_rows(share * np.minimum(of_window.leverage(features), 1), leverage[number])
+            _sum_points(share * np.minimum(of_window.leverage(features), 1), leverage[number])
         return Fits(
             coefficients,
             residual,
             leverage,
-            (share * self._raw.variance[index]).sum(axis=1),
+            (share * self._raw.variance[index]).sum(axis=0),
             noise,
-            share.sum(axis=1),
+            share.sum(axis=0),
         )
 
     def fitted(self, best: ChosenFits, block: slice) -> Fitted:
         """The values at the points of a block."""
-        index, is_raw = self._cells.points[block], best.window[block, None] == 0
-        value = np.repeat(best.coefficients[0, block, None], index.shape[1], axis=1)
-        for slope, feature in zip(best.coefficients[1:, block, None], self._features, strict=True):
+        (index, _), is_raw = self._points(block), best.window[block] == 0
+        value = np.repeat(best.coefficients[:1, block], len(index), axis=0)
+        for slope, feature in zip(best.coefficients[1:, block], self._features, strict=True):
             value += slope * feature[index]
         return Fitted(
             np.where(is_raw, self._raw.hidden[index], value),
-            np.where(is_raw, self._raw.variance[index], best.risk[block, None]),
+            np.where(is_raw, self._raw.variance[index], best.risk[block]),
             None if self._directions is None else self._fitted_directions(self._directions, best, block),
         )
 
     def _fitted_directions(
         self, directions: Directions, best: ChosenFits, block: slice
     ) -> NDArray[np.float64]:
-        """(3, B, size) mean unoccluded directions, from polynomials in the windows that were chosen for w."""
+        """(3, size, B) mean unoccluded directions, from polynomials in the windows that were chosen for w."""
         # moments over the cells of each window
-        index, near = self._cells.points[block], self._cells.near[block]
+        (index, _), near = self._points(block), self._cells.near[block]
         size = np.array([1, *WINDOWS])[best.window[block]]
-        sums = np.zeros((MOMENTS, len(index)))
-        others = np.zeros((3, 1 + FEATURES, len(index)))
+        sums = np.zeros((len(near), MOMENTS))
+        others = np.zeros((len(near), 3, 1 + FEATURES))
         for k in range(WINDOWS[-1]):
-            cell = np.where(k < size, near[:, k], len(self._cells.points))
-            sums += self._moments.take(cell, axis=1)
-            others += directions.moments.take(cell, axis=2)
+            weight = np.maximum(1 - k / size, 0)
+            sums += weight[:, None] * self._moments.take(near[:, k], axis=0)
+            others += weight[:, None, None] * directions.moments.take(near[:, k], axis=0)
 
         # polynomials of each component at the points
         features = self._features[:, index]
-        of_window = polynomials(sums[:, :, None])
-        others = others[:, :, :, None] / of_window.count
-        fitted = np.stack([of_window.of_another(each[0], each[1:], features) for each in others])
+        of_window = polynomials(sums.T[:, None].copy())
+        means = others.transpose(1, 2, 0)[:, :, None] / of_window.count
+        fitted = np.stack([of_window.of_another(each[0], each[1:], features) for each in means])
         raw = np.stack([component[index] for component in directions.bent.T])
-        return np.where(best.window[block, None] == 0, raw, fitted)
+        return np.where(best.window[block] == 0, raw, fitted)
 
 
 def chosen_fits(fits: Sequence[Fits], cells: Cells) -> ChosenFits:
@@ -285,10 +298,11 @@ def _noise(residual: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray
     von Neumann, J. (1941). Distribution of the ratio of the mean square successive difference to the
     variance. Annals of Mathematical Statistics 12(4).
     """
-    both = share[:, 1:] * share[:, :-1]
-    square = (both * np.square(np.diff(residual, axis=1))).sum(axis=1)
-    return np.asarray(share.sum(axis=1) * square / (2 * np.maximum(both.sum(axis=1), 1)))
+    both = share[1:] * share[:-1]
+    square = (both * np.square(np.diff(residual, axis=0))).sum(axis=0)
+    return np.asarray(share.sum(axis=0) * square / (2 * np.maximum(both.sum(axis=0), 1)))
 
 
-def _sum_rows(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    values.sum(axis=-1, out=out)
+def _sum_points(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Sums over the points of each cell, (size, B)."""
+    np.add.reduce(values, axis=0, out=out)

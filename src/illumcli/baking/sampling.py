@@ -19,11 +19,12 @@ from illumcli.files.journal import Journal
 from illumcli.geometry.scene_geometry import triangle_corners
 from illumcli.geometry.spatial_order import compact
 from illumcli.progress import Progress
-from illumcli.rays.sampling import hashed, stream, unit_interval
+from illumcli.rays.sampling import hashed, spiral_draws, stream, unit_interval
 from illumcli.records import Record
 from illumcli.visibility.obscurance import estimates
 from illumcli.visibility.obscurance_error import Errors, Estimates
 from illumcli.visibility.open_hemisphere import trial_planes, triangle_planes
+from illumcli.visibility.samplers import SAMPLERS
 
 UNIT_RAYS = 1 << 18
 """Rays of a unit of work: an interrupt loses at most this, and there are enough units to share."""
@@ -81,6 +82,7 @@ class BakeSampler(Record):
     seed: int
     threads: int
     progress: Progress
+    is_dithered: bool = False  # so that errors of neighbouring results tend to cancel
 
     def open_points(self) -> NDArray[np.bool_]:
         """(M,) True for points with no geometry on that side of the triangles that their rays leave."""
@@ -141,11 +143,9 @@ class BakeSampler(Record):
         """
         count, side = len(self.points.key), self.measure.side
         out = Estimates(np.ones(count, F), np.zeros(count, F), np.zeros((count, 3), F) if bent else None)
-        keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase", "share")]
 
         def compute(unit: WorkUnit, stop: threading.Event) -> tuple[Estimates, int]:
-            key = self.points.key[unit.points]
-            draws = np.stack([unit_interval(hashed(stream_key, key)) for stream_key in keys])
+            draws = self._draws(unit.points, replicate)
             sampler = self.measure.method.sampler
             hemispheres = self.points.hemispheres(unit.points, draws[2], unit.samples, sampler, side)
             occluders = self.occluders[unit.object]
@@ -243,6 +243,16 @@ class BakeSampler(Record):
             # Scale towards the middle of the band.
             scale *= float(np.clip((reached / (0.97 * aim)) ** (4 / 3), 0.05, 20.0))
         return ChosenSamples(samples, pilot.rays, rays)
+
+    def _draws(self, points: NDArray[np.int64], replicate: int) -> NDArray[np.float64]:
+        """(3, K) random numbers of some points: rotation and phase of their patterns, and what divides their
+        rays among origins."""
+        keys = [stream(self.seed, f"ao {what} {replicate}") for what in ("turn", "phase", "share")]
+        draws = np.stack([unit_interval(hashed(key, self.points.key[points])) for key in keys])
+        if self.is_dithered and replicate == 0 and SAMPLERS[self.measure.method.sampler].turned:
+            # only results: the errors of other scrambles must be independent
+            draws[:2] = spiral_draws(keys[0], self.points.rank[points])
+        return draws
 
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
         """Units of neighbouring points of one object that cast the same number of rays in one way."""

@@ -18,6 +18,8 @@ from illumcli.rays.pattern_rays import CompactTable
 
 U32 = np.uint32
 GOLDEN = 0.6180339887498949
+ROTATION_STEP = 3**0.5
+"""Between spirals whose phases differ by the golden ratio, in turns."""
 PLASTIC = 1.32471795724474602596
 """Root of x^3 = x + 1; 1/x and 1/x^2 step the R2 sequence (Roberts 2018)."""
 
@@ -145,19 +147,30 @@ def compact_spiral_table(count: int) -> CompactTable:
     return CompactTable(compact_table, order.astype(np.int32))
 
 
+def spiral_draws(key: int, number: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(2, N) in [0, 1): rotation and phase of the spiral of each number.
+
+    The steps are rationally independent of each other and of the spiral's own angle, so the spirals of
+    consecutive numbers together fill the disc evenly, and their errors tend to cancel.
+    """
+    start = unit_interval(hashed(key, np.array([0, 1], U32)))
+    draws = np.stack([ROTATION_STEP * number + start[0], GOLDEN * number + start[1]])
+    draws -= np.floor(draws)
+    return draws
+
+
 def dither(
     key: int, x: NDArray[np.int64], y: NDArray[np.int64], sample: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """(2, N) in [0, 1): rotation and phase of each pixel's spiral, from the R2 sequence over the pixel grid.
 
     The errors of neighbouring pixels then tend to cancel: a small blur removes more of them than it would of
-    independent noise. Samples of one pixel step by sqrt(3) and the golden ratio, which are rationally
-    independent, so that their spirals together fill the disc evenly, too.
+    independent noise. Samples of one pixel step like `spiral_draws`.
     """
     a, b = 1 / PLASTIC, 1 / PLASTIC**2
     start = unit_interval(hashed(key, np.array([0, 1], U32)))
     draws = np.stack(
-        [a * x + b * y + 3**0.5 * sample + start[0], b * x + (a * b) * y + GOLDEN * sample + start[1]]
+        [a * x + b * y + ROTATION_STEP * sample + start[0], b * x + (a * b) * y + GOLDEN * sample + start[1]]
     )
     draws -= np.floor(draws)  # exact, as the remainder is, and a quarter of its time
     return draws

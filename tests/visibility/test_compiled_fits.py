@@ -1,4 +1,4 @@
-"""The compiled loop gives the bits of numpy: moments of cells, fits in windows, w of pixels."""
+"""The compiled loop gives the bits of numpy: moments of cells, fits in windows, values between cells."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from illumcli.compiled import SWITCH
 from illumcli.visibility import compiled_fits
 from illumcli.visibility.compiled_fits import fit_loop
-from illumcli.visibility.reconstruction import WINDOWS, fit, pyramid
+from illumcli.visibility.reconstruction import WINDOWS, finer, fit, interpolated, pyramid
 from illumcli.visibility.sheets import Area
 
 
@@ -50,6 +50,21 @@ def test_moments_and_fits_have_the_same_bits(monkeypatch, rows, columns):
             assert (ours.leverage > 0).all()
             for name, values in vars(theirs).items():
                 assert getattr(ours, name).tobytes() == values.tobytes(), name
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (3, 70), (33, 32)])
+def test_bilinear_means_have_the_same_bits(monkeypatch, rows, columns):
+    rng = np.random.default_rng(columns)
+    coefficients = rng.normal(size=(8, rows, columns))
+    coefficients[-1] = rng.random((rows, columns)) < 0.7
+    features = rng.normal(size=(6, 4, rows, columns)).astype(np.float32)
+    there = coefficients[-1] > 0
+    compiled = finer(coefficients, there), interpolated(coefficients, features)
+    monkeypatch.setenv(SWITCH, "0")
+    for ours, theirs in zip(
+        compiled, (finer(coefficients, there), interpolated(coefficients, features)), strict=True
+    ):
+        assert ours.tobytes() == theirs.tobytes()
 
 
 def test_a_library_of_another_interface_is_not_used(monkeypatch):

@@ -1,4 +1,5 @@
-"""Moments of cells of pixels and fits in windows of cells by a loop in C (`regression.c`).
+"""Moments of cells of pixels, fits in windows of cells and values between cells by a loop in C
+(`regression.c`).
 
 It does the operations of `visibility.reconstruction` in their order, without the interpreter's lock and in a
 core's first cache: a quarter of the time on one thread.
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from illumcli.compiled import are_switched_off, compiled_library
 from illumcli.visibility.regression import Planes
 
-INTERFACE = 1
+INTERFACE = 2
 """Version of the interface of `regression.c`; a library with another one is not used."""
 
 
@@ -23,15 +24,24 @@ class _Planes(ctypes.Structure):
     _fields_ = (("data", ctypes.c_void_p), ("plane", ctypes.c_int64), ("row", ctypes.c_int64))
 
 
+class _Weighted(ctypes.Structure):
+    _fields_ = (("planes", _Planes), *((name, ctypes.c_int64) for name in ("number", "rows", "columns")))
+
+
 class FitLoop:
     """The compiled loop."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         size, planes = ctypes.c_int64, ctypes.POINTER(_Planes)
-        self._cell_moments, self._window_fits = library.illum_cell_moments, library.illum_window_fits
-        self._cell_moments.argtypes = [ctypes.c_void_p, size, size, planes]
-        self._window_fits.argtypes = [planes, size, size, size, planes]
-        self._cell_moments.restype = self._window_fits.restype = None
+        weighted = ctypes.POINTER(_Weighted)
+        library.illum_cell_moments.argtypes = [ctypes.c_void_p, size, size, planes]
+        library.illum_sum_cells.argtypes = [planes, size, size, planes]
+        library.illum_window_fits.argtypes = [planes, size, size, size, planes]
+        library.illum_finer.argtypes = [weighted, planes]
+        library.illum_interpolated.argtypes = [weighted, ctypes.c_void_p, planes]
+        for name in ("cell_moments", "sum_cells", "window_fits", "finer", "interpolated"):
+            getattr(library, f"illum_{name}").restype = None
+        self._library = library
 
     def cell_moments(self, planes: NDArray[np.float32], out: Planes) -> None:
         """The moments of cells, (36, rows, columns).
@@ -42,7 +52,11 @@ class FitLoop:
             Share, hidden share and features of the pixels of each cell; contiguous.
         """
         assert planes.flags.c_contiguous
-        self._cell_moments(planes.ctypes.data, *planes.shape[2:], _planes(out))
+        self._library.illum_cell_moments(planes.ctypes.data, *planes.shape[2:], _planes(out))
+
+    def sum_cells(self, cells: Planes, out: Planes) -> None:
+        """Sums over 2 x 2 cells: of (36, 2 rows, 2 columns) moments into (36, rows, columns)."""
+        self._library.illum_sum_cells(_planes(cells), *out.shape[1:], _planes(out))
 
     def window_fits(self, cells: Planes, radius: int, out: Planes) -> None:
         """The fits in the window around each cell, (11, rows, columns), as `reconstruction.fit` has them.
@@ -52,7 +66,30 @@ class FitLoop:
         cells : (36, rows, columns) float64
             Moments within an array that reaches `radius` cells further on all sides.
         """
-        self._window_fits(_planes(cells), radius, *cells.shape[1:], _planes(out))
+        self._library.illum_window_fits(_planes(cells), radius, *cells.shape[1:], _planes(out))
+
+    def finer(self, weighted: Planes) -> Planes:
+        """(K, 2 rows, 2 columns) bilinear means of (K + 1, rows, columns) values, the last of which is the
+        weight of each cell that the others were multiplied by.
+        """
+        number, rows, columns = weighted.shape
+        out = np.empty((number - 1, 2 * rows, 2 * columns))
+        self._library.illum_finer(_weighted(weighted), _planes(out))
+        return out
+
+    def interpolated(self, weighted: Planes, features: NDArray[np.float32]) -> Planes:
+        """(4, rows, columns) values of polynomials, as `reconstruction.interpolated` has them.
+
+        Parameters
+        ----------
+        weighted : (8, rows, columns) float64
+            Coefficients, multiplied by the weight of each cell, and the weight.
+        features : (6, 4, rows, columns) float32
+        """
+        out = np.empty(features.shape[1:])
+        features = np.ascontiguousarray(features)
+        self._library.illum_interpolated(_weighted(weighted), features.ctypes.data, _planes(out))
+        return out
 
 
 @cache
@@ -71,3 +108,7 @@ def _planes(array: Planes) -> _Planes:
     size = array.itemsize
     assert column == size
     return _Planes(array.ctypes.data, plane // size, row // size)
+
+
+def _weighted(array: Planes) -> _Weighted:
+    return _Weighted(_planes(array), *array.shape)

@@ -172,6 +172,10 @@ def _sum_places(pixels: NDArray[np.float64], out: NDArray[np.float64]) -> None:
 
 def _sum_cells(planes: Planes, out: Planes) -> None:
     """Sums over 2 x 2 cells."""
+    loop = fit_loop()
+    if loop is not None:
+        loop.sum_cells(planes, out)
+        return
     rows = planes[:, 0::2] + planes[:, 1::2]
     np.add(rows[:, :, 0::2], rows[:, :, 1::2], out=out)
 
@@ -337,6 +341,9 @@ def _value(coefficients: Planes, features: Sequence[Floats] | Floats) -> NDArray
 def finer(planes: Planes, there: NDArray[np.bool_]) -> Planes:
     """(K, 2 rows, 2 columns) bilinear means of (K, rows, columns) values of those cells that are `there`."""
     weighted = np.concatenate([planes * there, there[None]])
+    loop = fit_loop()
+    if loop is not None:
+        return loop.finer(weighted)
     count, rows, columns = weighted.shape
     down = np.stack(_between(weighted, 1), axis=2).reshape(count, 2 * rows, columns)
     weighted = np.stack(_between(down, 2), axis=3).reshape(count, 2 * rows, 2 * columns)
@@ -368,6 +375,9 @@ def interpolated(coefficients: Planes, features: NDArray[np.float32]) -> NDArray
     features : (6, 4, rows, columns) float32
     """
     planes = coefficients * coefficients[-1]
+    loop = fit_loop()
+    if loop is not None:
+        return loop.interpolated(planes, features)
     out = np.empty(features.shape[1:])
     for upper, down in enumerate(_between(planes, 1)):
         for left, mean in enumerate(_between(down, 2)):

@@ -1,4 +1,4 @@
-/* Moments of cells of pixels, and polynomials of least squares in windows of cells.
+/* Moments of cells of pixels, polynomials of least squares in windows of cells, and their values between cells.
 
    The operations of regression.py and reconstruction.py in their order, so that the results have the same bits.
    compiled_fits.py calls this file by ctypes, without the interpreter lock. */
@@ -15,7 +15,7 @@
 #else
 #define INLINE static inline __attribute__((always_inline))
 #endif
-enum { INTERFACE = 1 }; /* of compiled_fits.py: both change together */
+enum { INTERFACE = 2 }; /* of compiled_fits.py: both change together */
 enum { FEATURES = 6, PAIRS = FEATURES * (FEATURES + 1) / 2 };
 /* Rows of moments, as in regression.py. */
 enum {
@@ -93,6 +93,17 @@ EXPORT void illum_cell_moments(const float *pixels, int64_t rows, int64_t column
       }
       for (int plane = 0; plane < MOMENTS; plane++)
         store(out, plane, row, column, count, sums[plane]);
+    }
+}
+
+/* Sums over 2 x 2 cells. */
+EXPORT void illum_sum_cells(const Planes *cells, int64_t rows, int64_t columns, const Planes *out) {
+  for (int plane = 0; plane < MOMENTS; plane++)
+    for (int64_t row = 0; row < rows; row++) {
+      const double *upper = at(cells, plane, 2 * row, 0), *lower = at(cells, plane, 2 * row + 1, 0);
+      double *sums = at(out, plane, row, 0);
+      for (int64_t k = 0; k < columns; k++)
+        sums[k] = (upper[2 * k] + lower[2 * k]) + (upper[2 * k + 1] + lower[2 * k + 1]);
     }
 }
 
@@ -207,6 +218,74 @@ EXPORT void illum_window_fits(const Planes *cells, int64_t radius, int64_t rows,
       for (int plane = 0; plane < FIT; plane++)
         store(out, plane, row, column, count, fit[plane]);
     }
+}
+
+/* Bilinear means of cells for their four pixels or finer cells, a quarter of a cell from the centre. The last plane is
+   the weight of the cells, which the others were multiplied by; cells outside hold nothing. */
+typedef struct {
+  Planes planes;
+  int64_t number, rows, columns;
+} Weighted;
+
+INLINE double mean(double near, const double *far) { return far ? 0.75 * near + 0.25 * *far : 0.75 * near; }
+
+/* One plane of a row, from column `first` on, in the upper or lower half of the cells: the left and right means. */
+INLINE void halves(const Weighted *of, int64_t plane, int64_t row, int is_lower, int64_t first, int64_t count,
+                   double *left, double *right) {
+  double room[LANES + 2], *down = room + 1;
+  int64_t other = is_lower ? row + 1 : row - 1, start = first > 0 ? -1 : 0;
+  int64_t end = first + count < of->columns ? count + 1 : count;
+  const double *near = at(&of->planes, plane, row, first);
+  const double *far = other >= 0 && other < of->rows ? at(&of->planes, plane, other, first) : 0;
+  for (int64_t k = start; k < end; k++)
+    down[k] = mean(near[k], far ? far + k : 0);
+  for (int64_t k = 0; k < count; k++) {
+    left[k] = mean(down[k], k > start ? down + k - 1 : 0);
+    right[k] = mean(down[k], k + 1 < end ? down + k + 1 : 0);
+  }
+}
+
+/* The means over the weights, at twice the rows and columns. */
+EXPORT void illum_finer(const Weighted *of, const Planes *out) {
+  for (int64_t row = 0; row < 2 * of->rows; row++)
+    for (int64_t first = 0; first < of->columns; first += LANES) {
+      Lanes weight[2], value[2];
+      int64_t count = smaller(LANES, of->columns - first);
+      halves(of, of->number - 1, row / 2, row % 2, first, count, weight[0], weight[1]);
+      for (int64_t plane = 0; plane < of->number - 1; plane++) {
+        double *place = at(out, plane, row, 2 * first);
+        halves(of, plane, row / 2, row % 2, first, count, value[0], value[1]);
+        for (int64_t k = 0; k < count; k++)
+          for (int side = 0; side < 2; side++)
+            place[2 * k + side] = value[side][k] / greater(weight[side][k], LEAST_COUNT);
+      }
+    }
+}
+
+/* The values of polynomials at the features of pixels, (6, 4, rows, columns), into planes of each place in a cell. */
+EXPORT void illum_interpolated(const Weighted *of, const float *features, const Planes *out) {
+  for (int64_t row = 0; row < of->rows; row++)
+    for (int place = 0; place < PLACES; place += 2)
+      for (int64_t first = 0; first < of->columns; first += LANES) {
+        Lanes value[2], slope[2];
+        int64_t count = smaller(LANES, of->columns - first);
+        halves(of, CONSTANT, row, place / 2, first, count, value[0], value[1]);
+        for (int i = 0; i <= FEATURES; i++) {
+          halves(of, SLOPE + i, row, place / 2, first, count, slope[0], slope[1]);
+          for (int side = 0; side < 2; side++) {
+            const float *feature = features + ((i * PLACES + place + side) * of->rows + row) * of->columns + first;
+            double *sum = value[side], *factor = slope[side];
+            if (i < FEATURES)
+              for (int64_t k = 0; k < count; k++)
+                sum[k] += factor[k] * feature[k];
+            else
+              for (int64_t k = 0; k < count; k++)
+                sum[k] /= greater(factor[k], LEAST_COUNT); /* the last plane: the weight */
+          }
+        }
+        for (int side = 0; side < 2; side++)
+          store(out, place + side, row, first, count, value[side]);
+      }
 }
 
 EXPORT int illum_interface(void) { return INTERFACE; }

@@ -9,5 +9,5 @@ from illumcli.baking.vertex_points import vertex_points
 
 def sampled_at_vertices(context: BakeContext) -> VertexChannels:
     """The channels that the settings ask for, at the vertices."""
-    vertices = vertex_points(context.surfaces)
+    vertices = vertex_points(context.surfaces, context.threads)
     return VertexChannels(vertices, channels_at(context, vertices.points))

@@ -42,7 +42,7 @@ def fitted_to_surface(context: BakeContext) -> VertexChannels:
     """
     # Estimate obscurance at points on the surface.
     settings = context.settings
-    vertices = vertex_points(context.surfaces)
+    vertices = vertex_points(context.surfaces, context.threads)
     per_point = min(RAYS_PER_POINT, settings.samples)
     count = len(vertices.points.key) * settings.samples // per_point
     area = area_points(context.surfaces, max(count, PARTS), settings.seed)

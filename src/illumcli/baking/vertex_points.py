@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows, unit
 from illumcli.baking.points import Points, Side, Surfaces
 from illumcli.baking.wedges import CornerWedges, Triangles, corner_wedges, polygon_corners, triangles_of
+from illumcli.baking.work import in_blocks
 from illumcli.geometry.scene_geometry import SceneGeometry
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.records import Record
@@ -96,7 +97,7 @@ class VertexPoints(Points):
     def _insets(self, wedge: NDArray[np.int64], side: Side) -> tuple[Vectors, Vectors, Vectors, Vectors]:
         """Of some wedges, (K, 3) float32 each: the corner, offset from its triangle; the step inwards along
         the next edge, and the one at right angles to it; the triangle's normal on that side."""
-        vertex, triangle = self.wedges.vertex[wedge], self.wedges.triangle[wedge]
+        vertex, triangle = take_rows(self.wedges.vertex, wedge), self.wedges.triangle.take(wedge)
         corner, following, last = (
             column_major(take_rows(self.geometry.vertices, vertex[:, k]), np.float64) for k in range(3)
         )
@@ -139,16 +140,16 @@ class Vertices(Record):
     copies: int  # sides that share the point of another side at the same place
 
 
-def vertex_points(surfaces: Surfaces) -> Vertices:
+def vertex_points(surfaces: Surfaces, threads: int = 1) -> Vertices:
     """A point for every vertex and shading normal.
 
     Vertices of one object at one place with equal normals share a point: a seam of uv does not show, and a
     hard edge stays hard.
     """
     geometry, normals = surfaces.geometry, surfaces.normals
-    polygons, triangles = polygon_corners(geometry), triangles_of(geometry)
+    polygons, triangles = polygon_corners(geometry), triangles_of(geometry, threads)
     vertex = polygons.vertex
-    wedges = corner_wedges(geometry, polygons, triangles)
+    wedges = corner_wedges(geometry, polygons, triangles, threads)
 
     # corners that can cast rays: those with a normal and a wedge
     n = (
@@ -181,7 +182,7 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
         column_major(take_rows(geometry.vertices, at), F),
         _random_keys(at, len(geometry.vertices)),
         objects[at],
-        _is_flat(grouped, normal, triangles.ng),
+        _is_flat(grouped, normal, triangles.ng, threads),
         grouped,
         triangles,
     )
@@ -203,22 +204,37 @@ def vertex_points(surfaces: Surfaces) -> Vertices:
 
 def _grouped(wedges: CornerWedges, point_of_corner: NDArray[np.int64], count: int) -> Wedges:
     """The wedges of corners that have a point, point by point; `count` is that of the points."""
-    point = point_of_corner[wedges.corner]
-    order = np.argsort(point, kind="stable")
-    order = order[np.searchsorted(point[order], 0) :]
-    first = np.searchsorted(point[order], np.arange(count + 1))
-    return Wedges(first, wedges.triangle[order], wedges.vertex[order], wedges.angle[order].astype(F))
+    point = point_of_corner.take(wedges.corner)
+    first = np.zeros(count + 1, np.int64)
+    np.cumsum(np.bincount(point + 1, minlength=count + 1)[1:], out=first[1:])
+
+    # Sorting numbers that hold point and wedge is faster than a stable order of the points.
+    bits = np.int64(len(point)).item().bit_length()
+    order = np.sort((point << bits) | np.arange(len(point)))[len(point) - first[-1] :]
+    order &= (1 << bits) - 1
+    return Wedges(
+        first,
+        wedges.triangle.take(order),
+        take_rows(wedges.vertex, order),
+        wedges.angle.astype(F).take(order),
+    )
 
 
-def _is_flat(wedges: Wedges, n: Vectors, ng: Vectors) -> NDArray[np.bool_]:
+def _is_flat(wedges: Wedges, n: Vectors, ng: Vectors, threads: int) -> NDArray[np.bool_]:
     """(M,) True for points whose wedges are nearly in one plane, all around."""
-    if not len(n):
-        return np.zeros(0, bool)
-    count = np.diff(wedges.first)
-    cosine = dot(take_rows(n, np.repeat(np.arange(len(n)), count)), take_rows(ng, wedges.triangle))
-    least = np.minimum.reduceat(cosine, wedges.first[:-1])
-    total = np.add.reduceat(wedges.angle, wedges.first[:-1])
-    return (least >= FLAT_COSINE) & (total >= FLAT_ANGLE)
+    out = np.zeros(len(n), bool)
+
+    def compute(points: slice) -> None:
+        first = wedges.first[points.start : points.stop + 1]
+        own, begins = slice(first[0], first[-1]), first[:-1] - first[0]
+        normal = take_rows(n[points], np.repeat(np.arange(len(begins)), np.diff(first)))
+        cosine = dot(normal, take_rows(ng, wedges.triangle[own]))
+        least = np.minimum.reduceat(cosine, begins)
+        total = np.add.reduceat(wedges.angle[own], begins)
+        out[points] = (least >= FLAT_COSINE) & (total >= FLAT_ANGLE)
+
+    in_blocks(compute, len(n), threads)
+    return out
 
 
 def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -231,7 +247,7 @@ def _sides(vertex: NDArray[np.int32], n: Vectors) -> tuple[NDArray[np.int64], ND
     lowest = first[vertex]
 
     # among the others, equal normals are found by sorting
-    others = np.flatnonzero((n != take_rows(n, lowest)).any(axis=1))
+    others = np.flatnonzero(np.logical_or.reduce((n != take_rows(n, lowest)).T))
     if others.size:
         order, same = _equal_rows(np.ascontiguousarray(take_rows(n, others)), vertex[others])
         begins = np.append(True, ~same)
@@ -268,8 +284,11 @@ def _equal_rows(table: NDArray[np.float32], owner: Ids) -> tuple[NDArray[np.int6
         key = (key ^ column) * np.uint64(0x9E3779B97F4A7C15)
         key ^= key >> np.uint64(29)
     order = np.argsort(key, kind="stable")
-    a, b = order[:-1], order[1:]
-    same = (key[a] == key[b]) & (owner[a] == owner[b]) & (table[a] == table[b]).all(axis=1)
+    ordered = key.take(order)
+    same = ordered[:-1] == ordered[1:]
+    maybe = np.flatnonzero(same)
+    a, b = order[maybe], order[maybe + 1]
+    same[maybe] = (owner[a] == owner[b]) & (table[a] == table[b]).all(axis=1)
     return order, same
 
 

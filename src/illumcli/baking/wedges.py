@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors, column_major, cross, dot, length, take_rows
+from illumcli.baking.work import in_blocks
 from illumcli.geometry.scene_geometry import SceneGeometry, triangle_corners
 from illumcli.rays.interaction import interact
 from illumcli.records import Record
@@ -35,7 +36,7 @@ class CornerWedges(Record):
 
     corner: NDArray[np.int64]  # (K,)
     triangle: Ids  # (K,)
-    vertex: NDArray[np.int32]  # (K, 3) of the corner, of the next one and of the previous one
+    vertex: NDArray[np.int32]  # (K, 3) of the corner, of the next one and of the previous one, by columns
     angle: NDArray[np.float64]  # (K,) at the corner [rad]
 
 
@@ -48,20 +49,29 @@ def polygon_corners(geometry: SceneGeometry) -> PolygonCorners:
     )
 
 
-def triangles_of(geometry: SceneGeometry) -> Triangles:
+def triangles_of(geometry: SceneGeometry, threads: int = 1) -> Triangles:
     """Normal, edge, height and area of every triangle of the scene."""
-    every = np.arange(len(geometry.triangles), dtype=np.int32)
-    zero = np.zeros(len(every), F)
-    interaction = interact(geometry, geometry.objects, every, zero, zero, np.zeros((len(every), 3), F))
-    corner = triangle_corners(geometry.vertices, geometry.triangles)
-    edges = [corner[k - 2] - corner[k] for k in range(3)]
-    area = length(cross(edges[0], edges[1]))
-    longest = np.maximum.reduce([length(edge) for edge in edges])
-    height = np.divide(area, longest, out=np.zeros_like(area), where=longest > 0)
-    return Triangles(interaction.ng, interaction.edge, height.astype(F), area.astype(F))
+    count = len(geometry.triangles)
+    out = Triangles(np.empty((count, 3), F, order="F"), *(np.empty(count, F) for _ in range(3)))
+
+    def compute(rows: slice) -> None:
+        of = np.arange(rows.start, rows.stop, dtype=np.int32)
+        zero = np.zeros(len(of), F)
+        interaction = interact(geometry, geometry.objects[rows], of, zero, zero, np.zeros((len(of), 3), F))
+        corner = triangle_corners(geometry.vertices, geometry.triangles[rows])
+        edges = [corner[k - 2] - corner[k] for k in range(3)]
+        area = length(cross(edges[0], edges[1]))
+        longest = np.maximum.reduce([length(edge) for edge in edges])
+        out.ng[rows], out.edge[rows], out.area[rows] = interaction.ng, interaction.edge, area
+        out.height[rows] = np.divide(area, longest, out=np.zeros_like(area), where=longest > 0)
+
+    in_blocks(compute, count, threads)
+    return out
 
 
-def corner_wedges(geometry: SceneGeometry, polygons: PolygonCorners, triangles: Triangles) -> CornerWedges:
+def corner_wedges(
+    geometry: SceneGeometry, polygons: PolygonCorners, triangles: Triangles, threads: int = 1
+) -> CornerWedges:
     """The wedges of all corners.
 
     A triangle has one at each of its corners. A corner whose triangles all have area 0, because its polygon
@@ -70,16 +80,15 @@ def corner_wedges(geometry: SceneGeometry, polygons: PolygonCorners, triangles: 
     # corners of triangles that have an area
     ng, area = triangles.ng, triangles.area
     sound = np.flatnonzero(area > 0)
-    triangle, corner = geometry.triangles[sound], geometry.corners[sound]
-    rotated = [np.roll(triangle, -k, axis=1) for k in range(3)]
-    vertices = np.concatenate(rotated) if len(sound) else np.zeros((0, 3), np.int32)
-    owner = np.concatenate([corner[:, k] for k in range(3)]).astype(np.int64)
+    owner = take_rows(geometry.corners, sound).T.ravel().astype(np.int64)
     of = np.tile(sound.astype(np.int32), 3)
-    angle = np.concatenate([_angles(geometry, each, take_rows(ng, sound)) for each in rotated])
+    vertices, angle = _wedges_of_triangles(geometry, ng, sound, threads)
 
     # corners without such a triangle, in polygons that have one
     without = np.ones(len(polygons.vertex), bool)
     without[owner] = False
+    if not without.any():
+        return CornerWedges(owner, of, vertices, angle)
     largest = np.full(len(polygons.starts) - 1, -1, np.int64)
     by_area = sound[np.argsort(area[sound], kind="stable")]
     largest[geometry.polygons[by_area]] = by_area
@@ -93,17 +102,40 @@ def corner_wedges(geometry: SceneGeometry, polygons: PolygonCorners, triangles: 
         forwards = _runs_forwards(geometry, carrier, polygons.starts, polygon[lone])
         more[~forwards] = more[~forwards][:, [0, 2, 1]]
         owner, of = np.concatenate([owner, lone]), np.concatenate([of, carrier])
-        vertices = np.concatenate([vertices, more])
-        angle = np.concatenate([angle, _angles(geometry, more, take_rows(ng, carrier))])
+        vertices = np.concatenate([vertices.T, more.T], axis=1).T
+        corner, ahead, back = (_positions(geometry, more[:, k]) for k in range(3))
+        angle = np.concatenate([angle, _angles(ahead - corner, back - corner, take_rows(ng, carrier))])
     return CornerWedges(owner, of, vertices, angle)
 
 
-def _angles(geometry: SceneGeometry, vertex: NDArray[np.int32], ng: Vectors) -> NDArray[np.float64]:
-    """(K,) angle at the corner from the next vertex to the previous one about `ng`, in (0, 2 pi) [rad]."""
-    corner, following, last = (
-        column_major(take_rows(geometry.vertices, vertex[:, k]), np.float64) for k in range(3)
-    )
-    ahead, back = following - corner, last - corner
+def _wedges_of_triangles(
+    geometry: SceneGeometry, ng: Vectors, sound: NDArray[np.int64], threads: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Vertices, (3 T, 3), and angles, (3 T,), of the wedges of T triangles; those at corner 0 come first."""
+    count = len(sound)
+    vertices, angle = np.empty((3 * count, 3), np.int32, order="F"), np.empty(3 * count)
+
+    def compute(rows: slice) -> None:
+        triangle, normal = take_rows(geometry.triangles, sound[rows]), take_rows(ng, sound[rows])
+        corner = [_positions(geometry, triangle[:, k]) for k in range(3)]
+        edges = [corner[k - 2] - corner[k] for k in range(3)]
+        for k in range(3):
+            wedge = slice(k * count + rows.start, k * count + rows.stop)
+            for column in range(3):
+                vertices[wedge, column] = triangle[:, (k + column) % 3]
+            angle[wedge] = _angles(edges[k], -edges[k - 1], normal)
+
+    in_blocks(compute, count, threads)
+    return vertices, angle
+
+
+def _positions(geometry: SceneGeometry, vertex: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(K, 3) positions of vertices."""
+    return column_major(take_rows(geometry.vertices, vertex), np.float64)
+
+
+def _angles(ahead: NDArray[np.float64], back: NDArray[np.float64], ng: Vectors) -> NDArray[np.float64]:
+    """(K,) angle from one edge to the other about `ng`, in (0, 2 pi) [rad]."""
     angle: NDArray[np.float64] = np.arctan2(dot(cross(ahead, back), ng.astype(np.float64)), dot(ahead, back))
     return np.maximum(np.where(angle < -1e-6, angle + 2 * np.pi, angle), 1e-6)
 

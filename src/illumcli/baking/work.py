@@ -12,6 +12,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from illumcli.arrays import row_blocks
 from illumcli.progress import Progress
 from illumcli.records import Record
 
@@ -73,3 +74,10 @@ def run_units(
         finally:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def in_blocks(compute: Callable[[slice], None], count: int, threads: int) -> None:
+    """Call a function for every block of so many rows, several at a time."""
+    with ThreadPoolExecutor(threads, thread_name_prefix="blocks") as pool:
+        for _ in pool.map(compute, row_blocks(count)):
+            pass

@@ -152,3 +152,23 @@ loaded = [name for name in sys.modules if name.startswith((*late, "OpenImageIO")
 assert not loaded, loaded
 """
     loaded_after(code)
+
+
+def test_a_render_loads_no_material_or_library_that_it_does_not_use(tmp_path):
+    scene = tmp_path / "s.yaml"
+    scene.write_text(
+        "version: 1\nobjects: [{mesh: {shape: teapot}, material: {model: phong}}]\nambient: 1\n"
+        "obscurance: {samples: 1}\nfilm: {width: 8, height: 6, samples: 1}\n"
+    )
+    code = f"""
+import sys
+sys.argv = ["illum", "render", {str(scene)!r}, "-o", {str(tmp_path / "s.png")!r}, "--no-cache"]
+from illumcli.cli import illum
+try:
+    illum()
+except SystemExit as end:
+    assert end.code == 0
+unused = ("illumcli.models.lambert", "numpy.ma")  # the default material; masked arrays, 10 ms
+assert not set(unused) & set(sys.modules), set(unused) & set(sys.modules)
+"""
+    loaded_after(code)

@@ -294,7 +294,9 @@ def _fans_between_edges(polygons: _Polygons, corners: NDArray[Any], limit: float
     place[corners] = np.arange(len(corners))
 
     # The edges that end at these vertices, sorted so that those between the same two vertices are adjacent.
-    edge = np.unique(np.concatenate([corners, previous[corners]]))
+    ends_here = np.zeros(len(following), bool)
+    ends_here[corners] = ends_here[previous[corners]] = True
+    edge = np.flatnonzero(ends_here)
     ends = np.sort([mesh.corners[edge], mesh.corners[following[edge]]], axis=0)
     key = ends[0].astype(np.int64) * len(mesh.vertices) + ends[1]
     order = np.argsort(key, kind="stable")

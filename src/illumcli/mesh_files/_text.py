@@ -206,8 +206,8 @@ class Block(Value):
 
     def _pieces(self) -> Iterator[bytes]:
         """The data, cut between lines every `PIECE` bytes."""
-        cuts = np.unique(np.searchsorted(self.starts, np.arange(0, len(self.data), PIECE)))
-        edges = [*self.starts[cuts[cuts < len(self.starts)]].tolist(), len(self.data)]
+        cuts = set(np.searchsorted(self.starts, np.arange(0, len(self.data), PIECE)).tolist())
+        edges = [*self.starts[sorted(cuts - {len(self.starts)})].tolist(), len(self.data)]
         for start, end in pairwise(edges):
             yield self.data[start:end].tobytes()
 

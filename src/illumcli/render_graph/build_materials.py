@@ -27,14 +27,15 @@ def material_nodes(scene: Scene, loaded: SceneFile, files: FileFingerprints) -> 
     """Nodes of the material numbers, the models, and the parameters that vary."""
     # How each object's materials are chosen, and all models that may be.
     choices: list[Choice] = []
-    models: dict[Token, Any] = {DEFAULT: default_material()}
+    models: dict[Token, Any] = {}
     for thing, name in zip(scene.objects, scene.object_names(), strict=True):
         choice, chosen = _choice(scene, thing, name)
         choices.append(choice)
         models |= chosen
     imported = tuple(choice.library for choice in choices)
-    if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene
+    if any(choice.own is None for choice in choices):  # a mesh may select any material of the scene, or none
         models |= {("material", name): model for name, model in scene.materials.items()}
+        models[DEFAULT] = default_material()
 
     # Measured materials and textures are identified by the content of their files.
     tables = {file for model in models.values() for file in model.files().values()}

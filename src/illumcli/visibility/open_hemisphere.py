@@ -388,4 +388,4 @@ def extremes(points: NDArray[np.float64]) -> NDArray[np.float64]:
     if not len(points):
         return points
     single, directions = column_major(points, F), directions.astype(F)
-    return points[np.unique([int(np.argmax(single @ d)) for d in directions])].astype(F)
+    return points[sorted({int(np.argmax(single @ d)) for d in directions})].astype(F)

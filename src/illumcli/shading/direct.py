@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from types import MappingProxyType
+from collections.abc import Iterable, Mapping
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors, dot, take_or_all, take_rows
 from illumcli.lights._incident import LitPoints
 from illumcli.rays.interaction import Hits
+from illumcli.records import Record
 from illumcli.shading.rates import ShadingPoints
 from illumcli.shading.terms import evaluate, given_terms
 from illumcli.shading.textures import PointMaterials
@@ -41,11 +42,18 @@ def take_group(values: NDArray[Any], index: Ids | slice) -> NDArray[Any]:
     return values if isinstance(index, slice) else take_rows(values, index)
 
 
-class Lobes(dict[str, Vectors]):
-    """The response lobe by lobe."""
+class Lobes(Record):
+    """The response to one light by lobe: `diffuse` and `specular`, only lobes that some material has."""
 
-    mended: Mapping[str, int] = MappingProxyType({})
+    lobes: Mapping[str, Vectors]  # (C, 3) float32 each
+    column: NDArray[np.intp] | None = None
+    """(E,) which of the C rows is that of each point, if they are not the points themselves."""
+    mended: Mapping[str, int] = field(default_factory=dict)
     """Material -> number of values that its model gave as negative or not finite, and that are 0."""
+
+    def at_points(self, values: Vectors) -> Vectors:
+        """(E, 3) what the points have of values like those of lobes."""
+        return values if self.column is None else take_rows(values, self.column)
 
 
 def direct(
@@ -56,7 +64,7 @@ def direct(
     v: Vectors | None = None,
     t: Vectors | None = None,
 ) -> Lobes:
-    """The response to one light at the M samples, lobe by lobe, without shadows.
+    """The response to one light at the M samples, without shadows.
 
     Parameters
     ----------
@@ -64,18 +72,14 @@ def direct(
         Intensity or irradiance of the light.
     v, t : (E, 3) float32, optional
         Unit vectors to the eye and tangents, if a model needs them.
-
-    Returns
-    -------
-    Lobes
-        `diffuse` and `specular`, (M, 3) float32, only lobes that some material has.
     """
     known = {"n": points.n, "v": v, "t": t}
     given = {term: values for term, values in known.items() if values is not None}
-    at_points = response(materials, incident, color, given)
-    of_samples = Lobes((name, points.to_samples(value)) for name, value in at_points.items())
-    of_samples.mended = at_points.mended
-    return of_samples
+    lobes = response(materials, incident, color, given)
+    if points.are_samples:
+        return lobes
+    of_samples = {name: points.to_samples(lobes.at_points(rows)) for name, rows in lobes.lobes.items()}
+    return Lobes(of_samples, mended=lobes.mended)
 
 
 def response(
@@ -84,7 +88,7 @@ def response(
     color: tuple[float, float, float],
     given: Mapping[str, Vectors],
 ) -> Lobes:
-    """Radiance towards the eye at every point, lobe by lobe, without shadows.
+    """Radiance towards the eye at every point, without shadows.
 
     Models are evaluated at lit points only, and materials without lobes nowhere.
 
@@ -92,22 +96,17 @@ def response(
     ----------
     given : mapping
         (E, 3) vectors at all points: `n`, and `v` and `t` if a model needs them.
-
-    Returns
-    -------
-    Lobes
-        `diffuse` and `specular`, (E, 3) float32, only lobes that some material has.
     """
     models, lobes = materials.materials.models, materials.materials.lobes
     batches, parameters = materials.materials.batches, materials.parameters
     names = sorted({name for each in lobes for name in each})
     count = len(incident.index)
 
-    # Results in order of material, and one column of zeros, which points without light take theirs from.
+    # Results in order of material, and one row of zeros, which points without light take theirs from.
     by_material = {name: np.zeros((3, count + 1), F) for name in names}
     column = np.full(incident.count, count, np.intp)  # of each point
     light = np.asarray(color, F)
-    out, mended = Lobes(), Counter[str]()
+    mended = Counter[str]()
     first = 0
     material = take_or_all(materials.number, incident.index)
     batch = material if len(batches.every) == len(models) else batches.batch.take(material)
@@ -137,26 +136,25 @@ def response(
         for name, value in evaluate(own_lobes, here, wrong).items():
             np.multiply(value.T, irradiance, out=by_material[name][:, first:last])
         mended[materials.materials.names[one]] += wrong.total()
-        out.mended = +mended
         if len(points) == incident.count:
-            out.update((name, columns[:, :count].T) for name, columns in by_material.items())
-            return out
+            return Lobes({name: columns[:, :count].T for name, columns in by_material.items()}, None, +mended)
         column[points] = np.arange(first, last)
         first = last
 
-    # Back to the order of the points by a gather, which is four times as fast as scattering each group.
-    out.update((name, take_rows(columns.T, column)) for name, columns in by_material.items())
-    return out
+    # A gather brings them back to the order of the points, four times as fast as scattering each group.
+    return Lobes({name: columns.T for name, columns in by_material.items()}, column, +mended)
 
 
-def sum_lobes(hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
+def sum_lobes(hits: Hits, direct: Lobes, shadow: Floats | None = None) -> Vectors:
     """(M, 3) all lobes of one light, shadowed."""
-    return _shadowed(add(hits, **direct), shadow)
+    lobes = direct.lobes.values()
+    return _shadowed(direct.at_points(total(lobes)) if lobes else black(hits), shadow)
 
 
-def one_lobe(name: str, hits: Hits, direct: dict[str, Vectors], shadow: Floats | None = None) -> Vectors:
+def one_lobe(name: str, hits: Hits, direct: Lobes, shadow: Floats | None = None) -> Vectors:
     """(M, 3) one lobe of one light, shadowed."""
-    return _shadowed(direct[name] if name in direct else black(hits), shadow)
+    has_lobe = name in direct.lobes
+    return _shadowed(direct.at_points(direct.lobes[name]) if has_lobe else black(hits), shadow)
 
 
 def irradiance(
@@ -174,9 +172,12 @@ def irradiance(
 
 def add(hits: Hits, **parts: Vectors) -> Vectors:
     """(M, 3) the sum of the parts, in their order."""
-    if not parts:
-        return black(hits)
-    first, *others = parts.values()
+    return total(parts.values()) if parts else black(hits)
+
+
+def total(parts: Iterable[Vectors]) -> Vectors:
+    """(N, 3) the sum of the parts, of which there is at least one, in their order."""
+    first, *others = parts
     if not others:
         return first
     out = first + others[0]

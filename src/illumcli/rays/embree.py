@@ -70,10 +70,11 @@ class Tracer:
             self.rays += len(missed)
             d = take_rows(directions, missed)
             o = take_rows(origins, missed // (len(directions) // len(origins)))
-            turned = d + RETRY_TURN * np.abs(np.roll(d, -1, axis=1))
+            turned = d + RETRY_TURN * np.abs(d[:, [1, 2, 0]])
             again = np.flatnonzero(self._loop.occluded(o, turned, np.asarray(NO_LIMIT), coherent))
-            closest = self._closest(take_rows(o, again), take_rows(turned, again), coherent)
-            hits.replace(missed[again], closest)
+            if again.size:
+                closest = self._closest(take_rows(o, again), take_rows(turned, again), coherent)
+                hits.replace(missed[again], closest)
         return hits
 
     def _closest(self, origins: Vectors, directions: Vectors, coherent: bool) -> Closest:

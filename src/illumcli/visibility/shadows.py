@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, column_major, dot, length, take_rows, unit
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, length, take_or_all, take_rows, unit
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.smooth_parts import SmoothParts
 from illumcli.lights._incident import LitPoints
@@ -63,10 +63,10 @@ class SmoothSurface:
 
     def curved(self, sample: NDArray[np.intp]) -> NDArray[np.intp]:
         """Indices into `sample` of the samples that lie below the implied surface."""
-        unknown = sample.compress(~self._is_known.take(sample))
-        if unknown.size:
+        if self._searches <= SEARCHES and (unknown := sample.compress(~self._is_known.take(sample))).size:
             self._searches += 1
-            self._compute(unknown if self._searches <= SEARCHES else np.flatnonzero(~self._is_known))
+            is_last = self._searches > SEARCHES
+            self._compute(np.flatnonzero(~self._is_known) if is_last else np.sort(unknown))
         return np.flatnonzero(self._is_curved.take(sample))
 
     def _compute(self, sample: NDArray[Any]) -> None:
@@ -134,7 +134,7 @@ def shadow(
     # One shadow ray for each sample that the light may reach.
     lit, smooth = shadow_candidates, smooth_surface
     delta = np.zeros(lit.count, F)
-    origins = column_major(take_rows(ray_origins, lit.index))
+    origins = column_major(take_or_all(ray_origins, lit.index))
     hidden = tracer.occluded(origins, lit.l, lit.distance, coherent=True)
 
     # A second one, from the implied surface, where it is blocked.

@@ -16,7 +16,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from illumcli.arrays import dot, take_rows
+from illumcli.arrays import dot
 from illumcli.lights import _incident as light_at
 from illumcli.lights._incident import LitPoints
 from illumcli.models._base import IlluminationModel
@@ -64,7 +64,7 @@ class Skip:
     """More of them."""
 
 
-def everywhere(light, render_space, points):
+def everywhere(light, render_space, points, ray_order=None):
     """Every point is asked about, those that get nothing with scale 0."""
     sample = light.sample_at(points.position, render_space)
     reached = (sample.irradiance_scale > 0) & (dot(points.n, sample.l) > 0)
@@ -73,20 +73,9 @@ def everywhere(light, render_space, points):
     return LitPoints(index, len(index), sample.l, sample.distance, scale)
 
 
-def asked(light, render_space, points, shadow):
-    """Every point that is not in shadow, those that get nothing with scale 0."""
-    lit = everywhere(light, render_space, points)
-    free = np.flatnonzero(shadow)
-    index, l, distance, scale = (
-        take_rows(part, free) for part in (lit.index, lit.l, lit.distance, lit.irradiance_scale)
-    )
-    return LitPoints(index, lit.count, l, distance, scale)
-
-
-def dimmed(light, render_space, points, shadow):
+def dimmed(incident, shadow):
     """Every lit point is evaluated, those in shadow with scale 0."""
-    lit = light_at.incident(light, render_space, points)
-    return replace(lit, irradiance_scale=lit.irradiance_scale * shadow.take(lit.index))
+    return replace(incident, irradiance_scale=incident.irradiance_scale * shadow.take(incident.index))
 
 
 def yes(*_):
@@ -105,11 +94,7 @@ DARK = ((needs, "is_on", yes),)
 AMBIENT = ((needs, "is_ambient", yes),)
 SKIPS = (
     Skip("lights of intensity 0", ("lights.rim.intensity=0",), DARK),
-    Skip(
-        "points a light does not reach",
-        (),
-        ((light_at, "incident", everywhere), (light_at, "unshadowed", asked)),
-    ),
+    Skip("points a light does not reach", (), ((light_at, "incident", everywhere),)),
     Skip("points in shadow", (), ((light_at, "unshadowed", dimmed),)),
     Skip("lobes that are black", ("materials.clay.specular=0",), ((IlluminationModel, "_is_always", no),)),
     Skip("ambient light of 0", ("ambient=0",), AMBIENT),

@@ -120,6 +120,7 @@ def test_a_second_run_makes_neither_meshes_nor_rays_and_the_same_bits(scene, sto
         same(cold[0], again)
         assert rays == {}
         assert not made & {"meshes", "tracer", "hits", "obscurance", "shadow:key", "shadow:rim"}
+        assert not made & {"incident:key", "incident:rim"}  # the lit points are known by their shadows
         assert "geometry" in reused
 
 

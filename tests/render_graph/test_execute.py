@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from illumcli.errors import InputError
-from illumcli.film.tiles import MIN_TILE_SAMPLES, tiles
+from illumcli.film.tiles import MIN_TILE_SAMPLES, Samples, Tile, tiles
 from illumcli.graph import Node
 from illumcli.layers import NAMES
+from illumcli.rays.interaction import Hits
 from illumcli.render_graph.execute import RenderStats, Run, bands, run_once
 from illumcli.render_graph.explain import expected_rays, why_not
 from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.stages import ray_order
 from illumcli.scene.load import load
 from planned import layers_of, planned
 
@@ -111,6 +113,33 @@ def test_tiles_cover_every_pixel_once_and_end_small(width, height, side, samples
     assert last == sorted(last, reverse=True)
     if width * height * samples > 100 * MIN_TILE_SAMPLES:
         assert rows[-1][-1].width <= side / 4
+
+
+def test_tiles_are_about_equal():
+    rows = tiles(320, 180, 176, 1)
+    assert [[(tile.width, tile.height) for tile in row] for row in rows] == [
+        [(160, 96), (160, 96)],
+        [(160, 84), (80, 84), (80, 84)],
+    ]
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (13, 6), (1, 5), (64, 3)])
+def test_a_tile_in_blocks_has_every_pixel_once_and_whole_blocks_in_a_row(width, height):
+    order = Tile(5, 7, width, height).in_blocks()
+    assert np.array_equal(np.sort(order), np.arange(width * height))
+    y, x = np.divmod(order, width)
+    assert np.count_nonzero(np.diff(y // 4 * width + x // 4)) == -(-width // 4) * -(-height // 4) - 1
+
+
+def test_shadow_rays_are_cast_in_blocks_of_pixels_without_those_that_miss():
+    tile = Tile(0, 0, 6, 5)
+    samples = Samples(*tile.pixels(), np.zeros((60, 2)), 2)
+    hit = np.delete(np.arange(60, dtype=np.int32), [3, 4, 30])
+    order = ray_order(tile, samples, Hits(hit, *[hit] * 4))
+    expected = [2 * pixel + each for pixel in tile.in_blocks() for each in (0, 1)]
+    assert hit[order].tolist() == [sample for sample in expected if sample in hit]
+    whole = np.arange(60, dtype=np.int32)
+    assert ray_order(tile, samples, Hits(whole, *[whole] * 4)).tolist() == expected
 
 
 def only_once(*steps):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ TILES = 24
 """Tiles of an image, approximately, for threads to share; fewer if they would be too small."""
 TILES_WITH_MARGINS = 12
 """The same where every tile is computed with a wide margin."""
-MANY_NODES, MIN_SAMPLES_OF_MANY = 128, 1 << 14
+MANY_NODES, MIN_SAMPLES_OF_MANY = 128, 1 << 15
 """If at least this many nodes run per tile, the smallest tiles are larger: threads wait for each other after
 each node, at the interpreter lock."""
 
@@ -49,6 +50,10 @@ class Tile(Value):
         x, y = np.arange(self.x, self.x + self.width), np.arange(self.y, self.y + self.height)
         return np.tile(x, self.height), np.repeat(y, self.width)
 
+    def in_blocks(self) -> NDArray[np.intp]:
+        """(P,) the pixels in blocks of 4 by 4, and 2 by 2 within these: neighbours in all directions."""
+        return _in_blocks(self.width, self.height)
+
     def grown(self, border: int, width: int, height: int) -> Tile:
         """The rectangle with a border of so many pixels, clipped to a film of this size."""
         x, y = max(self.x - border, 0), max(self.y - border, 0)
@@ -63,22 +68,30 @@ class Tile(Value):
 
 def tiles(width: int, height: int, side: int, samples: int, first: int = 0) -> list[list[Tile]]:
     """The tiles of an image of this size, or of `height` rows of one from its row `first` on, row by row:
-    squares, except at the end of the last row.
+    about squares of at most this side, and about equal, so that threads have equal work.
 
-    There each tile is half of the remaining width, down to `MIN_TILE_SAMPLES`, so that all threads finish at
-    about the same time.
+    At the end of the last row each tile is half of the remaining width, down to `MIN_TILE_SAMPLES`, so that
+    all threads finish at about the same time.
     """
     out = []
-    for y in range(0, height, side):
-        tile_height, last = min(side, height - y), 0 < y >= height - side
+    across, down = _equal_part(width, side), _equal_part(height, side)
+    for y in range(0, height, down):
+        tile_height, last = min(down, height - y), 0 < y >= height - down
         row, x = [], 0
         while rest := width - x:
             half = min(-(-rest // 16) * 8, rest)
-            ending = last and rest <= 2 * side and half * tile_height * samples >= MIN_TILE_SAMPLES
-            row.append(Tile(x, first + y, half if ending else min(side, rest), tile_height))
+            ending = last and rest <= 2 * across and half * tile_height * samples >= MIN_TILE_SAMPLES
+            row.append(Tile(x, first + y, half if ending else min(across, rest), tile_height))
             x += row[-1].width
         out.append(row)
     return out
+
+
+def _equal_part(length: int, longest: int) -> int:
+    """The length of about equal parts, at most `longest`; a multiple of 8 if that is one."""
+    step = 8 if longest % 8 == 0 else 1
+    parts = -(-length // longest)
+    return min(longest, -(-length // (parts * step)) * step)
 
 
 class Scattered(Tile):
@@ -100,6 +113,20 @@ class Scattered(Tile):
 
     def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return self.columns, self.rows
+
+    def in_blocks(self) -> NDArray[np.intp]:
+        return np.arange(self.width)
+
+
+@lru_cache(maxsize=32)
+def _in_blocks(width: int, height: int) -> NDArray[np.intp]:
+    """`Tile.in_blocks` of a size."""
+    x, y = np.arange(width), np.arange(height)[:, None]
+    block = y // 4 * -(-width // 4) + x // 4
+    within = (x & 1) | (y & 1) << 1 | (x & 2) << 1 | (y & 2) << 2
+    order = np.argsort((block << 4 | within).ravel())
+    order.flags.writeable = False
+    return order
 
 
 class Samples(Record):

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import F, Floats, Vectors, column_major, dot, take_or_all
+from illumcli.arrays import F, Floats, Vectors, column_major, dot, take_or_all, take_rows
 from illumcli.lights._base import Light, LightSample
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
@@ -16,7 +16,7 @@ from illumcli.render_space import RenderSpace
 class LitPoints(Record):
     """The points that a light reaches if nothing occludes it, with the incident light there."""
 
-    index: NDArray[np.intp]  # (K,) indices of the points, ascending: those with n.l > 0 and some light
+    index: NDArray[np.intp]  # (K,) the points with n.l > 0 and some light; ascending if K is `count`
     count: int  # of all points
     l: Vectors  # (K, 3) unit, to the light
     distance: Floats  # (K,) to the light, in radii
@@ -39,31 +39,53 @@ class Oriented(Placed, Protocol):
         """(N, 3) unit."""
 
 
-def incident(light: Light, render_space: RenderSpace, points: Oriented) -> LitPoints:
-    """The points in the light's range that face it; at others no model is evaluated."""
+def incident(
+    light: Light, render_space: RenderSpace, points: Oriented, ray_order: NDArray[np.intp] | None = None
+) -> LitPoints:
+    """The points in the light's range that face it; at others no model is evaluated.
+
+    Parameters
+    ----------
+    ray_order : (N,) optional
+        The points in the order in which shadow rays are cast.
+    """
     sample = light.sample_at(points.position, render_space)
-    reached = (sample.irradiance_scale > 0) & (dot(points.n, sample.l) > 0)
-    return _lit(sample, np.flatnonzero(reached))
+    reached = sample.irradiance_scale > 0
+    reached &= dot(points.n, sample.l) > 0
+    return _lit(sample, reached, ray_order)
 
 
-def shadow_candidates(light: Light, render_space: RenderSpace, interaction: Placed) -> LitPoints:
+def shadow_candidates(
+    light: Light, render_space: RenderSpace, interaction: Placed, ray_order: NDArray[np.intp] | None = None
+) -> LitPoints:
     """The samples in the light's range, facing it or not: a vertex that a sample is interpolated from may
     face the light where the sample does not."""
     sample = light.sample_at(column_major(interaction.position, F), render_space)
-    return _lit(sample, np.flatnonzero(sample.irradiance_scale > 0))
+    return _lit(sample, sample.irradiance_scale > 0, ray_order)
 
 
-def unshadowed(light: Light, render_space: RenderSpace, points: Oriented, shadow: Floats) -> LitPoints:
-    """The lit points that are not in shadow; points must be samples.
+def unshadowed(incident: LitPoints, shadow: Floats) -> LitPoints:
+    """The lit points that are not in shadow; points must be samples."""
+    lit = np.flatnonzero(shadow.take(incident.index))
+    if len(lit) == len(incident.index):
+        return incident
+    parts = (take_rows(part, lit) for part in (incident.l, incident.distance, incident.irradiance_scale))
+    return LitPoints(incident.index.take(lit), incident.count, *parts)
 
-    `shadow` alone decides: it is 0 where the light does not reach.
-    """
+
+def unshadowed_by_shadow(
+    light: Light, render_space: RenderSpace, points: Oriented, shadow: Floats
+) -> LitPoints:
+    """The same without the light at the other points: `shadow` is 0 where the light does not reach."""
     index = np.flatnonzero(shadow != 0)
     sample = light.sample_at(take_or_all(points.position, index), render_space)
     parts = sample.l, sample.distance, sample.irradiance_scale
     return LitPoints(index, len(points.position), *parts)
 
 
-def _lit(sample: LightSample, index: NDArray[np.intp]) -> LitPoints:
+def _lit(sample: LightSample, reached: NDArray[np.bool_], order: NDArray[np.intp] | None) -> LitPoints:
+    if order is None or reached.all():
+        order = np.arange(len(reached))
+    index = order.compress(reached.take(order))
     parts = (take_or_all(part, index) for part in (sample.l, sample.distance, sample.irradiance_scale))
     return LitPoints(index, len(sample.l), *parts)

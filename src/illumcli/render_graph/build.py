@@ -34,7 +34,7 @@ from illumcli.records import Value
 from illumcli.render_graph import needs, stages
 from illumcli.render_graph.build_adaptive import FITTED, adaptive_nodes
 from illumcli.render_graph.build_geometry import baked_files, baked_mesh_nodes, geometry_nodes
-from illumcli.render_graph.build_lights import light_nodes, sum_nodes
+from illumcli.render_graph.build_lights import light_nodes, shortcuts, sum_nodes
 from illumcli.render_graph.build_materials import material_nodes
 from illumcli.render_graph.replicates import error_nodes
 from illumcli.scene.access import resolve
@@ -78,6 +78,9 @@ class Graph(Value):
     """Buffers of the whole scene with known values, which need no node."""
     loaders: Mapping[str, Node] = field(default_factory=dict, repr=False)
     """Nodes that load a buffer of one view instead of computing it."""
+    shortcuts: Mapping[str, Node] = field(default_factory=dict, repr=False)
+    """Buffer -> a node that computes the same from other inputs, for use where those that it has in common
+    with the buffer's own node are loaded."""
     culled: tuple[int, ...] = ()
     """Numbers of the culled objects, which cannot affect any view."""
     reasons: Mapping[str, str] = field(default_factory=dict, repr=False)
@@ -128,7 +131,8 @@ def build(
     by_name |= adaptive_nodes(scene, by_name, GIVEN)
     if not needs.reconstructs(scene):  # there an audit of the finished picture makes the error
         by_name |= error_nodes(by_name, scene.seed, scene.film.background, counts, GIVEN)
-    return Graph(scene, views, by_name, reasons=_reasons(scene, by_name))
+    known_shorter = {name: node for name, node in shortcuts(scene).items() if name in by_name}
+    return Graph(scene, views, by_name, shortcuts=known_shorter, reasons=_reasons(scene, by_name))
 
 
 def _surface_nodes(scene: Scene) -> list[Node]:

@@ -31,6 +31,7 @@ def light_nodes(scene: Scene) -> list[Node]:
         Node.of(SmoothParts, "smooth_parts", normals="corner_normals"),
         Node.of(partial(smooth_surface, flat), "smooth_surface"),
     ] if smooth else []  # fmt: skip
+    nodes.append(Node.of(stages.ray_order))
     implied = {"smooth_surface": "smooth_surface"} if smooth and scene.terminator == "smooth" else {}
 
     eye: dict[str, str] = {term: term for term in ("v", "t") if term in needs.needed_terms(scene)}
@@ -44,25 +45,40 @@ def light_nodes(scene: Scene) -> list[Node]:
     return nodes
 
 
+def shortcuts(scene: Scene) -> dict[str, Node]:
+    """Nodes that know the lit points of a light from its shadow, without the light at the other points."""
+    nodes = [
+        Node.of(
+            partial(incident.unshadowed_by_shadow, light.without_color()),
+            f"unshadowed:{name}",
+            shadow=f"shadow:{name}",
+        )
+        for name, light in scene.named_lights().items()
+    ]
+    return {node.output: node for node in nodes}
+
+
 def _shadow_nodes(name: str, light: Light, at_samples: bool, implied: Mapping[str, str]) -> list[Node]:
     """Nodes of a light's unoccluded incident light and of its shadow.
 
     `implied` names the smooth surface that shadow rays may start from, if there is one.
     """
     colorless = light.without_color()
-    nodes = [Node.of(partial(incident.incident, colorless), f"incident:{name}")]
+    order = {"ray_order": "ray_order"} if light.shadows else {}
+    arriving = partial(incident.incident, colorless)
+    nodes = [Node.of(arriving, f"incident:{name}", **(order if at_samples else {}))]
     if not light.shadows:
         nodes.append(Node.of(stages.no_shadow, f"shadow:{name}"))
     if at_samples:  # the samples that need shadow rays are the points where models are evaluated
         candidates = f"incident:{name}"
     else:
         candidates = f"shadow_candidates:{name}"
-        nodes.append(Node.of(partial(incident.shadow_candidates, colorless), candidates))
+        nodes.append(Node.of(partial(incident.shadow_candidates, colorless), candidates, **order))
     if light.shadows:
         nodes.append(Node.of(shadow, f"shadow:{name}", shadow_candidates=candidates, **implied))
         if at_samples:  # models are not evaluated in shadow
-            unshadowed = partial(incident.unshadowed, colorless)
-            nodes.append(Node.of(unshadowed, f"unshadowed:{name}", shadow=f"shadow:{name}"))
+            lit = {"incident": f"incident:{name}", "shadow": f"shadow:{name}"}
+            nodes.append(Node.of(incident.unshadowed, f"unshadowed:{name}", **lit))
     return nodes
 
 

@@ -73,7 +73,15 @@ def substitute_cached(
 
     # Depth first; the inputs of loaded buffers are not visited.
     pending, visited = list(buffers)[::-1], set(GIVEN)
-    while pending:
+    undecided: list[str] = []  # buffers with a shortcut: is what both nodes read loaded?
+    while pending or undecided:
+        if not pending:
+            name = undecided.pop()
+            node = graph.nodes[name]
+            if all(need in loaders for need in _shared_inputs(graph, name)):
+                node = loaders[name] = graph.shortcuts[name]
+            pending += list(node.inputs.values())[::-1]
+            continue
         name = pending.pop()
         if name in visited:
             continue
@@ -104,8 +112,18 @@ def substitute_cached(
                 in_memory |= {key: of_tiles.keys()} if of_tiles is not None else {}
             elif cache.accepts(name):
                 keeps[name] = key
+        if name in graph.shortcuts and name not in loaders:
+            undecided.append(name)
+            pending += _shared_inputs(graph, name)
+            continue
         pending += list(node.inputs.values())[::-1]
     return replace(graph, loaders=loaders), Lookup(reused, keeps, pixels, in_memory)
+
+
+def _shared_inputs(graph: Graph, name: str) -> list[str]:
+    """The buffers that a node and its shortcut read."""
+    own, shorter = graph.nodes[name].inputs.values(), graph.shortcuts[name].inputs.values()
+    return [need for need in own if need in shorter]
 
 
 def _pixel_loader(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Vectors
 from illumcli.cache.fingerprint import FileFingerprint
 from illumcli.errors import InputError
-from illumcli.film.tiles import Samples
+from illumcli.film.tiles import Samples, Tile
 from illumcli.film.view import View, distance
 from illumcli.geometry.bounds import ObjectBounds
 from illumcli.geometry.mesh import Mesh
@@ -134,6 +134,19 @@ def alpha(hits: Hits) -> Floats:
 def no_shadow(hits: Hits) -> Floats:
     """(M,) delta of a light that casts no shadow."""
     return np.ones(len(hits.sample), F)
+
+
+def ray_order(tile: Tile, samples: Samples, hits: Hits) -> NDArray[np.intp]:
+    """(M,) hits in the order in which shadow rays are cast: those of neighbouring pixels in one packet."""
+    order, each = tile.in_blocks(), samples.per_pixel
+    if each > 1:
+        order = (order[:, None] * each + np.arange(each)).ravel()
+    if len(hits.sample) == len(order):
+        return order
+    hit = np.full(len(order), -1, np.intp)
+    hit[hits.sample] = np.arange(len(hits.sample))
+    hit = hit.take(order)
+    return hit.compress(hit >= 0)
 
 
 def obscurance_draws(seed: int, samples: Samples, hits: Hits) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from typing import Any
 
 ROOT = Path(__file__).parent
 PACKAGE = ROOT / "src" / "illumcli"
-SOURCES = (PACKAGE / "rays" / "packets.c", PACKAGE / "visibility" / "regression.c")
+SOURCES = tuple(PACKAGE / name for name in ("rays/packets.c", "rays/samples.c", "visibility/regression.c"))
 REQUIRED = "ILLUM_REQUIRE_PACKETS"
 """Environment variable; with 1, an installation without the libraries fails, and so do their tests."""
 
@@ -67,7 +67,7 @@ def _with_cc(source: Path, made: Path) -> None:
     compiler = shlex.split(os.environ.get("CC") or "cc")
     flags = ["-O3", "-std=c99", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden"]
     more = shlex.split(os.environ.get("ARCHFLAGS", ""))
-    command = [*compiler, *flags, *more, "-o", str(made), str(source)]
+    command = [*compiler, *flags, *more, "-o", str(made), str(source), "-lm"]
     subprocess.run(command, check=True, capture_output=True, text=True)
 
 

@@ -29,7 +29,7 @@ def project(tmp_path):
     package = tmp_path / "src" / "illumcli"
     for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE", ".gitignore"):
         shutil.copy(ROOT / name, tmp_path)
-    for name in ("__init__.py", "rays/packets.c", "visibility/regression.c"):
+    for name in ("__init__.py", "rays/packets.c", "rays/samples.c", "visibility/regression.c"):
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "src" / "illumcli" / name, package / name)
     return tmp_path
@@ -63,8 +63,8 @@ def test_without_a_compiler_or_by_request_the_wheel_is_pure(project, environment
     assert reason in done.stderr
     name, files = only_wheel(project)
     assert name.endswith("-py3-none-any.whl")
-    assert {"packets.c", "regression.c"} <= files
-    assert not files & {"_packets.so", "_regression.so"}
+    assert {"packets.c", "samples.c", "regression.c"} <= files
+    assert not files & {"_packets.so", "_samples.so", "_regression.so"}
 
 
 @WITH_COMPILER
@@ -74,7 +74,7 @@ def test_with_a_compiler_the_wheel_is_of_its_platform(project):
     name, files = only_wheel(project)
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     assert name.endswith(f"-py3-none-{platform}.whl")
-    assert {"_packets.so", "_regression.so"} <= files
+    assert {"_packets.so", "_samples.so", "_regression.so"} <= files
 
 
 def test_a_required_loop_that_cannot_be_compiled_stops_the_build(project):

@@ -9,6 +9,9 @@ from __future__ import annotations
 import ctypes
 import os
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 SWITCH = "ILLUM_PACKETS"
 """Environment variable; 0 turns the compiled loops off."""
@@ -17,6 +20,18 @@ SWITCH = "ILLUM_PACKETS"
 def are_switched_off() -> bool:
     """True if the environment turns the compiled loops off."""
     return os.environ.get(SWITCH) == "0"
+
+
+class CVectors(ctypes.Structure):
+    """(N, 3) numbers of 32 bits, of any strides, as the loops take them; the array must outlive it."""
+
+    _fields_ = (("data", ctypes.c_void_p), ("stride", ctypes.c_int64), ("component", ctypes.c_int64))
+
+    @classmethod
+    def of(cls, array: NDArray[Any]) -> CVectors:
+        """Those of an array."""
+        assert array.itemsize == 4
+        return cls(array.ctypes.data, *array.strides)
 
 
 def compiled_library(module: str, name: str, interface: int) -> ctypes.CDLL | None:

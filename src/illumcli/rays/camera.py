@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from illumcli.arrays import F, Floats, Vectors, column_major
 from illumcli.geometry.bounds import ObjectBounds, transformed_vertices
 from illumcli.geometry.extent import take_used
 from illumcli.geometry.mesh import Mesh
+from illumcli.rays.compiled_samples import sample_loop
 from illumcli.rays.viewpoints import Camera, PixelFilter, Point
 from illumcli.records import Record
 from illumcli.render_space import RenderSpace
@@ -147,36 +148,46 @@ def camera_rays(
     start_distance : (N,) float64
         Distance of each origin from the eye or the view plane, in radii.
     """
-    # Coordinates on an image plane of height 2, y upwards.
     right, up, forward = axes(camera)
-    x = (2 * points[:, 0] - width) / height
-    y = 1 - 2 * points[:, 1] / height
     eye = render_space.from_world(camera.position)
     if camera.projection == "perspective":
-        # Unit directions; right, up and forward are orthonormal, so lengths need no vector.
-        slope = np.tan(np.radians(camera.fov) / 2)
-        x, y = slope * x, slope * y
-        scale = 1 / np.sqrt(1 + x * x + y * y)
-        x *= scale
-        y *= scale
-        d = _weighted_sum((scale, forward), (x, right), (y, up))
+        pinhole = {
+            **{"right": right, "up": up, "forward": forward, "eye": eye},
+            **{"right_eye": right @ eye, "up_eye": up @ eye, "forward_eye": forward @ eye},
+            **{"slope": np.tan(np.radians(camera.fov) / 2), "width": width, "height": height},
+        }
+        loop = sample_loop()
+        return Rays(*(loop.camera_rays(pinhole, points) if loop else _pinhole_rays(pinhole, points)))
 
-        # Move each origin along its ray to the scene's sphere.
-        along = -(scale * (forward @ eye) + x * (right @ eye) + y * (up @ eye))
-        start_distance = np.maximum(along - CLEAR, 0)
-        start = (
-            _weighted_sum((np.broadcast_to(1.0, len(x)), eye))
-            if not start_distance.any()
-            else eye + start_distance[:, None] * d
-        )
-    else:
-        # Parallel rays from the view plane, which moves to the sphere as a whole.
-        half = camera.extent / 2 / render_space.radius
-        d = np.broadcast_to(forward, (len(x), 3))
-        plane = _weighted_sum((half * x, right), (half * y, up))
-        start_distance = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
-        start = eye + start_distance[0] * forward + plane if len(x) else plane
+    # Parallel rays from the view plane, which moves to the sphere as a whole.
+    x, y = _on_image_plane(points, width, height)
+    half = camera.extent / 2 / render_space.radius
+    d = np.broadcast_to(forward, (len(x), 3))
+    plane = _weighted_sum((half * x, right), (half * y, up))
+    start_distance = np.full(len(x), max(-(forward @ eye) - CLEAR, 0))
+    start = eye + start_distance[0] * forward + plane if len(x) else plane
     return Rays(column_major(start, F), column_major(d, F), start_distance)
+
+
+def _on_image_plane(points: NDArray[np.float64], width: int, height: int) -> tuple[Floats, Floats]:
+    """Coordinates of film positions on an image plane of height 2, y upwards."""
+    return (2 * points[:, 0] - width) / height, 1 - 2 * points[:, 1] / height
+
+
+def _pinhole_rays(pinhole: Mapping[str, Any], points: NDArray[np.float64]) -> tuple[Vectors, Vectors, Floats]:
+    """The origins, directions and distances of the starts of rays; as the compiled loop computes them."""
+    # Unit directions; right, up and forward are orthonormal, so lengths need no vector.
+    x, y = (pinhole["slope"] * each for each in _on_image_plane(points, pinhole["width"], pinhole["height"]))
+    scale = 1 / np.sqrt(1 + x * x + y * y)
+    x *= scale
+    y *= scale
+    d = _weighted_sum((scale, pinhole["forward"]), (x, pinhole["right"]), (y, pinhole["up"]))
+
+    # Move each origin along its ray to the scene's sphere.
+    along = -(scale * pinhole["forward_eye"] + x * pinhole["right_eye"] + y * pinhole["up_eye"])
+    start_distance = np.maximum(along - CLEAR, 0)
+    start = pinhole["eye"] + start_distance[:, None] * d
+    return column_major(start, F), column_major(d, F), start_distance
 
 
 CLEAR = 1.25

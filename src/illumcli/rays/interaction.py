@@ -26,6 +26,7 @@ from illumcli.geometry.planar import PlanarPolygons
 from illumcli.geometry.scene_geometry import CornerVectors, SceneGeometry
 from illumcli.geometry.transforms import cofactors
 from illumcli.rays.camera import Rays
+from illumcli.rays.compiled_samples import sample_loop
 from illumcli.rays.corner_weights import Corners, CornerWeights, MeanCorners, TriangleCorners
 from illumcli.rays.embree import Tracer
 from illumcli.rays.offsets import effective_edge
@@ -73,6 +74,12 @@ def interact(
     geometry: SceneGeometry, objects: Ids, triangle: Ids, u: Floats, v: Floats, towards_eye: Vectors
 ) -> SurfaceInteraction:
     """Surface interactions of hits, computed in float64 from the float32 vertices that Embree has."""
+    loop = sample_loop()
+    if loop is not None and geometry.instances is None:
+        return SurfaceInteraction(
+            *loop.surface(geometry.vertices, geometry.triangles, (triangle, u, v), towards_eye)
+        )
+
     # The triangles' first vertices and edges.
     v0, e1, e2 = (geometry.corner_positions(objects, triangle, k) for k in range(3))
     e1 -= v0

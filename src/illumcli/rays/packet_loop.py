@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, take_rows
-from illumcli.compiled import compiled_library
+from illumcli.compiled import CVectors, compiled_library
 from illumcli.rays.embree_library import embree_library, loaded_library
 from illumcli.rays.embree_tree import EmbreeTree, native_widths
 from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
@@ -40,10 +40,6 @@ COHERENT = _Arguments(1 << 16, 0xFFFFFFFF)
 time with it, rays in all directions up to twice as long. With instances the answers change in some rays."""
 
 
-class _Vectors(ctypes.Structure):
-    _fields_ = (("data", ctypes.c_void_p), ("stride", ctypes.c_int64), ("component", ctypes.c_int64))
-
-
 class _Query(ctypes.Structure):
     _fields_ = (
         ("function", ctypes.c_void_p),
@@ -59,8 +55,8 @@ class _Rays(ctypes.Structure):
         ("first", ctypes.c_int64),
         ("end", ctypes.c_int64),
         ("rays_per_origin", ctypes.c_int64),
-        ("origins", _Vectors),
-        ("directions", _Vectors),
+        ("origins", CVectors),
+        ("directions", CVectors),
         ("limits", ctypes.c_void_p),
         ("limit_stride", ctypes.c_int64),
     )
@@ -79,8 +75,8 @@ class _Patterns(ctypes.Structure):
         ("number", ctypes.c_void_p),
         ("origin_of_ray", ctypes.c_void_p),
         ("first_mirrored", ctypes.c_void_p),
-        ("origins", _Vectors),
-        ("normals", _Vectors),
+        ("origins", CVectors),
+        ("normals", CVectors),
         ("limit", ctypes.c_float),
         ("least_height", ctypes.c_float),
     )
@@ -199,13 +195,13 @@ class PacketLoop:
             query=self._query("rtcOccluded" if out.distance is None else "rtcIntersect"),
             samples=samples,
             origins_per_point=rays.origins_per_point,
-            origins=_vectors(rays.origins),
+            origins=CVectors.of(rays.origins),
             limit=limit,
             least_height=rays.least_height,
             **{name: _address_of(array) for name, array in arrays.items()},
         )
         if rays.normals is not None:
-            structure.normals = _vectors(rays.normals)
+            structure.normals = CVectors.of(rays.normals)
 
         # The arrays to fill.
         wanted = {name: _address_of(array) for name, array in vars(out).items() if array is not None}
@@ -226,8 +222,8 @@ class PacketLoop:
         return _Rays(
             query=self._query(query),
             rays_per_origin=count // max(len(origins), 1) or 1,
-            origins=_vectors(origins),
-            directions=_vectors(directions),
+            origins=CVectors.of(origins),
+            directions=CVectors.of(directions),
             limits=limits.ctypes.data,
             limit_stride=1 if limits.ndim else 0,
         )
@@ -237,10 +233,6 @@ def _address_of(array: NDArray[Any]) -> int:
     """Address of an array that the C loop reads or writes in C order."""
     assert array.flags.c_contiguous
     return array.ctypes.data
-
-
-def _vectors(array: Vectors) -> _Vectors:
-    return _Vectors(array.ctypes.data, *array.strides)
 
 
 @cache

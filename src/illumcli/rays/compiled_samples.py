@@ -1,0 +1,120 @@
+"""Camera rays and surface interactions by a loop in C (`samples.c`), in a third of numpy's time."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from illumcli.arrays import F, Floats, Ids, Vectors
+from illumcli.compiled import CVectors, are_switched_off, compiled_library
+
+INTERFACE = 1
+"""Version of the interface of `samples.c`; a library with another one is not used."""
+
+
+class _Pinhole(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_double * 3) for name in ("right", "up", "forward", "eye")),
+        *((name, ctypes.c_double) for name in ("right_eye", "up_eye", "forward_eye")),
+        *((name, ctypes.c_double) for name in ("slope", "width", "height")),
+    )
+
+
+class _SurfaceHits(ctypes.Structure):
+    _fields_ = (
+        *((name, CVectors) for name in ("vertices", "triangles", "towards_eye")),
+        *((name, ctypes.c_void_p) for name in ("triangle", "u", "v")),
+        ("count", ctypes.c_int64),
+    )
+
+
+class _Surface(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("position", "ng", "edge", "back_facing"))
+
+
+class SampleLoop:
+    """The compiled loop."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        address = ctypes.c_void_p
+        library.illum_camera_rays.argtypes = [
+            ctypes.POINTER(_Pinhole), address, ctypes.c_int64, address, address, address
+        ]  # fmt: skip
+        library.illum_surface.argtypes = [ctypes.POINTER(_SurfaceHits), ctypes.POINTER(_Surface)]
+        library.illum_camera_rays.restype = library.illum_surface.restype = None
+        self._library = library
+
+    def camera_rays(
+        self, pinhole: Mapping[str, Any], points: NDArray[np.float64]
+    ) -> tuple[Vectors, Vectors, Floats]:
+        """Origins, directions and distances of the starts of rays through (N, 2) film positions.
+
+        Parameters
+        ----------
+        pinhole : mapping
+            The values of `Pinhole` in `samples.c`, vectors as (3,) arrays.
+        """
+        count = len(points)
+        origins, directions = (np.empty((count, 3), F, order="F") for _ in range(2))
+        start_distance = np.empty(count)
+        camera = _Pinhole(
+            **{
+                name: tuple(value) if isinstance(value, np.ndarray) and value.ndim else float(value)
+                for name, value in pinhole.items()
+            }
+        )
+        self._library.illum_camera_rays(
+            camera,
+            np.asfortranarray(points).ctypes.data,
+            count,
+            origins.ctypes.data,
+            directions.ctypes.data,
+            start_distance.ctypes.data,
+        )
+        return origins, directions, start_distance
+
+    def surface(
+        self,
+        vertices: Vectors,
+        triangles: NDArray[np.int32],
+        hits: tuple[Ids, Floats, Floats],
+        towards_eye: Vectors,
+    ) -> tuple[NDArray[np.float64], Vectors, Floats, NDArray[np.bool_]]:
+        """Positions, normals, effective edges, and which hits are on the back of their triangle.
+
+        Parameters
+        ----------
+        hits
+            Triangle, u and v of each.
+        """
+        count = len(towards_eye)
+        contiguous = [*map(np.ascontiguousarray, hits)]
+        out = (
+            np.empty((count, 3), order="F"),
+            np.empty((count, 3), F, order="F"),
+            np.empty(count, F),
+            np.empty(count, np.bool_),
+        )
+        given = _SurfaceHits(
+            *map(CVectors.of, (vertices, triangles, towards_eye)),
+            *(array.ctypes.data for array in contiguous),
+            count,
+        )
+        self._library.illum_surface(given, _Surface(*(array.ctypes.data for array in out)))
+        return out
+
+
+@cache
+def _sample_loop() -> SampleLoop | None:
+    library = compiled_library(__file__, "samples", INTERFACE)
+    return None if library is None else SampleLoop(library)
+
+
+def sample_loop() -> SampleLoop | None:
+    """The compiled loop, if there is one and it is not switched off."""
+    return None if are_switched_off() else _sample_loop()

@@ -1,0 +1,64 @@
+"""The compiled loop gives the bits of numpy: camera rays, positions, normals and edges."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+from illumcli.compiled import SWITCH
+from illumcli.geometry.mesh import Mesh
+from illumcli.geometry.scene_geometry import place_meshes
+from illumcli.rays.camera import camera_rays
+from illumcli.rays.compiled_samples import sample_loop
+from illumcli.rays.interaction import interact
+from illumcli.render_space import RenderSpace
+from illumcli.scene.spec import Perspective
+
+F = np.float32
+
+
+@pytest.fixture(autouse=True)
+def _needs_the_loop(monkeypatch):
+    monkeypatch.delenv(SWITCH, raising=False)
+    if sample_loop() is None:
+        assert os.environ.get("ILLUM_REQUIRE_PACKETS") != "1"
+        pytest.skip("no compiled loop")
+
+
+def same_bits(first, second):
+    for name, values in vars(first).items():
+        other = getattr(second, name)
+        assert (values.dtype, values.shape) == (other.dtype, other.shape), name
+        assert np.ascontiguousarray(values).tobytes() == np.ascontiguousarray(other).tobytes(), name
+
+
+@pytest.mark.parametrize("distance", [0.0, 1.2, 3.0, 1e6])
+def test_camera_rays_have_the_same_bits(monkeypatch, distance):
+    space = RenderSpace((0.3, -0.1, 7.0), 2.5)
+    eye = space.to_world(distance * np.array([0.48, 0.6, 0.64]))
+    camera = Perspective(position=tuple(eye), target=(0.1, 0.2, -0.3), fov=47.0)
+    points = np.random.default_rng(5).random((5000, 2)) * (200, 70)
+    compiled = camera_rays(camera, space, 192, 64, points)
+    monkeypatch.setenv(SWITCH, "0")
+    same_bits(compiled, camera_rays(camera, space, 192, 64, points))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e4])
+def test_surfaces_have_the_same_bits(monkeypatch, scale):
+    rng = np.random.default_rng(6)
+    vertices = rng.normal(size=(400, 3, 3)) * rng.gamma(0.3, size=(400, 1, 1))
+    vertices[::7, 2] = 0.5 * vertices[::7, 0] + 0.5 * vertices[::7, 1] + 1e-6  # slivers
+    vertices[3::7, 2] = vertices[3::7, 1]  # no area
+    corners = np.arange(1200, dtype=np.int32)
+    mesh = Mesh(vertices.reshape(-1, 3), corners, np.arange(0, 1201, 3, np.int32))
+    geometry = place_meshes([mesh], [np.diag([scale, scale, -scale, 1.0])])
+    triangle = rng.integers(0, len(geometry.triangles), 20_000).astype(np.int32)
+    u, v = rng.random((2, len(triangle))).astype(F) / F(2)
+    towards_eye = rng.normal(size=(len(triangle), 3)).astype(F)
+    arguments = geometry, np.zeros_like(triangle), triangle, u, v, towards_eye
+    compiled = interact(*arguments)
+    monkeypatch.setenv(SWITCH, "0")
+    same_bits(compiled, interact(*arguments))
+    assert compiled.back_facing.any()

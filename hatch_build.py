@@ -22,7 +22,10 @@ from typing import Any
 
 ROOT = Path(__file__).parent
 PACKAGE = ROOT / "src" / "illumcli"
-SOURCES = tuple(PACKAGE / name for name in ("rays/packets.c", "rays/samples.c", "visibility/regression.c"))
+SOURCES = tuple(
+    PACKAGE / name
+    for name in ("rays/packets.c", "rays/samples.c", "visibility/regression.c", "baking/cells.c")
+)
 REQUIRED = "ILLUM_REQUIRE_PACKETS"
 """Environment variable; with 1, an installation without the libraries fails, and so do their tests."""
 

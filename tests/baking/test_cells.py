@@ -7,6 +7,7 @@ import pytest
 
 from illumcli.baking import cells as module
 from illumcli.baking.cells import AGREE, SAME_CELL, SIZE, cells_of, nearest
+from illumcli.geometry.spatial_order import compact
 
 
 def sphere(count, seed=0):
@@ -19,7 +20,7 @@ def test_every_point_is_in_one_cell_of_its_object_whose_normals_agree():
     n = sphere(1003)
     position = np.asfortranarray(np.random.default_rng(1).random((1003, 3)), np.float32)
     objects = np.random.default_rng(2).integers(0, 5, 1003).astype(np.int32)
-    cells = cells_of(position, n, objects, 4)
+    cells = cells_of(position, n, objects, compact(position), 4)
     assert sorted(cells.points[cells.filled]) == list(range(1003))
     first = cells.points[:, :1]
     cosine = (n[first] * n[cells.points]).sum(axis=2)
@@ -29,7 +30,7 @@ def test_every_point_is_in_one_cell_of_its_object_whose_normals_agree():
 
 def test_points_of_a_smooth_surface_fill_their_cells():
     n = sphere(4096)
-    cells = cells_of(n, n, np.zeros(4096, np.int32), 4)
+    cells = cells_of(n, n, np.zeros(4096, np.int32), compact(n), 4)
     assert len(cells.points) < 1.2 * 4096 / SIZE
 
 
@@ -37,7 +38,7 @@ def test_two_sides_of_a_thin_sheet_share_no_cell_and_are_not_near():
     grid = np.random.default_rng(0).random((500, 3)) * [1, 0, 1]
     position = np.asfortranarray(np.concatenate([grid, grid - [0, 1e-6, 0]]), np.float32)
     n = np.asfortranarray(np.repeat([[0, 1, 0], [0, -1, 0]], 500, axis=0), np.float32)
-    cells = cells_of(position, n, np.zeros(1000, np.int32), 8)
+    cells = cells_of(position, n, np.zeros(1000, np.int32), compact(position), 8)
     side = (cells.points < 500).astype(int)
     assert (side.min(axis=1) == side.max(axis=1)).all()
     near = np.append(side[:, 0], -1)[cells.near]

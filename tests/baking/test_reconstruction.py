@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from illumcli.baking.cells import cells_of
 from illumcli.baking.points import Points
 from illumcli.baking.reconstruction import RawValues, reconstruct, rotated_cells
 from illumcli.geometry.scene_geometry import SceneGeometry
@@ -157,4 +156,4 @@ def test_values_of_each_point_come_from_the_cells_around():
     after = reconstructed(points, changed).hidden
     near = points.position[:, 0] < 0.3
     assert (before[near] == after[near]).all()
-    assert len(cells_of(points.position, points.n, points.objects, 16).points) == 500
+    assert len(rotated_cells(points, 1)[0].points) == 500

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
-from illumcli.geometry.spatial_order import compact
+from illumcli.baking.compiled_cells import CellSearch, cell_loop
 from illumcli.records import Record
 
 SIZE = 8
@@ -28,6 +28,11 @@ ROWS = 32
 """Groups at a time: their distances stay in a core's own cache."""
 TOUCHING = 2.5e-4
 """Weight of the squared distance of the centres of two boxes [per (2 radii)^2], beside that of their gap."""
+PLACE_BITS = np.uint64(16)
+PLACES = np.uint64((1 << 16) - 1)
+"""Bits of a key of a distance that hold a place."""
+FAR_KEY = np.uint64(int(np.array(np.inf, F).view(np.uint32)) << 16)
+"""Keys from here on are those of infinite distances."""
 APART = 8.0
 """Distance between objects along a fourth axis [radii]: more than any within an object."""
 
@@ -40,11 +45,12 @@ class Cells(Record):
     near: NDArray[np.int64]  # (C, K) nearest cells that agree, itself first; C where there are fewer
 
 
-def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int, size: int = SIZE) -> Cells:
-    """Cells of up to `size` points at (M, 3) positions with (M, 3) unit normals, and the `near` nearest of
-    each."""
+def cells_of(
+    position: Vectors, n: Vectors, objects: Ids, order: NDArray[np.int64], near: int, size: int = SIZE
+) -> Cells:
+    """Cells of up to `size` points at (M, 3) positions with (M, 3) unit normals, which follow each other in a
+    compact order, and the `near` nearest cells of each."""
     # groups along the order, one object after the other
-    order = compact(position)
     order = order[np.argsort(objects[order], kind="stable")]
     group = np.arange(len(order)) // size
     normal, owner = n[order].astype(np.float64), objects[order]
@@ -78,7 +84,8 @@ def cells_of(position: Vectors, n: Vectors, objects: Ids, near: int, size: int =
 
 
 def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """(C, count) the nearest cells whose normals agree, each cell itself first; C where there are fewer.
+    """(C, count) the cells whose centres are nearest to that of each among those whose normals agree with it,
+    the cell itself first; C where there are fewer.
 
     Cells are searched in the groups whose boxes are nearest to that of their own group; `centre` is (C, 4) in
     the order of the cells.
@@ -88,11 +95,23 @@ def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int
         return np.zeros((0, count), np.int64)
     member = _members(np.arange(-(-cells // GROUP)), cells)
     groups = nearest_boxes(centre[member].min(axis=1), centre[member].max(axis=1), GROUPS_NEAR)
-    single = centre.astype(F), normal.astype(F)
+    axes, normals = (np.ascontiguousarray(each.T, F) for each in (centre, normal))
+    search = CellSearch(axes, normals, groups, GROUP, AGREE, (APART / 2) ** 2)
     out = np.full((len(member) * GROUP, count), cells)
+    loop = cell_loop()
+    if loop is None:
+        _search(search, member, out)
+    else:
+        loop.nearest(search, 0, len(groups), out)
+    return out[:cells]
+
+
+def _search(of: CellSearch, member: NDArray[np.int64], out: NDArray[np.int64]) -> None:
+    """The nearest cells of each, in the rows of `out`."""
+    cells, count = of.centre.shape[1], out.shape[1]
     for begin in range(0, len(member), ROWS):
         own = member[begin : begin + ROWS]
-        near = groups[begin : begin + ROWS]
+        near = of.groups[begin : begin + ROWS]
         other = np.where(near[:, :, None] < 0, -1, near[:, :, None] * GROUP + np.arange(GROUP))
         other = other.reshape(len(own), -1)
         is_cell = (other >= 0) & (other < cells)
@@ -101,18 +120,22 @@ def nearest(centre: NDArray[np.float64], normal: NDArray[np.float64], count: int
         # squared distances, infinite to cells of other objects and to those that disagree
         square = np.zeros((*own.shape, other.shape[1]), F)
         cosine = np.zeros_like(square)
-        for axis in single[0].T:
+        for axis in of.centre:
             square += np.square(axis[own][:, :, None] - axis[other][:, None])
-        for axis in single[1].T:
+        for axis in of.normal:
             cosine += axis[own][:, :, None] * axis[other][:, None]
-        square[(cosine < AGREE) | (square > (APART / 2) ** 2) | ~is_cell[:, None]] = np.inf
-        square[own[:, :, None] == np.where(is_cell, other, -1)[:, None]] = -1
-        square = square.reshape(-1, square.shape[2])
-        place, distance = _least(square, count)
-        chosen = np.take_along_axis(np.repeat(other, GROUP, axis=0), place, axis=1)
+        square[(cosine < of.agree) | (square > of.apart) | ~is_cell[:, None]] = np.inf
+
+        # The least, and of equal ones the first: the bits of positive floats order like the numbers.
+        place = np.arange(other.shape[1], dtype=np.uint64)
+        keys = square.view(np.uint32).astype(np.uint64) + np.uint64(1) << PLACE_BITS | place
+        itself = own[:, :, None] == np.where(is_cell, other, -1)[:, None]
+        keys &= np.where(itself, PLACES, ~np.uint64(0))
+        keys = keys.reshape(-1, keys.shape[2])
+        keys = np.sort(np.partition(keys, count - 1, axis=1)[:, :count] if count < keys.shape[1] else keys)
+        chosen = np.take_along_axis(np.repeat(other, GROUP, axis=0), (keys & PLACES).astype(np.int64), axis=1)
         rows = slice(begin * GROUP, begin * GROUP + len(chosen))
-        out[rows, : chosen.shape[1]] = np.where(np.isfinite(distance), chosen, cells)
-    return out[:cells]
+        out[rows, : chosen.shape[1]] = np.where(keys < FAR_KEY, chosen, cells)
 
 
 def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: int) -> NDArray[np.int64]:
@@ -142,6 +165,7 @@ def nearest_boxes(low: NDArray[np.float64], high: NDArray[np.float64], count: in
             # of boxes that touch, those whose centres are nearer first
             square += TOUCHING * np.square((at + end) - (least + most)[rows, None])
         square[np.broadcast_to(other < 0, square.shape)] = np.inf
+        square[other == np.arange(begin, begin + len(square))[:, None]] = -1
         place, distance = _least(square, count)
         chosen = np.take_along_axis(np.broadcast_to(other, square.shape), place, axis=1)
         out[rows, : chosen.shape[1]] = np.where(np.isfinite(distance), chosen, -1)

@@ -36,7 +36,9 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Vectors, column_major, unit
 from illumcli.baking.cells import Cells, cells_of
+from illumcli.baking.compiled_cells import CellPoints, cell_loop
 from illumcli.baking.points import Points
+from illumcli.geometry.spatial_order import compact
 from illumcli.records import Record
 from illumcli.visibility.regression import FEATURES, MOMENTS, Planes, moments, polynomials
 
@@ -47,11 +49,9 @@ POOL = 12
 EXCESS = 2.0
 """Between windows, the variance of a raw value is that of the residuals in the smallest window, but at most
 so many times the stated one: where windows are too coarse, residuals are mostly bias."""
-ROTATIONS = (
-    np.eye(3),
-    np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3,
-)
-"""Of the positions before they are ordered into cells: one reconstruction each."""
+ROTATIONS = (None, np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]]) / 3)
+"""Of the positions before they are ordered into cells: one reconstruction each. Without one, cells follow the
+order of the points."""
 CELLS_AT_ONCE = 1 << 11
 """Cells that are solved together."""
 
@@ -79,10 +79,13 @@ def rotated_cells(points: Points, threads: int) -> list[Cells]:
         return list(pool.map(partial(_rotated_cells, points), ROTATIONS))
 
 
-def _rotated_cells(points: Points, rotation: NDArray[np.float64]) -> Cells:
-    x, y, z = points.position.T.astype(np.float64)
-    turned = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
-    return cells_of(turned, points.n, points.objects, WINDOWS[-1], points.cell_size)
+def _rotated_cells(points: Points, rotation: NDArray[np.float64] | None) -> Cells:
+    position, order = points.position, points.order
+    if rotation is not None:
+        x, y, z = position.T.astype(np.float64)
+        position = column_major(np.stack([x * a + y * b + z * c for a, b, c in rotation], axis=1), F)
+        order = compact(position)
+    return cells_of(position, points.n, points.objects, order, WINDOWS[-1], points.cell_size)
 
 
 def reconstruct(points: Points, rotated: Sequence[Cells], raw: RawValues, threads: int) -> Reconstruction:
@@ -155,14 +158,27 @@ class CellValues:
         # moments of every cell, and of an empty one that stands for neighbours that are not there
         self._moments = np.zeros((len(cells.points) + 1, MOMENTS))
         for block in self.blocks():
-            index, share = self._points(block)
-            moments(share, raw.hidden[index], features[:, index], _sum_points, self._moments[block].T)
+            self._sum_moments(block)
         self._directions = None if raw.bent is None else self._with_moments(raw.bent)
 
     def _points(self, block: slice) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """(size, B) points of the cells of a block, and 1 where there is one, else 0."""
         cells = self._cells
         return cells.points[block].T.copy(), cells.filled[block].T.astype(np.float64, order="C")
+
+    def _sum_moments(self, block: slice) -> None:
+        loop = cell_loop()
+        if loop is not None:
+            loop.moments(self._in_c(block), self._moments[block])
+            return
+        index, share = self._points(block)
+        hidden, features = self._raw.hidden[index], self._features[:, index]
+        moments(share, hidden, features, _sum_points, self._moments[block].T)
+
+    def _in_c(self, block: slice) -> CellPoints:
+        """The points of a block, for the compiled loop."""
+        cells = self._cells
+        return CellPoints(self._features, self._raw.hidden, cells.points[block], cells.filled[block])
 
     def _with_moments(self, bent: Vectors) -> Directions:
         out = np.zeros((len(self._cells.points) + 1, 3, 1 + FEATURES))
@@ -183,10 +199,30 @@ class CellValues:
     def fits(self, block: slice) -> Fits:
         """The polynomials of a block in each of the windows."""
         (index, share), near = self._points(block), self._cells.near[block]
+        count = len(near)
+        coefficients = np.empty((len(WINDOWS), 1 + FEATURES, count))
+        residual, leverage = (np.empty((len(WINDOWS), count)) for _ in range(2))
+        steps = np.empty(count)
+        out = coefficients, residual, leverage, steps
+        loop = cell_loop()
+        if loop is None:
+            self._fit_windows(block, out)
+        else:
+            loop.fits(self._in_c(block), self._moments, near, WINDOWS, out)
+        return Fits(
+            coefficients,
+            residual,
+            leverage,
+            (share * self._raw.variance[index]).sum(axis=0),
+            _noise(steps, share) if self._is_dense else np.zeros(count),
+            share.sum(axis=0),
+        )
+
+    def _fit_windows(self, block: slice, out: Sequence[NDArray[np.float64]]) -> None:
+        """The same as the compiled loop's."""
+        coefficients, residual, leverage, steps = out
+        (index, share), near = self._points(block), self._cells.near[block]
         hidden, features = self._raw.hidden[index], self._features[:, index]
-        coefficients = np.empty((len(WINDOWS), 1 + FEATURES, len(near)))
-        residual, leverage = (np.empty((len(WINDOWS), len(near))) for _ in range(2))
-        noise = np.zeros(len(near))
         # sums over the nearest cells, and the same weighted by how many are nearer
         sums, by_rank = np.zeros((len(near), MOMENTS)), np.zeros((len(near), MOMENTS))
         first = 0
@@ -200,17 +236,9 @@ class CellValues:
             coefficients[number] = of_window.coefficients()[:, 0]
             off = of_window.at(features) - hidden
             _sum_points(share * np.square(off), residual[number])
-            if number == 0 and self._is_dense:
-                noise = _noise(off, share)
+            if number == 0:
+                _sum_points(share[1:] * share[:-1] * np.square(np.diff(off, axis=0)), steps)
             _sum_points(share * np.minimum(of_window.leverage(features), 1), leverage[number])
-        return Fits(
-            coefficients,
-            residual,
-            leverage,
-            (share * self._raw.variance[index]).sum(axis=0),
-            noise,
-            share.sum(axis=0),
-        )
 
     def fitted(self, best: ChosenFits, block: slice) -> Fitted:
         """The values at the points of a block."""
@@ -289,7 +317,7 @@ def _pooled(values: NDArray[np.float64], cells: Cells) -> NDArray[np.float64]:
     return out
 
 
-def _noise(residual: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+def _noise(steps: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
     """(B,) variance of the raw values times their number: half the mean square of the differences between
     consecutive ones, as bias hardly differs between these.
 
@@ -298,11 +326,12 @@ def _noise(residual: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray
     von Neumann, J. (1941). Distribution of the ratio of the mean square successive difference to the
     variance. Annals of Mathematical Statistics 12(4).
     """
-    both = share[1:] * share[:-1]
-    square = (both * np.square(np.diff(residual, axis=0))).sum(axis=0)
-    return np.asarray(share.sum(axis=0) * square / (2 * np.maximum(both.sum(axis=0), 1)))
+    pairs = (share[1:] * share[:-1]).sum(axis=0)
+    return np.asarray(share.sum(axis=0) * steps / (2 * np.maximum(pairs, 1)))
 
 
 def _sum_points(values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Sums over the points of each cell, (size, B)."""
-    np.add.reduce(values, axis=0, out=out)
+    """Sums over the points of each cell, (size, B), one after the other."""
+    out[...] = 0
+    for of_point in values:
+        out += of_point

@@ -3,42 +3,12 @@
    The operations of regression.py and reconstruction.py in their order, so that the results have the same bits.
    compiled_fits.py calls this file by ctypes, without the interpreter lock. */
 
-#include <stdint.h>
+#include "polynomials.h"
 
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-#if defined(_MSC_VER)
-#define INLINE static __forceinline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
 enum { INTERFACE = 2 }; /* of compiled_fits.py: both change together */
-enum { FEATURES = 6, PAIRS = FEATURES * (FEATURES + 1) / 2 };
-/* Rows of moments, as in regression.py. */
-enum {
-  COUNT = 0, FEATURE = 1, PAIR = FEATURE + FEATURES, HIDDEN = PAIR + PAIRS, HIDDEN_FEATURE = HIDDEN + 1,
-  SQUARE = HIDDEN_FEATURE + FEATURES, MOMENTS = SQUARE + 1
-};
-/* Rows of a fit: constant and slopes, value and leverage at the cell itself, sum of squared residuals, count. */
-enum { CONSTANT = 0, SLOPE = 1, VALUE = SLOPE + FEATURES, LEVERAGE, RESIDUAL, PIXELS, FIT };
+/* Rows of a fit: coefficients, value and leverage at the cell itself, sum of squared residuals, count. */
+enum { VALUE = COEFFICIENTS, LEVERAGE, RESIDUAL, PIXELS, FIT };
 enum { PLACES = 4 }; /* pixels of a cell */
-enum { LANES = 32 }; /* cells that are computed together, in a core's first cache */
-
-#define NORMAL_RIDGE 1e-6
-#define POSITION_RIDGE 1e-6
-#define ROUNDING 4e-14
-#define LEAST_COUNT 1e-30
-
-typedef double Lanes[LANES];
-
-#define EACH_LANE for (int64_t k = 0; k < LANES; k++)
-
-INLINE double greater(double a, double b) { return a > b ? a : b; }
-
-INLINE int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
 /* Planes of float64, whose columns are adjacent. */
 typedef struct {
@@ -126,72 +96,6 @@ INLINE void sum_windows(const Planes *of, int64_t radius, int64_t row, int64_t c
   }
 }
 
-/* Polynomials of least squares from sums of moments, at `own` features. */
-INLINE void solve(Lanes *sums, Lanes *own, Lanes *out) {
-  Lanes total, covariance[FEATURES][FEATURES], lower[FEATURES][FEATURES], inverse[FEATURES], scaled[FEATURES];
-  Lanes forth[FEATURES], slopes[FEATURES], steps[FEATURES], ridge, explained, moved, value, square;
-  Lanes *means = sums + FEATURE, *hidden = sums + HIDDEN;
-  EACH_LANE total[k] = greater(sums[COUNT][k], LEAST_COUNT);
-  for (int plane = 0; plane < MOMENTS; plane++)
-    EACH_LANE sums[plane][k] /= total[k];
-
-  /* Covariances of the features, with a ridge, and with the hidden share. */
-  for (int i = 0, pair = PAIR; i < FEATURES; i++) {
-    for (int j = 0; j <= i; j++, pair++)
-      EACH_LANE covariance[i][j][k] = sums[pair][k] - means[i][k] * means[j][k];
-    EACH_LANE forth[i][k] = sums[HIDDEN_FEATURE + i][k] - means[i][k] * (*hidden)[k];
-  }
-  EACH_LANE ridge[k] =
-      POSITION_RIDGE * (covariance[3][3][k] + covariance[4][4][k] + covariance[5][5][k]) + ROUNDING;
-  for (int i = 0; i < FEATURES; i++)
-    EACH_LANE covariance[i][i][k] += i < 3 ? NORMAL_RIDGE : ridge[k];
-
-  /* Covariance = L D L^T; the slopes by substitution, forth and back. */
-  for (int j = 0; j < FEATURES; j++) {
-    for (int m = 0; m < j; m++) {
-      EACH_LANE scaled[m][k] = lower[j][m][k] / inverse[m][k];
-      EACH_LANE covariance[j][j][k] -= lower[j][m][k] * scaled[m][k];
-    }
-    EACH_LANE inverse[j][k] = 1 / greater(covariance[j][j][k], ROUNDING);
-    for (int i = j + 1; i < FEATURES; i++) {
-      for (int m = 0; m < j; m++)
-        EACH_LANE covariance[i][j][k] -= lower[i][m][k] * scaled[m][k];
-      EACH_LANE lower[i][j][k] = covariance[i][j][k] * inverse[j][k];
-    }
-  }
-  for (int i = 0; i < FEATURES; i++) {
-    EACH_LANE steps[i][k] = own[i][k] - means[i][k];
-    for (int m = 0; m < i; m++)
-      EACH_LANE forth[i][k] -= lower[i][m][k] * forth[m][k];
-    EACH_LANE slopes[i][k] = forth[i][k] * inverse[i][k];
-  }
-  EACH_LANE explained[k] = moved[k] = value[k] = square[k] = 0;
-  for (int i = 0; i < FEATURES; i++)
-    EACH_LANE explained[k] += forth[i][k] * slopes[i][k];
-  for (int i = FEATURES - 1; i >= 0; i--)
-    for (int m = i + 1; m < FEATURES; m++)
-      EACH_LANE slopes[i][k] -= lower[m][i][k] * slopes[m][k];
-
-  /* Constant, value, leverage and residuals. */
-  for (int i = 0; i < FEATURES; i++) {
-    EACH_LANE moved[k] += slopes[i][k] * means[i][k];
-    EACH_LANE value[k] += slopes[i][k] * steps[i][k];
-    EACH_LANE out[SLOPE + i][k] = slopes[i][k];
-  }
-  for (int i = 0; i < FEATURES; i++) {
-    for (int m = 0; m < i; m++)
-      EACH_LANE steps[i][k] -= lower[i][m][k] * steps[m][k];
-    EACH_LANE square[k] += steps[i][k] * steps[i][k] * inverse[i][k];
-  }
-  EACH_LANE {
-    double mean = (*hidden)[k];
-    out[CONSTANT][k] = mean - moved[k];
-    out[VALUE][k] = mean + value[k];
-    out[LEVERAGE][k] = (1 + square[k]) / total[k];
-    out[RESIDUAL][k] = greater(sums[SQUARE][k] - mean * mean - explained[k], 0) * total[k];
-  }
-}
-
 /* Fits in windows around the cells of an area, (11, rows, columns); `cells` reaches a radius beyond it on all sides. */
 EXPORT void illum_window_fits(const Planes *cells, int64_t radius, int64_t rows, int64_t columns, const Planes *out) {
   for (int64_t row = 0; row < rows; row++)
@@ -207,7 +111,14 @@ EXPORT void illum_window_fits(const Planes *cells, int64_t radius, int64_t rows,
         for (int i = 0; i < FEATURES; i++)
           for (int64_t k = 0; k < count; k++)
             own[i][k] = *at(cells, FEATURE + i, row, column + k) / greater(held[k], LEAST_COUNT);
-        solve(sums, own, fit);
+        Polynomials polynomials;
+        solve(sums, &polynomials);
+        coefficients(&polynomials, fit);
+        evaluate(&polynomials, own, fit[VALUE], fit[LEVERAGE]);
+        EACH_LANE {
+          double hidden = sums[HIDDEN][k], square = sums[SQUARE][k] - hidden * hidden - polynomials.explained[k];
+          fit[RESIDUAL][k] = greater(square, 0) * polynomials.total[k];
+        }
       }
       for (int64_t k = 0; k < count; k++) /* Nothing in the window is hidden, or the cell is empty. */
         if (!is_solved[k]) {

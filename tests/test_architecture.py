@@ -172,3 +172,17 @@ unused = ("illumcli.models.lambert", "numpy.ma")  # the default material; masked
 assert not set(unused) & set(sys.modules), set(unused) & set(sys.modules)
 """
     loaded_after(code)
+
+
+def test_what_a_mesh_file_names_is_found_without_its_reader(tmp_path):
+    for suffix in ("obj", "ply", "gltf", "stl"):
+        (tmp_path / f"m.{suffix}").write_text("mtllib m.mtl\n")
+    code = f"""
+from pathlib import Path
+from illumcli.mesh_files import companions
+found = [companions(Path({str(tmp_path)!r}) / name) for name in ("m.obj", "m.ply", "m.gltf", "m.stl")]
+assert [len(files) for files in found] == [1, 0, 0, 0], found
+readers = {{f"illumcli.mesh_files.{{name}}" for name in ("obj", "mtl", "ply", "gltf", "stl", "_text")}}
+assert not readers & set(sys.modules), readers & set(sys.modules)
+"""
+    loaded_after(code)

@@ -1,6 +1,7 @@
 """Mesh files: one module per format, named after the suffix that it reads.
 
-A format is a module with `read(path) -> Mesh`, and `companions(path)` if its files name other files.
+A format is a module with `read(path) -> Mesh`. If its files name other files, a module of the same name in
+`_companions` has `companions(path)`.
 """
 
 from __future__ import annotations
@@ -60,8 +61,9 @@ def companions(path: Path) -> list[Path]:
     All files that are read are among them, possibly others, but none outside of the mesh's folder.
     """
     name = _formats().get(path.suffix.lower())
-    named = getattr(_module(name), "companions", None) if name else None
-    files: list[Path] = named(path) if named else []
+    if name not in _formats_with_companions():
+        return []
+    files: list[Path] = _module(f"_companions.{name}").companions(path)
     return files
 
 
@@ -80,6 +82,11 @@ def holds_obscurance(path: Path) -> bool:
 def _formats() -> Mapping[str, str]:
     """Suffix -> module."""
     return {f".{name}": name for name in modules(__path__) if name not in NO_FORMATS} | OTHER_SUFFIXES
+
+
+@cache
+def _formats_with_companions() -> frozenset[str]:
+    return frozenset(modules([f"{folder}/_companions" for folder in __path__]))
 
 
 def _module(name: str) -> ModuleType:

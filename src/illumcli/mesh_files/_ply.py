@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, note
+from illumcli.mesh_files._companions.ply import END, LONGEST_HEADER
 from illumcli.mesh_files._polygons import Ints, runs
-from illumcli.mesh_files._text import BYTE_ORDER_MARK, Block, Text, decoded
+from illumcli.mesh_files._text import BYTE_ORDER_MARK, Block, Text
+from illumcli.mesh_files._words import decoded
 from illumcli.records import Value
 
 _TYPES = {
@@ -40,9 +42,7 @@ _TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-LONGEST_HEADER = 1 << 20  # [bytes]
 _START = re.compile(rb"(?:\xef\xbb\xbf)?ply[ \t]*(\r\n|\n|\r)")
-_END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r)")
 
 
 class Lists(Value):
@@ -83,17 +83,11 @@ class Header(Value):
     textures: list[tuple[str, int]] = field(default_factory=list)  # images named in comments, and their lines
 
 
-def head(data: bytes) -> bytes:
-    """The lines of a header before its end; all bytes if it has none."""
-    end = _END.search(data, 0, LONGEST_HEADER)
-    return data if end is None else data[: end.start()]
-
-
 def header(path: Path, data: bytes, repairs: dict[str, Repair]) -> Header:
     """Parse the header; lines that do not concern the rows are left out."""
     # Its extent.
     begin = _START.match(data)
-    end = _END.search(data, 0, LONGEST_HEADER)
+    end = END.search(data, 0, LONGEST_HEADER)
     if begin is None or end is None:
         raise InputError(f"{path}: has no PLY header; give the file the suffix of its format")
     if data.startswith(BYTE_ORDER_MARK):

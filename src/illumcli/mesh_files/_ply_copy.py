@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from illumcli.geometry.repairs import Repair
+from illumcli.mesh_files._companions.ply import head
 from illumcli.mesh_files._files import content
-from illumcli.mesh_files._ply import Column, Element, Lists, Property, Table, head, header, tables
-from illumcli.mesh_files._text import decoded
+from illumcli.mesh_files._ply import Column, Element, Lists, Property, Table, header, tables
+from illumcli.mesh_files._words import decoded
 
 if TYPE_CHECKING:
     from plyfile import PlyData

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from illumcli.errors import InputError
 from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files._polygons import Ints
+from illumcli.mesh_files._words import decoded
 from illumcli.records import Value
 
 PIECE = 1 << 22  # bytes cut into words at a time: Python's words need ten times the memory of their text
@@ -122,19 +123,6 @@ class Text(Value):
         for i in range(keyword):
             data[starts + i] = 32
         return Block(self, lines, data, starts)
-
-
-def decoded(line: bytes) -> str:
-    """A line as text: UTF-8, otherwise Latin-1."""
-    try:
-        return line.decode("utf-8")
-    except UnicodeDecodeError:
-        return line.decode("latin-1")
-
-
-def without_comment(text: str) -> str:
-    """`text` up to a # that begins a word."""
-    return re.split(r"(?:^|(?<=\s))#", text, maxsplit=1)[0]
 
 
 def keyword(word: bytes) -> int:

@@ -27,12 +27,11 @@ from illumcli.geometry.mesh import Substitute
 from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._polygons import LARGEST
-from illumcli.mesh_files._text import decoded, without_comment
+from illumcli.mesh_files._words import decoded, without_comment
 from illumcli.records import Value
 
 _COLORS = {"ka": "Ka", "kd": "Kd", "ks": "Ks", "ke": "Ke"}
 _MAPS = ("bump", "disp", "decal", "refl", "norm")
-IMAGE = re.compile(rb"(?:map_\w+|bump|disp|decal|refl|norm)[ \t]([^\r\n]*)", re.IGNORECASE)
 _NUMBERS = {"ns": "Ns", "d": "d", "tr": "Tr", "illum": "illum"}
 _NOTHING = {
     "ni",

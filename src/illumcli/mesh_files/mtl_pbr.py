@@ -25,7 +25,7 @@ from pathlib import Path
 
 from illumcli.errors import IllumError
 from illumcli.mesh_files._files import content
-from illumcli.mesh_files._text import without_comment
+from illumcli.mesh_files._words import without_comment
 from illumcli.mesh_files.mtl import image_of, is_map, statements
 from illumcli.mesh_files.pbr import Color, PbrMaterial
 

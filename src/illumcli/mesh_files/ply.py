@@ -11,7 +11,6 @@ Turk, G. (1994). The PLY polygon file format. Stanford University.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.repairs import Repair, note
 from illumcli.mesh_files import _ply
 from illumcli.mesh_files._color import unit_range
-from illumcli.mesh_files._companions import files_named
+from illumcli.mesh_files._companions.ply import LONGEST_HEADER
 from illumcli.mesh_files._files import TAKEN, content, nearby
 from illumcli.mesh_files._ply import Element, Lists, Table
 from illumcli.mesh_files._ply_copy import read_copy
@@ -43,7 +42,6 @@ _NORMAL = ("nx", "ny", "nz")
 _UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 BYTE: np.dtype[Any] = np.dtype(np.uint8)
 _COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
-_TEXTURE = re.compile(rb"comment[ \t]+texturefile[ \t]([^\r\n]*)", re.IGNORECASE)
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
@@ -124,18 +122,13 @@ def read(path: Path) -> Mesh:
     return checked_mesh(path, replace(raw, attributes=_attributes(file), repairs=repairs), file.place)
 
 
-def companions(path: Path) -> list[Path]:
-    """The images that a PLY may name."""
-    return files_named(path, lambda data: _TEXTURE.findall(_ply.head(data)), most=_ply.LONGEST_HEADER)
-
-
 def holds_obscurance(path: Path) -> bool:
     """True if vertices have baked obscurance, in a file with a sound header.
 
     `quality` alone does not count: other programs write anything under this name.
     """
     with path.open("rb") as file:
-        data = file.read(_ply.LONGEST_HEADER)
+        data = file.read(LONGEST_HEADER)
     vertex = [each for each in _ply.header(path, data, {}).elements if each.name == "vertex"]
     return any(prop.name == "obscurance" for each in vertex for prop in each.properties)
 

@@ -7,8 +7,6 @@ The Khronos Group (2021). glTF 2.0 specification, 2.0.1. ISO/IEC 12113:2022. Sec
 
 from __future__ import annotations
 
-import json
-import re
 from bisect import bisect_right
 from functools import partial
 from pathlib import Path
@@ -19,7 +17,6 @@ from numpy.typing import NDArray
 
 from illumcli.errors import InputError
 from illumcli.geometry.mesh import Mesh
-from illumcli.mesh_files._companions import files_named
 from illumcli.mesh_files._polygons import Ints, RawMesh, checked_mesh, starts_of
 from illumcli.mesh_files.gltf.document import Document, dicts, open_document, printable, read_json
 from illumcli.mesh_files.gltf.materials import Library
@@ -27,7 +24,6 @@ from illumcli.mesh_files.gltf.primitives import Part, parts
 
 OBSCURANCE = "_OBSCURANCE"
 """Name of the attribute of baked obscurance."""
-_URI = re.compile(rb'"uri"\s*:\s*"([^"]{1,4096})"')
 
 FILLED = {"color": 1.0, "alpha": 1.0, OBSCURANCE: 1.0}
 """Values of attributes that a primitive lacks and others have: white and opaque (3.7.2.1), and open."""
@@ -106,23 +102,6 @@ def holds_obscurance(path: Path) -> bool:
     return any(OBSCURANCE in (each.get("attributes") or {}) for each in primitives) or any(
         isinstance(each.get("occlusionTexture"), dict) for each in dicts(materials)
     )
-
-
-def companions(path: Path) -> list[Path]:
-    """The buffers and images that a file may name."""
-    return files_named(path, _uris)
-
-
-def _uris(data: bytes) -> list[bytes]:
-    return [_unescaped(uri) for uri in _URI.findall(data)]
-
-
-def _unescaped(uri: bytes) -> bytes:
-    """A JSON string with its escapes decoded."""
-    try:
-        return str(json.loads(b'"' + uri + b'"', strict=False)).encode("utf-8", "replace")
-    except ValueError:
-        return uri
 
 
 def _place(primitives: list[Part], vertices: list[int], faces: list[int], part: str, number: int) -> str:

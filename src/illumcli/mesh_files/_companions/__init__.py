@@ -1,4 +1,8 @@
-"""Names of other files in the text of a mesh file, extracted without reading the mesh."""
+"""The files that a mesh file may name: one module for each format that names any, called as the format.
+
+Each has `companions(path)`. They are imported without the formats: a mesh in the cache is not read, but the
+files beside it are part of its identity.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from urllib.parse import unquote
 
 from illumcli.errors import IllumError, InputError
 from illumcli.mesh_files._files import LONGEST_NAME, beside, content
-from illumcli.mesh_files._text import decoded, without_comment
+from illumcli.mesh_files._words import decoded, without_comment
 
 MOST_WORDS = 128  # words considered in a line that names files, blanks between them included
 

@@ -6,6 +6,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -113,9 +114,27 @@ INLINE void prepare(Cell *packet, int64_t width) {
   }
 }
 
+/* Whether the vectors lie component by component, without gaps, so that lanes can be copied together. */
+INLINE int is_by_component(const Vectors *of) { return of->stride == sizeof(float); }
+
+INLINE void copy(const Vectors *of, int64_t first, int64_t width, Cell *rows) {
+  for (int k = 0; k < 3; k++)
+    memcpy(rows + k * width, of->data + k * of->component + first * sizeof(float), width * sizeof(float));
+}
+
 /* Rays from `ray` on; lanes beyond the last ray repeat it and are not valid. */
 INLINE void fill(const Rays *of, int64_t ray, int64_t width, Cell *packet, int32_t *valid) {
   int64_t last = of->end - 1;
+  if (ray + width <= of->end && of->rays_per_origin == 1 && is_by_component(&of->origins) &&
+      is_by_component(&of->directions)) {
+    copy(&of->origins, ray, width, packet + ORG_X * width);
+    copy(&of->directions, ray, width, packet + DIR_X * width);
+    for (int64_t j = 0; j < width; j++) {
+      packet[TFAR * width + j].real = of->limits[(ray + j) * of->limit_stride];
+      valid[j] = -1;
+    }
+    return;
+  }
   int64_t origin = ray / of->rays_per_origin, place = ray % of->rays_per_origin;
   for (int64_t j = 0; j < width; j++) {
     int64_t i = ray + j < last ? ray + j : last;
@@ -227,13 +246,28 @@ INLINE int is_grazing(const Cell *ray, int64_t width, float distance) {
   }
   across *= across;
   double rounding = ROUNDING * ROUNDING * distance * distance * length;
-  return across < 4e-4 * area * length || across * across < rounding * rounding * area * length * length;
+  return across < 4e-4 * area * length || (across * across < rounding * rounding * area * length * length);
+}
+
+/* The results of `count` rays of a packet. */
+INLINE void hand_over(const Cell *packet, const uint8_t *doubtful, int64_t ray, int64_t count, int64_t width,
+                      const Hits *out) {
+  if (out->doubtful)
+    memcpy(out->doubtful + ray, doubtful, count);
+  memcpy(out->distance + ray, packet + TFAR * width, count * sizeof(Cell));
+  if (!out->triangle)
+    return;
+  memcpy(out->triangle + ray, packet + PRIMITIVE * width, count * sizeof(Cell));
+  memcpy(out->instance + ray, packet + INSTANCE * width, count * sizeof(Cell));
+  memcpy(out->u + ray, packet + U * width, count * sizeof(Cell));
+  memcpy(out->v + ray, packet + V * width, count * sizeof(Cell));
 }
 
 INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
   Cell room[ROWS * WIDEST + ALIGNMENT], *packet = aligned(room);
   Cell mask[2 * WIDEST + ALIGNMENT];
   int32_t *valid = &aligned(mask)->number;
+  uint8_t doubtful[WIDEST];
   Query query = of->query;
   Context context;
   Arguments together = {COHERENT | INVOKE_ARGUMENT_FILTER, 0xffffffff, &context, note_rivals, {0}};
@@ -246,26 +280,21 @@ INLINE void closest(const Rays *of, int64_t width, const Hits *out) {
   for (int64_t ray = of->first; ray < of->end; ray += width) {
     fill(of, ray, width, packet, valid);
     clear_hits(packet, width);
-    for (int64_t j = 0; j < width; j++) {
+    for (int64_t j = 0; out->doubtful && j < width; j++) {
       context.closest[j] = packet[TFAR * width + j].real;
       context.margin[j] = ROUNDING * largest(packet + j, width) / largest(packet + DIR_X * width + j, width);
       context.has_rivals[j] = 0;
     }
     trace(&query, width, valid, packet);
-    for (int64_t j = 0; j < width && ray + j < of->end; j++) {
-      if (out->doubtful) {
-        packet[TFAR * width + j].real = context.closest[j];
-        out->doubtful[ray + j] = packet[PRIMITIVE * width + j].number < 0 || context.has_rivals[j] ||
-                                 is_grazing(packet + j, width, context.closest[j]);
-      }
-      out->distance[ray + j] = packet[TFAR * width + j].real;
-      if (!out->triangle)
-        continue;
-      out->triangle[ray + j] = packet[PRIMITIVE * width + j].number;
-      out->instance[ray + j] = packet[INSTANCE * width + j].number;
-      out->u[ray + j] = packet[U * width + j].real;
-      out->v[ray + j] = packet[V * width + j].real;
+    for (int64_t j = 0; out->doubtful && j < width; j++) {
+      packet[TFAR * width + j].real = context.closest[j];
+      doubtful[j] = packet[PRIMITIVE * width + j].number < 0 || context.has_rivals[j] ||
+                    is_grazing(packet + j, width, context.closest[j]);
     }
+    if (ray + width <= of->end) /* a constant, for the compiler */
+      hand_over(packet, doubtful, ray, width, width, out);
+    else
+      hand_over(packet, doubtful, ray, of->end - ray, width, out);
   }
 }
 

@@ -80,18 +80,22 @@ def cross(a: Vectors, b: Vectors) -> Vectors:
 
 def length(a: Vectors) -> Floats:
     """(N,) Euclidean lengths in the precision of `a`, which also decides underflow and overflow."""
-    return np.sqrt(dot(a, a))
+    square = dot(a, a)
+    return np.sqrt(square, out=square)
 
 
 def unit(a: Vectors) -> Vectors:
     """(N, 3) `a` scaled to length 1; zero vectors remain zero."""
     size = length(a)
-    return a * (1 / np.maximum(size, np.finfo(size.dtype).tiny))[:, None]
+    np.maximum(size, np.finfo(size.dtype).tiny, out=size)
+    return a * np.divide(1, size, out=size)[:, None]
 
 
 def mirror(l: Vectors, n: Vectors, n_l: Floats) -> Vectors:
     """(N, 3) r = 2 (n . l) n - l, `l` mirrored at the unit vector `n`."""
-    return (2 * n_l)[:, None] * n - l
+    r = (2 * n_l)[:, None] * n
+    r -= l
+    return r
 
 
 def perpendicular(n: Vectors) -> tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]:

@@ -66,11 +66,11 @@ def shadow_candidates(
 
 def unshadowed(incident: LitPoints, shadow: Floats) -> LitPoints:
     """The lit points that are not in shadow; points must be samples."""
-    lit = np.flatnonzero(shadow.take(incident.index))
+    lit = np.flatnonzero(take_rows(shadow, incident.index) != 0)
     if len(lit) == len(incident.index):
         return incident
     parts = (take_rows(part, lit) for part in (incident.l, incident.distance, incident.irradiance_scale))
-    return LitPoints(incident.index.take(lit), incident.count, *parts)
+    return LitPoints(take_rows(incident.index, lit), incident.count, *parts)
 
 
 def unshadowed_by_shadow(
@@ -86,6 +86,6 @@ def unshadowed_by_shadow(
 def _lit(sample: LightSample, reached: NDArray[np.bool_], order: NDArray[np.intp] | None) -> LitPoints:
     if order is None or reached.all():
         order = np.arange(len(reached))
-    index = order.compress(reached.take(order))
+    index = order[reached.take(order, mode="wrap")]
     parts = (take_or_all(part, index) for part in (sample.l, sample.distance, sample.irradiance_scale))
     return LitPoints(index, len(sample.l), *parts)

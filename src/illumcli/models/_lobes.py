@@ -18,7 +18,12 @@ def lobe(gap: Floats, exponent: Floats | float) -> Floats:
     squared distance of two unit vectors, exp(e log1p(-gap)) is accurate for exponents of 10^6 and more.
     """
     below_one = 1 - float(np.finfo(gap.dtype).epsneg)
-    return np.exp(exponent * np.log1p(-np.minimum(gap, below_one))) * ((gap < 1) | (exponent == 0))
+    power = np.negative(np.minimum(gap, below_one))
+    np.log1p(power, out=power)
+    power = np.multiply(exponent, power)
+    np.exp(power, out=power)
+    power *= (gap < 1) | (exponent == 0)
+    return power
 
 
 def log_cos(cosine: Floats, sin2: Floats) -> Floats:

@@ -62,3 +62,13 @@ def test_surfaces_have_the_same_bits(monkeypatch, scale):
     monkeypatch.setenv(SWITCH, "0")
     same_bits(compiled, interact(*arguments))
     assert compiled.back_facing.any()
+
+
+def test_other_types_are_computed_by_numpy(monkeypatch):
+    corners = np.arange(3, dtype=np.int32)
+    geometry = place_meshes([Mesh(np.eye(3), corners, np.array([0, 3], np.int32))], [np.eye(4)])
+    at = np.array([[0.3], [0.1]])
+    arguments = geometry, np.zeros(1, np.int32), np.zeros(1, np.int64), *at, np.ones((1, 3))
+    compiled = interact(*arguments)
+    monkeypatch.setenv(SWITCH, "0")
+    same_bits(compiled, interact(*arguments))

@@ -90,7 +90,8 @@ class SampleLoop:
         Parameters
         ----------
         hits
-            Triangle, u and v of each.
+            Triangle, u and v of each, float32.
+        towards_eye : (M, 3) float32
         """
         count = len(towards_eye)
         contiguous = [*map(np.ascontiguousarray, hits)]

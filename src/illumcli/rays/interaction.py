@@ -75,7 +75,8 @@ def interact(
 ) -> SurfaceInteraction:
     """Surface interactions of hits, computed in float64 from the float32 vertices that Embree has."""
     loop = sample_loop()
-    if loop is not None and geometry.instances is None:
+    is_single = triangle.dtype == np.int32 and all(each.dtype == F for each in (u, v, towards_eye))
+    if loop is not None and is_single and geometry.instances is None:
         return SurfaceInteraction(
             *loop.surface(geometry.vertices, geometry.triangles, (triangle, u, v), towards_eye)
         )

@@ -86,3 +86,9 @@ def test_consecutive_spirals_fill_the_disc_together(samples):
     together = np.mean([off(sampling.spiral_draws(key, number)) for key in range(8)])
     apart = np.mean([off(rng.random((2, 32))) for _ in range(8)])
     assert together < 0.6 * apart
+
+
+def test_a_shuffle_is_the_stable_order_of_the_hashes():
+    number = np.arange(5000, dtype=np.uint32) % 700
+    expected = np.argsort(sampling.hashed(9, number), kind="stable")
+    assert sampling.shuffled(9, number).tolist() == expected.tolist()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats
 from illumcli.baking.sampling import BakeSampler, RayCounts
-from illumcli.rays.sampling import hashed, stream
+from illumcli.rays.sampling import shuffled, stream
 from illumcli.records import Record, Value
 from illumcli.visibility.obscurance_error import NO_HIT_QUANTILE, line
 
@@ -134,7 +134,7 @@ def _drawn(chance: NDArray[np.float64], seed: int, number: int) -> NDArray[np.in
     """Points drawn with these probabilities, ascending: systematic sampling in a random order, since files of
     meshes have periods of their own."""
     key = stream(seed, f"audit {number}")
-    order = np.argsort(hashed(key, np.arange(len(chance), dtype=np.uint32)), kind="stable")
+    order = shuffled(key, np.arange(len(chance), dtype=np.uint32))
     offset = key * 2.0**-32
     upto = np.floor(np.cumsum(chance[order]) - offset)
     return np.sort(order[np.diff(upto, prepend=np.floor(-offset)) > 0])

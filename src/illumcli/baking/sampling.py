@@ -19,7 +19,7 @@ from illumcli.files.journal import Journal
 from illumcli.geometry.scene_geometry import triangle_corners
 from illumcli.geometry.spatial_order import compact
 from illumcli.progress import Progress
-from illumcli.rays.sampling import hashed, spiral_draws, stream, unit_interval
+from illumcli.rays.sampling import hashed, shuffled, spiral_draws, stream, unit_interval
 from illumcli.records import Record
 from illumcli.visibility.obscurance import estimates
 from illumcli.visibility.obscurance_error import Errors, Estimates
@@ -185,9 +185,9 @@ class BakeSampler(Record):
             return ErrorEstimate(Errors(0.0, 0.0, 0.0, 0), 0)
 
         # Choose a few points at random.
-        draw = hashed(stream(self.seed, "ao pairs"), self.points.key[counts.points])
-        few = np.argsort(draw, kind="stable")[: max(-(-len(draw) // PAIR_SHARE), MIN_PAIRS)]
-        few = np.sort(few)
+        count = max(-(-len(counts.points) // PAIR_SHARE), MIN_PAIRS)
+        few = shuffled(stream(self.seed, "ao pairs"), self.points.key[counts.points])[:count]
+        few.sort()
 
         # Estimate pairs of values there, several pairs if the points are few.
         halves: list[list[Estimates]] = [[], []]
@@ -257,22 +257,19 @@ class BakeSampler(Record):
     def _units(self, counts: RayCounts) -> Iterator[WorkUnit]:
         """Units of neighbouring points of one object that cast the same number of rays in one way."""
         purpose = f"{self.points.kind} {self.measure.channel}"
-        every = self.points.order
-        samples = np.zeros(len(every), np.int64)
-        samples[counts.points] = counts.samples
         # Group them, along their order.
-        order = every[samples[every] > 0]
+        along = np.argsort(self.points.rank[counts.points])
+        order, samples = counts.points[along], counts.samples[along]
         objects, is_flat = self.points.objects[order].astype(np.int64), self.points.is_flat[order]
-        kind = (objects * (MAX_SAMPLES + 1) + samples[order]) * 2 + is_flat
+        kind = (objects * (MAX_SAMPLES + 1) + samples) * 2 + is_flat
         by_kind = np.argsort(kind, kind="stable")
         begins = np.flatnonzero(np.diff(kind[by_kind], prepend=-1))
 
-        for group in np.split(order[by_kind], begins[1:]) if len(order) else ():
-            count = int(samples[group[0]])
+        for places in np.split(by_kind, begins[1:]) if len(order) else ():
+            count, owner = int(samples[places[0]]), int(objects[places[0]])
             size = max(1, UNIT_RAYS // count)
-            for first in range(0, len(group), size):
-                owner = int(self.points.objects[group[0]])
-                yield WorkUnit(group[first : first + size], count, owner, purpose)
+            for first in range(0, len(places), size):
+                yield WorkUnit(order[places[first : first + size]], count, owner, purpose)
 
     def _run(
         self, purpose: str, units: Sequence[WorkUnit], compute: Compute[Result]

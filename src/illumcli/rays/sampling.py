@@ -38,6 +38,14 @@ def hashed(key: int, number: NDArray[np.uint32]) -> NDArray[np.uint32]:
     return (x ^ (x >> U32(16))) + U32(key)
 
 
+def shuffled(key: int, number: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """(N,) order of numbers by their hashes; equal ones by index."""
+    keys = hashed(key, number).astype(np.uint64) << np.uint64(32)
+    keys |= np.arange(len(number), dtype=np.uint64)
+    keys.sort()  # values without ties sort several times as fast as indices in a stable order
+    return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
+
+
 def unit_interval(bits: NDArray[np.uint32]) -> NDArray[np.float64]:
     """[0, 1) float64 from 32 bits."""
     return np.multiply(bits, 2.0**-32, dtype=np.float64)

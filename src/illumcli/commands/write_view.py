@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -78,13 +79,7 @@ def write_view(
             for target in targets
         ]
 
-        # Render and write band by band.
-        developed: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
-        if audit is not None and is_held:
-            held = list(developed)
-            error, draws = measured(audit, shared, run, advance)
-            developed = bands_with_errors(held, audit.pixel_errors(draws), develop)
-        for band in developed:
+        def write(band: Band) -> None:
             start = time.perf_counter()
             if "error" in band.layers:
                 sums.add(band.layers["error"])
@@ -92,9 +87,24 @@ def write_view(
                 writer.write_band(band.y - (target.rows or (0,))[0], band.layers[str(target.path)])
             run.stats.add({"write": time.perf_counter() - start}, {})
 
+        # Render band by band; a thread writes each while later ones are rendered or the picture is audited.
+        developed: Iterable[Band] = bands(plan, shared, run, advance, develop=finish)
+        if audit is not None and is_held:
+            held = list(developed)
+            error, draws = measured(audit, shared, run, advance)
+            developed = bands_with_errors(held, audit.pixel_errors(draws), develop)
+        writing = files.enter_context(ThreadPoolExecutor(1, thread_name_prefix="write"))
+        previous: Future[None] | None = None
+        for band in developed:
+            if previous is not None:
+                previous.result()
+            previous = writing.submit(write, band)
+
         # Measure the error of reconstructed obscurance, and write it beside the layer.
         if audit is not None and not is_held:
             error, _ = measured(audit, shared, run, advance)
+        if previous is not None:
+            previous.result()
         if error is not None:
             for target, writer in zip(targets, writers, strict=True):
                 for name in _room(target, stated):

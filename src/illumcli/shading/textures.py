@@ -258,7 +258,7 @@ def _objects_of(geometry: SceneGeometry, materials: Materials) -> list[list[int]
             continue
         number = int(numbering.of_object[i])
         own = slice(*(numbering.first[i] + starts[which : which + 2]))
-        for each in [number] if number >= 0 else np.unique(numbering.of_triangle[own]).tolist():
+        for each in [number] if number >= 0 else np.flatnonzero(np.bincount(numbering.of_triangle[own])):
             objects[each].append(i)
     return objects
 

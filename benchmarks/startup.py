@@ -2,7 +2,9 @@
 
 References: `python -c "import click"` for `--help`. For a tiny render, 64x64 with its meshes kept: to import
 the six libraries that it needs. A bare import of pydantic leaves BaseModel out, and the first model that is
-defined imports the rest, so there are three of these. Whole processes, with compiled modules, interleaved.
+defined imports the rest, so there are three of these. Their processor time holds that of the threads which
+numpy's linear algebra starts; `illum` lets it start none, as does the last of them. Whole processes, with
+compiled modules, interleaved.
 
     PYTHONPATH=src python benchmarks/startup.py [--small]
 """
@@ -32,6 +34,9 @@ def main() -> None:
             "import six libraries, bare": lambda: process([sys.executable, "-c", BARE], folder),
             "import six libraries": lambda: process([sys.executable, "-c", LIBRARIES], folder),
             "six libraries and a model": lambda: process([sys.executable, "-c", ONE_MODEL], folder),
+            "six libraries, one thread": lambda: process(
+                [sys.executable, "-c", LIBRARIES], folder, OPENBLAS_NUM_THREADS="1"
+            ),
             "illum plan": lambda: illum("plan", tiny, cwd=folder),
             "illum render 64x64": lambda: illum("render", tiny, "--force", "-q", cwd=folder),
         }
@@ -40,7 +45,7 @@ def main() -> None:
         times = interleaved(runs, 1 if SMALL else 3 * REPEATS)
         table(times)
         ratio("--help / import click", times, "illum --help", "import click")
-        for reference in ("import six libraries, bare", "import six libraries", "six libraries and a model"):
+        for reference in [name for name in runs if "six libraries" in name]:
             ratio(f"tiny render / {reference}", times, "illum render 64x64", reference)
 
 

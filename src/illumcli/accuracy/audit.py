@@ -243,7 +243,7 @@ class Audit(Record):
 def pixel_chances(picture: NDArray[np.float32]) -> NDArray[np.float64]:
     """(H * W,) chance of each pixel at each draw: a third the same for all, a third by the contrast around
     it, and a third by its square, since most of the error is at edges and highlights."""
-    contrast = contrasts(picture)
+    contrast = contrasts(picture).astype(np.float64)
     chances = np.full(contrast.size, 1 / contrast.size)
     if not contrast.any():
         return chances
@@ -251,12 +251,12 @@ def pixel_chances(picture: NDArray[np.float32]) -> NDArray[np.float64]:
     return (chances + contrast / contrast.sum() + square / square.sum()) / 3
 
 
-def contrasts(picture: NDArray[np.float32]) -> NDArray[np.float64]:
+def contrasts(picture: NDArray[np.float32]) -> NDArray[np.float32]:
     """(H * W,) range of the values, means over the channels, in the 3 x 3 pixels around each pixel."""
-    values = np.zeros(picture.shape[:2])
+    values = np.zeros(picture.shape[:2], F)
     for channel in range(picture.shape[2]):  # a mean over the last axis takes ten times as long
         values += picture[..., channel]
-    values /= picture.shape[2]
+    values /= F(picture.shape[2])
     return np.asarray((around(values, np.maximum, 1) - around(values, np.minimum, 1)).ravel())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
@@ -18,6 +19,7 @@ from illumcli.cache.store import Store
 from illumcli.commands import render
 from illumcli.commands.options import RenderJob, RenderOptions
 from illumcli.commands.sweep import sweep_scene
+from illumcli.compiled import SWITCH
 from illumcli.images.reader import read_image
 from illumcli.render_graph.execute import Run, at_pixels, run_once
 from illumcli.scene.load import load
@@ -52,6 +54,18 @@ def tiles_and_threads_change_nothing(case: Case, random: Random, studio: Studio)
     same(
         pictures(path, layers=layers), pictures(path, layers=layers, threads=random.randint(1, 3), side=side)
     )
+
+
+@relation("exact")
+def loops_in_c_change_nothing(case: Case, random: Random, studio: Studio) -> None:
+    """Without the compiled loops every pixel is the same, also where obscurance is reconstructed."""
+    path = case.write(studio.folder())
+    layers = (*ALL, "triangle_id", *light_layers(case))
+    reconstructed = ["obscurance.reconstruct=true"] if "obscurance" in case.scene else []
+    overrides = random.choice([[], reconstructed])
+    compiled = pictures(path, overrides, layers)
+    with patch.dict(os.environ, {SWITCH: "0"}):
+        same(compiled, pictures(path, overrides, layers))
 
 
 @relation("exact")

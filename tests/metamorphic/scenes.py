@@ -396,7 +396,7 @@ def vary(random: Random, case: Case, thing: dict[str, Any]) -> None:
 
 def has_uvs(source: dict[str, Any]) -> bool:
     """Has a built-in shape texture coordinates?"""
-    return source["shape"] not in ("polygons", "implicit")
+    return source["shape"] not in ("polygons", "implicit", "text")
 
 
 # --- lights, views, settings -----------------------------------------------------------------------------

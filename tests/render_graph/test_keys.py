@@ -27,6 +27,7 @@ DECIDE_NOTHING = {
     "images/": "textures, which are read anew in every run",
     "layers.py": "what goes into files",
     "memory.py": "refusals",
+    "compiled.py": "which loop runs, whose bits are the same",
     "records.py": "fields",
     "scene/": "descriptions, whose values are bound in the nodes",
     "schema/": "checks of descriptions, whose values are bound in the nodes",

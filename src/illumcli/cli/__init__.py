@@ -13,7 +13,6 @@ from typing import Any
 import click
 
 from illumcli import __version__
-from illumcli.cli._plugins import disable_plugins
 from illumcli.cli._streams import open_standard_streams
 from illumcli.errors import LITTLE_MEMORY, IllumError, LimitError, OutputError, known
 from illumcli.memory import refuse_little
@@ -95,7 +94,8 @@ def main() -> None:
     gc.set_threshold(100_000, 50, 50)
     # tiles run on our own threads; threads of numpy's linear algebra would only compete with them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    disable_plugins()
+    # in search of plugins, pydantic would read the metadata of every installed package: 5 % of start-up
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     status = 1
     try:
         output = open_standard_streams()

@@ -27,6 +27,7 @@ from illumcli.render_graph.adaptive_tile import (
 from illumcli.render_graph.build import SURROUNDINGS
 from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.schedule import Plan
+from illumcli.render_graph.shadow_batches import with_shadow_batches
 from illumcli.render_graph.tile_nodes import (
     Develop,
     Kept,
@@ -134,6 +135,7 @@ def bands(
     rows = plan.rows_of_tiles(side)
     keeps = plan.lookup.keeps if plan.rows is None else {}  # buffers of tiles are kept of whole pictures
     recorder, stop = BufferRecorder(run.cache, keeps, view), threading.Event()
+    plan = with_shadow_batches(plan)
     common = TileContext(
         plan, shared, run.stats, stop, recorder, develop, pixel_recorder_of(plan, run.cache), run.cache
     )

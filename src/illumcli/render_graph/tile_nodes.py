@@ -27,6 +27,7 @@ from illumcli.render_graph.build_adaptive import FITTED
 from illumcli.render_graph.schedule import Plan, uncached_plans
 from illumcli.shading.direct import Lobes
 from illumcli.visibility.object_pixels import FittedPixels
+from illumcli.visibility.shadows import Shadows
 
 Planes: TypeAlias = dict[str, NDArray[Any]]  # layer -> (rows, columns, channels), float32; ids are uint32
 Kept: TypeAlias = dict[str, NDArray[Any] | None]  # buffer -> its values as the cache stores them
@@ -160,7 +161,8 @@ def given_buffers(
 def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int]) -> None:
     """Run the nodes of these numbers on the buffers of a tile."""
     buffers, tracer = started.buffers, started.buffers.get("tracer")
-    seconds, rays, unlit = {}, {}, {}
+    seconds: dict[str, float] = {}
+    rays, unlit = {}, {}
     mended: Counter[str] = Counter()
     plan = started.plan
     if id(plan) not in common.last_use:
@@ -174,9 +176,15 @@ def run_nodes(common: TileContext, started: StartedTile, numbers: Iterable[int])
         # Compute the buffer, and measure it.
         start, before = time.perf_counter(), tracer.rays if tracer else 0
         value = buffers[node.output] = node.run(buffers)
-        seconds[node.output] = time.perf_counter() - start
-        if tracer and tracer.rays > before:
-            rays[node.output] = tracer.rays - before
+        elapsed = time.perf_counter() - start
+        if isinstance(value, Shadows):  # those of each light are its own
+            for name, share in value.shares(elapsed).items():
+                of_light = f"shadow:{name.partition(':')[2]}"
+                seconds[of_light], rays[of_light] = share, value.rays[name]
+        else:
+            seconds[node.output] = seconds.get(node.output, 0.0) + elapsed
+            if tracer and tracer.rays > before:
+                rays[node.output] = tracer.rays - before
         if isinstance(value, LitPoints):
             unlit[node.output] = value.count - len(value.index)
         elif isinstance(value, Lobes):

@@ -50,6 +50,21 @@ def test_bounds_of_many_copies_are_those_of_each(monkeypatch):
     assert made.render_space == each.render_space
 
 
+def test_boxes_of_small_meshes_together_are_those_of_each_alone():
+    random = np.random.default_rng(3)
+    small, large = Sphere(segments=8, rings=6).mesh(), Torus().mesh()
+    unused = Mesh(np.vstack([small.vertices, [[1e3] * 3]]), small.corners, small.starts)
+    meshes = [(small, unused, large)[k] for k in random.integers(0, 3, 600)]
+    matrices = [np.eye(4) for _ in meshes]
+    for matrix in matrices:
+        matrix[:3] = random.normal(size=(3, 4))
+    made = object_bounds(meshes, matrices)
+    for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
+        alone = object_bounds([mesh], [matrix])
+        assert np.array_equal(made.low[number], alone.low[0])
+        assert np.array_equal(made.high[number], alone.high[0])
+
+
 def test_widths_of_copies_are_bounds(monkeypatch):
     random = np.random.default_rng(2)
     mesh = Sphere(segments=8, rings=6).mesh()

@@ -10,15 +10,33 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import field, fields
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from inspect import ismethod
 from pathlib import Path
 from types import FunctionType
+from typing import cast
 
 from illumcli.errors import InputError
 from illumcli.graph import short_name
 from illumcli.records import Value
 from illumcli.schema.foreign import source_digest
+
+PLAIN = frozenset((str, int, float, bool, bytes, type(None)))
+"""Types of most values, told without a search of their ancestors."""
+
+
+@cache
+def shown_fields(kind: type) -> list[str]:
+    """Names of the fields of a class that the `repr` of its values shows."""
+    return [part.name for part in fields(kind) if part.repr]
+
+
+@cache
+def is_description(kind: type) -> bool:
+    """True for classes of this package whose values list their fields and have no `fingerprint`."""
+    others = str, int, float, bytes, tuple, list, Mapping, type, Value
+    is_listing = issubclass(kind, Iterable) and not issubclass(kind, others)
+    return is_listing and kind.__module__.startswith("illumcli.") and not hasattr(kind, "fingerprint")
 
 
 def fingerprint(value: object) -> str:
@@ -32,13 +50,17 @@ def fingerprint(value: object) -> str:
     TypeError
         A value without a fingerprint: an array, an arbitrary object.
     """
-    if value is None or isinstance(value, str | int | float | bytes):
+    kind = type(value)
+    if kind in PLAIN or isinstance(value, (str, int, float, bytes)):
         return repr(value)
-    if isinstance(value, tuple | list):
-        return f"({', '.join(map(fingerprint, value))})"
+    if is_description(kind):  # type: ignore[arg-type]  # mypy takes the hash of its values
+        return kind.__name__ + fingerprint(dict(cast("Iterable[tuple[str, object]]", value)))
+    if isinstance(value, (tuple, list)):
+        return f"({', '.join(_each(value))})"
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{fingerprint(key)}: {fingerprint(each)}' for key, each in value.items())}}}"
-    if isinstance(value, type | FunctionType):
+        parts = zip(_each(value), _each(value.values()), strict=True)
+        return f"{{{', '.join([f'{key}: {each}' for key, each in parts])}}}"
+    if isinstance(value, (type, FunctionType)):
         return short_name(value)
     if isinstance(value, partial):
         return fingerprint((value.func, value.args, sorted(value.keywords.items())))
@@ -47,14 +69,17 @@ def fingerprint(value: object) -> str:
     if (method := getattr(value, "fingerprint", None)) is not None:
         return str(method())
     if isinstance(value, Value):
-        named = {part.name: getattr(value, part.name) for part in fields(value) if part.repr}
-    elif isinstance(value, Iterable) and type(value).__module__.startswith("illumcli."):
-        named = dict(value)  # descriptions list their fields
+        named = {name: getattr(value, name) for name in shown_fields(kind)}  # type: ignore[arg-type]
     elif isinstance(value, Iterable) and (sources := source_digest(type(value))):
         named = {"sources of its class": sources, **dict(value)}
     else:
         raise TypeError(f"{type(value).__name__} has no fingerprint")
     return type(value).__name__ + fingerprint(named)
+
+
+def _each(values: Iterable[object]) -> list[str]:
+    """The fingerprint of each value; most are plain."""
+    return [repr(each) if type(each) in PLAIN else fingerprint(each) for each in values]
 
 
 def digest(value: object) -> str:

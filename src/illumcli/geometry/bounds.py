@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.arrays import row_blocks
+from illumcli.arrays import BLOCK_ROWS, row_blocks
 from illumcli.geometry.extent import Extent, box_corners, extents, take_used, used_vertices
 from illumcli.geometry.mesh import Mesh
 from illumcli.geometry.polygon_normals import blocks
@@ -44,11 +44,15 @@ def object_bounds(
     # A box for each object.
     of_mesh = extents(meshes) if known is None else known
     low, high = np.full((len(meshes), 3), np.inf), np.full((len(meshes), 3), -np.inf)
-    for number, (mesh, matrix) in enumerate(zip(meshes, matrices, strict=True)):
+    for mesh, numbers in _objects_of_meshes(meshes):
         if extent := of_mesh.get(id(mesh)):
-            low[number], high[number] = extent.box(matrix[:3, :3], matrix[:3, 3])
+            for number in numbers:
+                matrix = matrices[number]
+                low[number], high[number] = extent.box(matrix[:3, :3], matrix[:3, 3])
         elif len(mesh.corners):
-            low[number], high[number] = _transformed_box(mesh, matrix)
+            for some in _together(mesh, numbers):
+                places = np.stack([matrices[number] for number in some])
+                low[some], high[some] = _transformed_boxes(mesh, places)
 
     # The box around all of them; a point at the origin where there are no polygons.
     lowest, highest = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
@@ -64,18 +68,36 @@ def object_bounds(
     return ObjectBounds(tuple(matrices), low, high, polygons, most_corners, render_space)
 
 
-def _transformed_box(
-    mesh: Mesh, matrix: NDArray[np.float64]
+def _objects_of_meshes(meshes: Sequence[Mesh]) -> list[tuple[Mesh, list[int]]]:
+    """Each distinct mesh, and the numbers of the objects that have it."""
+    numbers: dict[int, list[int]] = {}
+    for number, mesh in enumerate(meshes):
+        numbers.setdefault(id(mesh), []).append(number)
+    return [(meshes[each[0]], each) for each in numbers.values()]
+
+
+def _together(mesh: Mesh, numbers: list[int]) -> Iterator[list[int]]:
+    """The objects of a mesh, so many at a time that their vertices fill a block."""
+    step = max(1, BLOCK_ROWS // max(len(mesh.vertices), 1))
+    for first in range(0, len(numbers), step):
+        yield numbers[first : first + step]
+
+
+def _transformed_boxes(
+    mesh: Mesh, matrices: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner, (3,) each, of the box around all vertices in polygons [scene units]."""
+    """Lowest and highest corners, (O, 3) each, of the boxes around all vertices in polygons [scene units]
+    under each of (O, 4, 4) matrices."""
     used = used_vertices(mesh)
-    parts = [
-        box_corners(points[used[rows]] if not used[rows].all() else points)
-        for rows, points in transformed_blocks(mesh, matrix)
-        if used[rows].any()
-    ]
-    low, high = (np.stack(each) for each in zip(*parts, strict=True))
-    return low.min(axis=0), high.max(axis=0)
+    low, high = np.full((len(matrices), 3), np.inf), np.full((len(matrices), 3), -np.inf)
+    for rows in row_blocks(len(mesh.vertices)):
+        if not used[rows].any():
+            continue
+        points = mesh.vertices[rows] @ matrices[:, :3, :3].transpose(0, 2, 1)
+        points = points.transpose(2, 0, 1)[:, :, used[rows]] + matrices[:, :3, 3].T[:, :, None]
+        np.minimum(low, points.min(axis=2).T, out=low)
+        np.maximum(high, points.max(axis=2).T, out=high)
+    return low, high
 
 
 def transformed_vertices(mesh: Mesh, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -124,9 +146,13 @@ def implied_widths(
     shared = {key: mesh for mesh in meshes if count[key := id(mesh)] > 1}
     widest = {key: SQRT3 * widest_polygon(mesh, np.eye(4)) for key, mesh in shared.items()}
     widths = np.zeros(len(meshes))
-    for i, (is_flat, mesh, matrix) in enumerate(zip(flat, meshes, object_bounds.matrices, strict=True)):
-        if not is_flat and id(mesh) in widest:
-            widths[i] = widest[id(mesh)] * np.linalg.norm(matrix[:3, :3], 2)
-        elif not is_flat:
-            widths[i] = widest_polygon(mesh, matrix)
+    smooth = [number for number, is_flat in enumerate(flat) if not is_flat]
+    several = [number for number in smooth if id(meshes[number]) in widest]
+    if several:
+        linear = np.stack([object_bounds.matrices[number][:3, :3] for number in several])
+        stretch = np.linalg.norm(linear, 2, axis=(1, 2))
+        widths[several] = [widest[id(meshes[number])] for number in several] * stretch
+    for number in smooth:
+        if id(meshes[number]) not in widest:
+            widths[number] = widest_polygon(meshes[number], object_bounds.matrices[number])
     return widths

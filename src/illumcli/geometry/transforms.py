@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -47,8 +48,9 @@ def transform_matrix(transform: Transform, mesh: Mesh, extent: Extent | None = N
     return matrix if transform.matrix is None else np.asarray(transform.matrix, np.float64) @ matrix
 
 
+@lru_cache(maxsize=1 << 10)
 def rotation(axis: int, degrees: float) -> NDArray[np.float64]:
-    """(4, 4) right-handed rotation about a coordinate axis; quarter turns are exact."""
+    """(4, 4) right-handed rotation about a coordinate axis, read-only; quarter turns are exact."""
     quarter, rest = divmod(degrees, 90.0)
     cosine, sine = np.cos(np.radians(rest)), np.sin(np.radians(rest))
     for _ in range(int(quarter) % 4):
@@ -57,6 +59,7 @@ def rotation(axis: int, degrees: float) -> NDArray[np.float64]:
     matrix = np.eye(4)
     matrix[i, i] = matrix[j, j] = cosine
     matrix[j, i], matrix[i, j] = sine, -sine
+    matrix.setflags(write=False)
     return matrix
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,8 @@ from illumcli.render_graph.explain import expected_rays
 from illumcli.render_graph.schedule import reached
 from illumcli.scene.access import resolve
 from illumcli.scene.scene_file import SceneFile
-from illumcli.scene.spec import MeshFile, Object, Scene
+from illumcli.scene.spec import Matrix, MeshFile, Scene
+from illumcli.schema.fields import Vector
 
 BYTES_OF_FILES = {".obj": 8, ".ply": 14, ".stl": 14}
 """Memory of a mesh per byte of its file; a triangle takes 80 bytes of text, or 43 of binary."""
@@ -47,12 +49,13 @@ def expected_memory(loaded: SceneFile, scene: Scene, shares_meshes: bool = True)
     """
     sizes = {"shapes": 0, "meshes": 0, "textures": 0}
     of_file: dict[Path, int] = {}  # each file is looked at once
+    paths: dict[str, Path] = {}
     importing: dict[Path, None] = {}
     shared: Counter[str] = Counter()
     for thing in scene.objects:
         name, is_sharing = (
             needs.mesh_name(scene, thing.mesh),
-            shares_meshes and _stretch(thing) <= MOST_STRETCH,
+            shares_meshes and _stretch(thing.transform.scale, thing.transform.matrix) <= MOST_STRETCH,
         )
         shared[name] += is_sharing
         is_stored = not is_sharing or shared[name] <= 2
@@ -60,7 +63,10 @@ def expected_memory(loaded: SceneFile, scene: Scene, shares_meshes: bool = True)
         if isinstance(source, Shape):
             sizes["shapes"] += TRIANGLE_BYTES * source.triangles() if is_stored else 0
             continue
-        path = loaded.folder / (source.file if isinstance(source, MeshFile) else str(source))
+        file = source.file if isinstance(source, MeshFile) else str(source)
+        if file not in paths:
+            paths[file] = loaded.folder / file
+        path = paths[file]
         if path not in of_file:
             of_file[path] = _mesh_bytes(path)
         sizes["meshes"] += of_file[path] if is_stored else 0
@@ -84,14 +90,15 @@ def _mesh_bytes(path: Path) -> int:
     return factor * path.stat().st_size if path.is_file() else 0
 
 
-def _stretch(thing: Object) -> float:
-    """Upper bound on the ratio of the axes of an object's transform."""
-    axes = np.abs(thing.transform.scale)
+@lru_cache(maxsize=1 << 10)
+def _stretch(scale: Vector, matrix: Matrix | None) -> float:
+    """Upper bound on the ratio of the axes of a transform."""
+    axes = np.abs(scale)
     if not axes.min():
         return np.inf
     of_matrix = 1.0
-    if thing.transform.matrix is not None:
-        of_matrix = float(np.linalg.cond(np.asarray(thing.transform.matrix)[:3, :3]))
+    if matrix is not None:
+        of_matrix = float(np.linalg.cond(np.asarray(matrix)[:3, :3]))
     return float(axes.max() / axes.min()) * of_matrix
 
 

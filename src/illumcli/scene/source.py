@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import yaml
@@ -32,6 +32,8 @@ _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f]")
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_NUMERIC = frozenset("+-.0123456789")
+"""What a number begins with, finite or not."""
 _UNQUOTED = re.compile(r"[ \t]*(#[0-9A-Fa-f]{3,8})[ \t]*\r?$", re.MULTILINE)
 _WORDS: dict[str, Scalar] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
@@ -306,7 +308,7 @@ class _Composer:
                 where = f", first in line {first.line}" if first.line else ""
                 self.problem(mark, path, f"the key '{short(key)}' stands twice{where}; remove one")
             else:
-                entries[key] = replace(value, key=at)
+                entries[key] = Node(value.value, value.place, at, value.size, value.depth)
         return merged | entries
 
     def merged(self, value: Node, path: Path, mark: Any) -> dict[str, Node]:
@@ -332,6 +334,8 @@ class _Composer:
         # null, true, false; numbers.
         if text in _WORDS:
             return _WORDS[text]
+        if text[0] not in _NUMERIC:
+            return text
         if _NOT_FINITE.fullmatch(text):
             self.problem(mark, path, f"must be a finite number, is {text}")
             return text

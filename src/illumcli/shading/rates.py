@@ -125,7 +125,7 @@ def points(
     if len(set(rates)) == 1 and (own_points := RATES[rates[0]].points) is not None:
         return own_points(context, centres, polygon_normals)
     of_sample = _rate_of_samples(rates, context)
-    if all(RATES[name].at_samples for name in rates):
+    if all(RATES[name].at_samples for name in set(rates)):
         return _samples(context, _sample_normals(context, of_sample))
 
     # Split the samples: one group per rate that has its own points, and one for all that are shaded in place.
@@ -181,7 +181,8 @@ def normals_of_points(points: ShadingPoints) -> Vectors:
 
 def _rate_of_samples(rates: Sequence[Rate], context: ShadingContext) -> NDArray[np.int8]:
     """(M,) row in `RATES` of the rate of each sample's object."""
-    number = np.array([list(RATES).index(name) for name in rates], np.int8)
+    row = {name: number for number, name in enumerate(RATES)}
+    number = np.fromiter(map(row.__getitem__, rates), np.int8, len(rates))
     return number.take(context.weights.hits.objects)
 
 

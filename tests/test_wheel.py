@@ -25,6 +25,7 @@ WITH_COMPILER = pytest.mark.skipif(os.name == "nt" or not COMPILERS, reason="nee
 
 SOURCES = (
     "__init__.py",
+    "compiled.h",
     "rays/packets.c",
     "rays/samples.c",
     "visibility/regression.c",

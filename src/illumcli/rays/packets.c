@@ -4,20 +4,10 @@
    functions, and calls it by ctypes, without the interpreter lock. The layouts are those of RTCRay, RTCRay4, RTCRay8
    and RTCRay16 and of the hits that follow them (rtcore_ray.h, Embree 4). */
 
-#include <stddef.h>
-#include <stdint.h>
-#include <string.h>
+#include "../compiled.h"
 
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-#if defined(_MSC_VER)
-#define INLINE static __forceinline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
+#include <stddef.h>
+#include <string.h>
 
 enum { INTERFACE = 4 }; /* of packet_loop.py: both change together */
 enum { WIDEST = 16, ALIGNMENT = 64 };
@@ -38,12 +28,6 @@ typedef union {
 typedef void (*Function)(void);
 typedef void (*PacketQuery)(const int32_t *valid, void *scene, void *rays, void *arguments);
 typedef void (*SingleQuery)(void *scene, void *ray, void *arguments);
-
-/* (N, 3) float32, of any strides [bytes]. */
-typedef struct {
-  const char *data;
-  int64_t stride, component;
-} Vectors;
 
 typedef struct {
   Function function; /* a PacketQuery such as rtcOccluded16; for packets of 1 a SingleQuery */
@@ -96,10 +80,6 @@ typedef struct {
   float *directions; /* (3, points, samples), or NULL */
   int64_t stride;    /* from one component of the directions to the next */
 } PatternResults;
-
-INLINE float component(const Vectors *of, int64_t i, int k) {
-  return *(const float *)(of->data + i * of->stride + k * of->component);
-}
 
 INLINE Cell *aligned(Cell *room) {
   return (Cell *)(((uintptr_t)room + ALIGNMENT - 1) & ~(uintptr_t)(ALIGNMENT - 1));

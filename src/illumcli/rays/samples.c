@@ -3,27 +3,15 @@
    The operations of camera.py, interaction.py and offsets.py in their order, so that the results have the same bits.
    compiled_samples.py calls this file by ctypes, without the interpreter lock. */
 
+#include "../compiled.h"
+
 #include <float.h>
 #include <math.h>
-#include <stdint.h>
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-#if defined(_MSC_VER)
-#define INLINE static __forceinline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
 
 enum { INTERFACE = 1 }; /* of compiled_samples.py: both change together */
 
 #define CLEAR 1.25    /* rays start so far before they are closest to the centre [radii] */
 #define LONGEST 100.0 /* effective edge [radii] */
-
-INLINE double greater(double a, double b) { return a > b ? a : b; }
 
 INLINE float greater_float(float a, float b) { return a > b ? a : b; }
 
@@ -54,18 +42,6 @@ EXPORT void illum_camera_rays(const Pinhole *camera, const double *points, int64
   }
 }
 
-/* (N, 3) values, of any strides [bytes]. */
-typedef struct {
-  const char *data;
-  int64_t stride, component;
-} Vectors;
-
-INLINE const void *component(const Vectors *of, int64_t i, int k) {
-  return of->data + i * of->stride + k * of->component;
-}
-
-INLINE float real(const Vectors *of, int64_t i, int k) { return *(const float *)component(of, i, k); }
-
 typedef struct {
   Vectors vertices, triangles, towards_eye;
   const int32_t *triangle; /* (count,) */
@@ -92,13 +68,13 @@ EXPORT void illum_surface(const SurfaceHits *hits, const Surface *out) {
     double v0[3], e1[3], e2[3], e3[3], eye[3];
     int32_t corner[3];
     for (int k = 0; k < 3; k++)
-      corner[k] = *(const int32_t *)component(&hits->triangles, hits->triangle[i], k);
+      corner[k] = number(&hits->triangles, hits->triangle[i], k);
     for (int k = 0; k < 3; k++) {
-      v0[k] = real(&hits->vertices, corner[0], k);
-      e1[k] = real(&hits->vertices, corner[1], k) - v0[k];
-      e2[k] = real(&hits->vertices, corner[2], k) - v0[k];
+      v0[k] = component(&hits->vertices, corner[0], k);
+      e1[k] = component(&hits->vertices, corner[1], k) - v0[k];
+      e2[k] = component(&hits->vertices, corner[2], k) - v0[k];
       e3[k] = e2[k] - e1[k];
-      eye[k] = real(&hits->towards_eye, i, k);
+      eye[k] = component(&hits->towards_eye, i, k);
     }
 
     /* Its longest edge in single precision, its normal in double. */

@@ -1,17 +1,7 @@
 /* Polynomials of least squares from sums of moments: the operations of regression.py in their order. */
 
-#include <stdint.h>
+#include "../compiled.h"
 
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-#if defined(_MSC_VER)
-#define INLINE static __forceinline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
 enum { FEATURES = 6, PAIRS = FEATURES * (FEATURES + 1) / 2 };
 /* Rows of moments, as in regression.py. */
 enum {
@@ -29,10 +19,6 @@ enum { LANES = 32 }; /* cells that are computed together, in a core's first cach
 typedef double Lanes[LANES];
 
 #define EACH_LANE for (int64_t k = 0; k < LANES; k++)
-
-INLINE double greater(double a, double b) { return a > b ? a : b; }
-
-INLINE int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
 /* One polynomial per lane. */
 typedef struct {

@@ -127,7 +127,8 @@ def edges(
 
     # Different objects.
     low = around(np.minimum(centres.object, probes.lowest.reshape(shape)), np.minimum, reach)
-    differ = around(np.maximum(centres.object, probes.highest.reshape(shape)), np.maximum, reach) > low
+    high = around(np.maximum(centres.object, probes.highest.reshape(shape)), np.maximum, reach)
+    differ = high > low
 
     # Different normals.
     for normal in centres.ng:
@@ -143,8 +144,7 @@ def edges(
     differ |= around(steps, np.maximum, reach)
 
     # The film's border, but for empty sky.
-    sees = around(np.maximum(centres.object, probes.highest.reshape(shape)), np.maximum, reach) > 0
-    return np.asarray(differ | (sees & at_border(view, tile, reach))).ravel()
+    return np.asarray(differ | ((high > 0) & at_border(view, tile, reach))).ravel()
 
 
 def at_border(view: View, tile: Tile, width: int) -> NDArray[np.bool_]:

@@ -25,6 +25,9 @@ lights:
 """
 
 
+TOGETHER = ["shadows until shadow:l6", "shadows until shadow:l8"]
+
+
 @pytest.fixture
 def loaded(tmp_path):
     rings = [
@@ -71,8 +74,8 @@ def test_every_node_comes_after_its_inputs_and_the_incident_light_of_a_batch_is_
         assert done >= set(node.inputs.values())
         done.add(node.output)
     names = [node.output for node in nodes]
-    assert [name for name in names if name.startswith("shadows of")] == ["shadows of 8", "shadows of 10"]
-    assert sorted(set(names) - {"shadows of 8", "shadows of 10"}) == sorted(n.output for n in plan.tile)
+    assert [name for name in names if name.startswith("shadows until")] == TOGETHER
+    assert sorted(set(names) - {*TOGETHER}) == sorted(n.output for n in plan.tile)
 
 
 def test_few_lights_flat_objects_and_adaptive_pictures_have_none(tmp_path):
@@ -80,4 +83,4 @@ def test_few_lights_flat_objects_and_adaptive_pictures_have_none(tmp_path):
         (tmp_path / "scene.yaml").write_text(SCENE)
         plan = plan_of(load(tmp_path / "scene.yaml", [change]))
         batches = shadow_batches.with_shadow_batches(plan)
-        assert not [node for node in batches.tile if node.output.startswith("shadows of")]
+        assert not [node for node in batches.tile if node.output.startswith("shadows until")]

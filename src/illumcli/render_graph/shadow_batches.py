@@ -30,20 +30,26 @@ def with_shadow_batches(plan: Plan) -> Plan:
 def batched(nodes: Sequence[Node]) -> list[Node]:
     """The nodes of a tile, in which shadows of consecutive lights are of one node."""
     of_shadow = [node for node in nodes if node.function is shadow and "smooth_surface" in node.inputs]
-    out = list(nodes)
-    for first in range(0, len(of_shadow) if len(of_shadow) >= BATCH else 0, BATCH):
-        # The batch stands where its first light's shadow does, behind the incident light of all its lights.
-        batch = of_shadow[first : first + BATCH]
-        place = out.index(batch[0])
-        before, after = out[:place], [node for node in out[place:] if node not in batch]
-        lights = {node.inputs[CANDIDATES] for node in batch}
-        incident = [node for node in after if node.output in lights]
-        unknown = {node.output for node in after} - lights
-        reads = {name for node in (*batch, *incident) for name in node.inputs.values()}
-        if len(batch) == 1 or not reads.isdisjoint(unknown):
+    if len(of_shadow) < BATCH:
+        return list(nodes)
+    by_name = {node.output: node for node in nodes}
+    batches = (of_shadow[first : first + BATCH] for first in range(0, len(of_shadow), BATCH))
+    batch_of = {batch[0].output: batch for batch in batches if len(batch) > 1}
+    out: list[Node] = []
+    known: set[str] = set()
+    for node in nodes:
+        if node.output in known:
             continue
-        after = [node for node in after if node not in incident]
-        out = [*before, *incident, *_together(batch, f"shadows of {first + len(batch)}"), *after]
+        # A batch stands where its first light's shadow does, behind the incident light of all its lights.
+        together = [node]
+        if batch := batch_of.get(node.output):
+            lights = [each.inputs[CANDIDATES] for each in batch]
+            incident = [by_name[name] for name in lights if name in by_name and name not in known]
+            reads = {name for each in (*batch, *incident) for name in each.inputs.values()}.difference(lights)
+            if all(name in known or name not in by_name for name in reads):
+                together = [*incident, *_together(batch, f"shadows until {batch[-1].output}")]
+        out += together
+        known |= {each.output for each in together}
     return out
 
 

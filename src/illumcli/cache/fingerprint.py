@@ -78,8 +78,16 @@ def fingerprint(value: object) -> str:
 
 
 def _each(values: Iterable[object]) -> list[str]:
-    """The fingerprint of each value; most are plain."""
-    return [repr(each) if type(each) in PLAIN else fingerprint(each) for each in values]
+    """The fingerprint of each value; most are plain, or the object before them."""
+    texts, last, text = [], None, ""
+    for value in values:
+        if type(value) in PLAIN:
+            texts.append(repr(value))
+            continue
+        if value is not last:
+            last, text = value, fingerprint(value)
+        texts.append(text)
+    return texts
 
 
 def digest(value: object) -> str:

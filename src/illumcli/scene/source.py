@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeAlias
 
 import yaml
@@ -235,7 +235,8 @@ class _Composer:
         # Aliases, and limits.
         mark = key or event.start_mark
         if isinstance(event, yaml.AliasEvent):
-            return self.alias(event, mark, path, depth)
+            aliased = self.alias(event, mark, path, depth)
+            return aliased if key is None else replace(aliased, key=self.place(key))
         self.written += 1
         self.count(mark, 1)
         if depth > MAX_DEPTH:
@@ -248,16 +249,18 @@ class _Composer:
             self.problem(mark, path, f"the tag {short(event.tag)} is not read; write the plain value")
 
         # The value.
+        place = self.place(event.start_mark)
+        of_key = None if key is None else self.place(key)
         if isinstance(event, yaml.ScalarEvent):
-            node = Node(self.scalar(event, mark, path), self.place(event.start_mark))
+            node = Node(self.scalar(event, mark, path), place, of_key)
         elif isinstance(event, yaml.SequenceStartEvent):
             parts = self.sequence(events, path, depth)
-            node = _branch(parts, parts, self.place(event.start_mark))
+            node = _branch(parts, parts, place, of_key)
         else:
             entries = self.mapping(events, path, depth)
-            node = _branch(entries, entries.values(), self.place(event.start_mark))
+            node = _branch(entries, entries.values(), place, of_key)
         if event.anchor is not None:
-            self.anchors[event.anchor] = node
+            self.anchors[event.anchor] = replace(node, key=None)
         return node
 
     def count(self, mark: Any, more: int) -> None:
@@ -299,7 +302,7 @@ class _Composer:
             mark = event.start_mark
             if not isinstance(event, yaml.ScalarEvent):
                 self.refuse(mark, "a key must be text")
-            key, at = event.value, self.place(mark)
+            key = event.value
             value = self.node(next(events), events, (*path, key), depth + 1, mark)
             if key == "<<" and event.implicit[0]:
                 merged |= self.merged(value, path, mark)
@@ -308,7 +311,7 @@ class _Composer:
                 where = f", first in line {first.line}" if first.line else ""
                 self.problem(mark, path, f"the key '{short(key)}' stands twice{where}; remove one")
             else:
-                entries[key] = Node(value.value, value.place, at, value.size, value.depth)
+                entries[key] = value
         return merged | entries
 
     def merged(self, value: Node, path: Path, mark: Any) -> dict[str, Node]:
@@ -355,12 +358,14 @@ class _Composer:
         return number
 
 
-def _branch(value: list[Node] | dict[str, Node], parts: Iterable[Node], place: Place) -> Node:
+def _branch(
+    value: list[Node] | dict[str, Node], parts: Iterable[Node], place: Place, key: Place | None
+) -> Node:
     size, depth = 1, 0
     for part in parts:
         size += part.size
         depth = max(depth, part.depth)
-    return Node(value, place, None, size, depth + 1)
+    return Node(value, place, key, size, depth + 1)
 
 
 def _syntax(error: yaml.MarkedYAMLError) -> str:

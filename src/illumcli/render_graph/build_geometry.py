@@ -72,8 +72,10 @@ def _normal_nodes(scene: Scene, shares_meshes: bool) -> list[Node]:
     # Objects that have one mesh, with normals computed in one way, may share it at any shading rate.
     names = [needs.mesh_name(scene, thing.mesh) for thing in scene.objects]
     number: dict[tuple[str, str], int] = {}
+    texts = {key: repr(each) for key, each in {id(each): each for each in says}.items()}
     kinds = tuple(
-        number.setdefault((name, repr(each)), len(number)) for name, each in zip(names, says, strict=True)
+        number.setdefault((name, texts[id(each)]), len(number))
+        for name, each in zip(names, says, strict=True)
     )
     if len(number) == len(kinds) or not shares_meshes or embree_library() is None:
         kinds = tuple(range(len(kinds)))

@@ -13,6 +13,7 @@ from illumcli.geometry.scene_geometry import place_meshes
 from illumcli.rays.camera import camera_rays
 from illumcli.rays.compiled_samples import sample_loop
 from illumcli.rays.interaction import interact
+from illumcli.rays.offsets import offset_ray_origins
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Perspective
 
@@ -62,6 +63,21 @@ def test_surfaces_have_the_same_bits(monkeypatch, scale):
     monkeypatch.setenv(SWITCH, "0")
     same_bits(compiled, interact(*arguments))
     assert compiled.back_facing.any()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_ray_origins_have_the_same_bits(monkeypatch, scale):
+    rng = np.random.default_rng(7)
+    position = np.asfortranarray(scale * rng.normal(size=(5001, 3)))
+    position[::5, 1], position[::7, 0] = 0, -0.0
+    ng = np.asfortranarray(rng.normal(size=(5001, 3)).astype(F))
+    ng[::3, 2], ng[::4, 1] = 0, -0.0
+    edges = rng.random(5001).astype(F)
+    for arguments in ((position, ng, edges), (position, ng, edges.astype(float)), (position, ng[:1], edges)):
+        monkeypatch.delenv(SWITCH, raising=False)
+        compiled = offset_ray_origins(*arguments)
+        monkeypatch.setenv(SWITCH, "0")
+        assert compiled.tobytes() == offset_ray_origins(*arguments).tobytes()
 
 
 def test_other_types_are_computed_by_numpy(monkeypatch):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.compiled import CVectors, are_switched_off, compiled_library
 
-INTERFACE = 1
+INTERFACE = 2
 """Version of the interface of `samples.c`; a library with another one is not used."""
 
 
@@ -46,7 +46,9 @@ class SampleLoop:
             ctypes.POINTER(_Pinhole), address, ctypes.c_int64, address, address, address
         ]  # fmt: skip
         library.illum_surface.argtypes = [ctypes.POINTER(_SurfaceHits), ctypes.POINTER(_Surface)]
-        library.illum_camera_rays.restype = library.illum_surface.restype = None
+        library.illum_ray_origins.argtypes = [address, address, address, ctypes.c_int64, address]
+        for function in (library.illum_camera_rays, library.illum_surface, library.illum_ray_origins):
+            function.restype = None
         self._library = library
 
     def camera_rays(
@@ -107,6 +109,13 @@ class SampleLoop:
             count,
         )
         self._library.illum_surface(given, _Surface(*(array.ctypes.data for array in out)))
+        return out
+
+    def ray_origins(self, position: NDArray[np.float64], ng: Vectors, edge: Floats) -> Vectors:
+        """(N, 3) origins of rays above triangles; vectors in Fortran order."""
+        out = np.empty(ng.shape, F, order="F")
+        arrays = position, ng, edge
+        self._library.illum_ray_origins(*(array.ctypes.data for array in arrays), len(ng), out.ctypes.data)
         return out
 
 

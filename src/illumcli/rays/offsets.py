@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, column_major, dot, length
+from illumcli.rays.compiled_samples import sample_loop
 
 ORIGIN_OFFSET = 4 * 2.0**-24
 """Offset of a ray's origin, relative to position and edge: four times the smallest without self-intersection.
@@ -47,6 +48,11 @@ def offset_ray_origins(position: NDArray[np.float64], ng: Vectors, edge: Floats)
     edge : (N,)
         The triangle's longest edge, or its `effective_edge`.
     """
+    loop = sample_loop()
+    is_single = ng.dtype == edge.dtype == F and position.dtype == np.float64
+    is_by_component = position.flags.f_contiguous and ng.flags.f_contiguous
+    if loop is not None and is_single and is_by_component and position.shape == ng.shape == (*edge.shape, 3):
+        return loop.ray_origins(position, ng, np.ascontiguousarray(edge))
     size = np.abs(position)
     step = (ORIGIN_OFFSET * (dot(np.abs(ng), size) + edge))[:, None] * ng
     # twice the rounding to float32, outwards, so that rounding never moves a component back inwards

@@ -8,7 +8,7 @@
 #include <float.h>
 #include <math.h>
 
-enum { INTERFACE = 1 }; /* of compiled_samples.py: both change together */
+enum { INTERFACE = 2 }; /* of compiled_samples.py: both change together */
 
 #define CLEAR 1.25    /* rays start so far before they are closest to the centre [radii] */
 #define LONGEST 100.0 /* effective edge [radii] */
@@ -97,6 +97,25 @@ EXPORT void illum_surface(const SurfaceHits *hits, const Surface *out) {
     double aspect = (edge * edge) / greater(4 * area, FLT_MIN);
     double effective = edge * greater(aspect, 1), longest = greater_float(edge, (float)LONGEST);
     out->edge[i] = (float)(effective < longest ? effective : longest);
+  }
+}
+
+/* As in offsets.py. */
+#define ORIGIN_OFFSET (4.0 / (1 << 24))
+#define ULP (1.0 / (1 << 23))
+
+/* Origins of rays above the triangles they leave, (3, count) as are positions and normals. */
+EXPORT void illum_ray_origins(const double *position, const float *ng, const float *edge, int64_t count,
+                              float *origins) {
+  for (int64_t i = 0; i < count; i++) {
+    double across[3];
+    for (int k = 0; k < 3; k++)
+      across[k] = fabs((double)ng[k * count + i]) * fabs(position[k * count + i]);
+    double offset = ORIGIN_OFFSET * (across[0] + across[1] + across[2] + edge[i]);
+    for (int k = 0; k < 3; k++) {
+      double p = position[k * count + i], n = ng[k * count + i];
+      origins[k * count + i] = (float)(offset * n + copysign(fabs(p) * ULP, n) + p);
+    }
   }
 }
 

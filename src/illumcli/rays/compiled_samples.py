@@ -61,7 +61,7 @@ class SampleLoop:
         pinhole : mapping
             The values of `Pinhole` in `samples.c`, vectors as (3,) arrays.
         """
-        count = len(points)
+        count, points = len(points), np.asfortranarray(points)
         origins, directions = (np.empty((count, 3), F, order="F") for _ in range(2))
         start_distance = np.empty(count)
         camera = _Pinhole(
@@ -72,7 +72,7 @@ class SampleLoop:
         )
         self._library.illum_camera_rays(
             camera,
-            np.asfortranarray(points).ctypes.data,
+            points.ctypes.data,
             count,
             origins.ctypes.data,
             directions.ctypes.data,

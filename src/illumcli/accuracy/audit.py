@@ -216,8 +216,8 @@ class Audit(Record):
             unit_interval(hashed(stream(self.seed, f"audit pixels:{purpose}"), np.zeros(1, np.uint32)))[0]
         )
         pixel = drawn(chances, number, start)
-        x, y = self.picture.pixels(pixel)
-        c, d = (self._fresh(x, y, rays, f"{purpose}:{half}", buffers, run) for half in ("c", "d"))
+        x, y = (np.tile(each, 2) for each in self.picture.pixels(pixel))
+        c, d = np.split(self._fresh(x, y, rays, purpose, buffers, run), 2)
         own = self.picture.values.reshape(chances.size, -1)[pixel].astype(np.float64)
         weights = 1 / (chances[pixel] * np.count_nonzero(self.picture.is_inside) * number)
         return Draws(pixel, weights, own - c, own - d)
@@ -231,7 +231,8 @@ class Audit(Record):
         buffers: dict[str, Any],
         run: Run,
     ) -> NDArray[np.float64]:
-        """(K, channels) the layer at K pixels, not reconstructed, with random numbers of its own."""
+        """(K, channels) the layer at K pixels, not reconstructed, with random numbers of its own for each of
+        them, which may be the same pixel."""
         seed = stream(self.seed, f"audit:{purpose}")
         plan = fresh_plan(self.plan, self.layer, rays, seed, self.camera_samples)
         for node in plan.once:

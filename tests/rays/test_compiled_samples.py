@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from illumcli.compiled import SWITCH
+from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
-from illumcli.geometry.scene_geometry import place_meshes
+from illumcli.geometry.scene_geometry import CornerVectors, place_meshes, scene_normals
+from illumcli.geometry.shapes.sphere import Sphere
 from illumcli.rays.camera import camera_rays
 from illumcli.rays.compiled_samples import sample_loop
-from illumcli.rays.interaction import interact
+from illumcli.rays.corner_weights import CornerWeights, TriangleCorners
+from illumcli.rays.interaction import ShadingContext, interact, interpolated
 from illumcli.rays.offsets import offset_ray_origins
 from illumcli.render_space import RenderSpace
 from illumcli.scene.spec import Perspective
@@ -78,6 +81,28 @@ def test_ray_origins_have_the_same_bits(monkeypatch, scale):
         compiled = offset_ray_origins(*arguments)
         monkeypatch.setenv(SWITCH, "0")
         assert compiled.tobytes() == offset_ray_origins(*arguments).tobytes()
+
+
+def test_interpolated_normals_have_the_same_bits(monkeypatch):
+    rng = np.random.default_rng(7)
+    ball = Sphere(segments=12, rings=7).mesh()
+    geometry = place_meshes([ball], [np.diag([1.0, 2.0, -1.0, 1.0])])
+    normals = scene_normals(geometry, [corner_normals(ball)])
+    values = normals.values.copy()
+    values[::5] *= -1  # some vanish between opposite corners
+    normals = CornerVectors(values, normals.index)
+    triangle = rng.integers(0, len(geometry.triangles), 5000).astype(np.int32)
+    u, v = np.sort(rng.random((2, len(triangle))), axis=0).astype(F)
+    u, v = u, v - u
+    u[::3], v[::3] = 0.5, 0.5
+    objects = np.zeros_like(triangle)
+    surface = interact(geometry, objects, triangle, u, v, rng.normal(size=(len(triangle), 3)).astype(F))
+    weights = TriangleCorners(None, objects, triangle, u, v)
+    context = ShadingContext(geometry, CornerWeights(weights, (weights,)), surface, normals)
+    compiled = interpolated(context)
+    monkeypatch.setenv(SWITCH, "0")
+    assert np.asfortranarray(compiled).tobytes("F") == np.asfortranarray(interpolated(context)).tobytes("F")
+    assert (compiled == surface.ng).all(axis=1).any()
 
 
 def test_other_types_are_computed_by_numpy(monkeypatch):

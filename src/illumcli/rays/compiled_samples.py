@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
 from illumcli.compiled import CVectors, are_switched_off, compiled_library
+from illumcli.geometry.scene_geometry import CornerVectors
 
-INTERFACE = 2
+INTERFACE = 3
 """Version of the interface of `samples.c`; a library with another one is not used."""
 
 
@@ -37,6 +38,15 @@ class _Surface(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_void_p) for name in ("position", "ng", "edge", "back_facing"))
 
 
+class _NormalHits(ctypes.Structure):
+    _fields_ = (
+        *((name, CVectors) for name in ("corners", "values")),
+        ("index", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("rows", "count")),
+        *((name, ctypes.c_void_p) for name in ("triangle", "u", "v", "ng", "back_facing")),
+    )
+
+
 class SampleLoop:
     """The compiled loop."""
 
@@ -47,8 +57,9 @@ class SampleLoop:
         ]  # fmt: skip
         library.illum_surface.argtypes = [ctypes.POINTER(_SurfaceHits), ctypes.POINTER(_Surface)]
         library.illum_ray_origins.argtypes = [address, address, address, ctypes.c_int64, address]
-        for function in (library.illum_camera_rays, library.illum_surface, library.illum_ray_origins):
-            function.restype = None
+        library.illum_normals.argtypes = [ctypes.POINTER(_NormalHits), address]
+        for name in ("camera_rays", "surface", "ray_origins", "normals"):
+            getattr(library, f"illum_{name}").restype = None
         self._library = library
 
     def camera_rays(
@@ -109,6 +120,37 @@ class SampleLoop:
             count,
         )
         self._library.illum_surface(given, _Surface(*(array.ctypes.data for array in out)))
+        return out
+
+    def normals(
+        self,
+        corners: NDArray[np.int32],
+        normals: CornerVectors,
+        hits: tuple[Ids, Floats, Floats],
+        ng: Vectors,
+        back_facing: NDArray[np.bool_],
+    ) -> Vectors:
+        """(M, 3) unit normals of hits, interpolated between the corners of triangles, on the eye's side.
+
+        Parameters
+        ----------
+        corners : (T, 3) int32
+            Of each triangle.
+        hits
+            Triangle, u and v of each, float32.
+        ng : (M, 3) float32
+            Unit normals of the triangles, where the interpolated ones vanish; in Fortran order.
+        """
+        out = np.empty(ng.shape, F, order="F")
+        contiguous = [np.ascontiguousarray(array) for array in (normals.index, *hits, back_facing)]
+        index, *others = (array.ctypes.data for array in contiguous)
+        triangle, u, v, back = others
+        given = _NormalHits(
+            *map(CVectors.of, (corners, normals.values)),
+            *(index, len(normals.values), len(ng)),
+            *(triangle, u, v, ng.ctypes.data, back),
+        )
+        self._library.illum_normals(given, out.ctypes.data)
         return out
 
     def ray_origins(self, position: NDArray[np.float64], ng: Vectors, edge: Floats) -> Vectors:

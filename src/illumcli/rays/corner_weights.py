@@ -249,6 +249,12 @@ class CornerWeights(Record):
     def __len__(self) -> int:
         return len(self.hits.triangle)
 
+    @property
+    def by_triangle(self) -> TriangleCorners | None:
+        """The hits, if all of them are interpolated within their triangles."""
+        first = self.groups[0] if len(self.groups) == 1 else None
+        return first if isinstance(first, TriangleCorners) and first.index is None else None
+
     def interpolate(self, geometry: SceneGeometry, table: CornerVectors) -> NDArray[Any]:
         """(M, j) the vectors that `table` has at corners, interpolated as they are stored; not normalized."""
         return self.weighted_mean(

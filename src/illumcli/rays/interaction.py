@@ -166,6 +166,11 @@ def interpolated(context: ShadingContext) -> Vectors:
     interaction = context.interaction
     if context.normals is None:
         return interaction.ng
+    loop, by_triangle = sample_loop(), context.weights.by_triangle
+    if loop is not None and by_triangle is not None and context.geometry.instances is None:
+        at = by_triangle.triangle, by_triangle.u, by_triangle.v
+        surface = interaction.ng, interaction.back_facing
+        return loop.normals(context.geometry.corners, context.normals, at, *surface)
     n = unit(context.weights.interpolate_normals(context.geometry, context.normals))
     return or_geometric(facing(n, interaction.back_facing), interaction.ng)
 

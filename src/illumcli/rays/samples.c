@@ -8,7 +8,7 @@
 #include <float.h>
 #include <math.h>
 
-enum { INTERFACE = 2 }; /* of compiled_samples.py: both change together */
+enum { INTERFACE = 3 }; /* of compiled_samples.py: both change together */
 
 #define CLEAR 1.25    /* rays start so far before they are closest to the centre [radii] */
 #define LONGEST 100.0 /* effective edge [radii] */
@@ -116,6 +116,38 @@ EXPORT void illum_ray_origins(const double *position, const float *ng, const flo
       double p = position[k * count + i], n = ng[k * count + i];
       origins[k * count + i] = (float)(offset * n + copysign(fabs(p) * ULP, n) + p);
     }
+  }
+}
+
+typedef struct {
+  Vectors corners, values;  /* corners of triangles, (triangles, 3); normals, (rows, 3) */
+  const int32_t *index;     /* row of the normal of each corner; from the end, if it is negative */
+  int64_t rows, count;      /* of normals, of hits */
+  const int32_t *triangle;  /* (count,) */
+  const float *u, *v, *ng;  /* (count,), (count,), (3, count) */
+  const uint8_t *back_facing;
+} NormalHits;
+
+INLINE float dot_float(const float *a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; }
+
+/* Unit normals on the eye's side, (3, count), interpolated linearly; the triangle's where they vanish. */
+EXPORT void illum_normals(const NormalHits *hits, float *out) {
+  for (int64_t i = 0; i < hits->count; i++) {
+    float weight[3] = {1 - hits->u[i] - hits->v[i], hits->u[i], hits->v[i]}, n[3] = {0, 0, 0};
+    for (int k = 0; k < 3; k++) {
+      int64_t row = hits->index[number(&hits->corners, hits->triangle[i], k)];
+      row += row < 0 ? hits->rows : 0;
+      for (int c = 0; c < 3; c++) {
+        float part = weight[k] * component(&hits->values, row, c);
+        n[c] = k ? n[c] + part : part;
+      }
+    }
+    float scale = 1 / greater_float(sqrtf(dot_float(n)), FLT_MIN), side = hits->back_facing[i] ? -1.0f : 1.0f;
+    for (int c = 0; c < 3; c++)
+      n[c] = n[c] * scale * side;
+    int has_vanished = !(dot_float(n) > 0.25f);
+    for (int c = 0; c < 3; c++)
+      out[c * hits->count + i] = has_vanished ? hits->ng[c * hits->count + i] : n[c];
   }
 }
 

@@ -124,11 +124,11 @@ def points(
     context = shading_context
     if len(set(rates)) == 1 and (own_points := RATES[rates[0]].points) is not None:
         return own_points(context, centres, polygon_normals)
-    of_sample = _rate_of_samples(rates, context)
     if all(RATES[name].at_samples for name in set(rates)):
-        return _samples(context, _sample_normals(context, of_sample))
+        return _samples(context, obscurance_normals(rates, context))
 
     # Split the samples: one group per rate that has its own points, and one for all that are shaded in place.
+    of_sample = _rate_of_samples(rates, context)
     groups, parts = [], []
     for number, rate in enumerate(RATES.values()):
         group = np.flatnonzero(of_sample == number)
@@ -171,6 +171,9 @@ def obscurance_normals(rates: Sequence[Rate], shading_context: ShadingContext) -
 
     Object i is shaded at ``rates[i]``; `gouraud` has the linear normal here, `constant` the triangle's.
     """
+    functions = {RATES[name].normals for name in set(rates)}
+    if len(functions) == 1:
+        return functions.pop()(shading_context)
     return _sample_normals(shading_context, _rate_of_samples(rates, shading_context))
 
 

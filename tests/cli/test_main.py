@@ -44,6 +44,21 @@ def test_no_end_is_a_traceback(error):
     assert len(done.stderr.splitlines()) == bool(said)
 
 
+FAILING = SCRIPT.replace(
+    "    raise {}",
+    """    try:
+        raise cli._Stopped(signal.SIGINT)
+    finally:
+        raise RuntimeError("release unlocked lock")
+""",
+)
+
+
+def test_an_error_that_a_signal_causes_is_that_signal():
+    done = subprocess.run([sys.executable, "-c", FAILING], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
+
+
 LINGERING = """
 import time
 import illumcli.cli as cli

@@ -123,6 +123,8 @@ def _status() -> int:
         error.show()
         return error.exit_code
     except Exception as error:
+        if (stop := _stop_behind(error)) is not None:
+            raise stop from None
         if (fault := known(error)) is None:
             raise
         return _reported(fault)
@@ -138,6 +140,13 @@ class _Stopped(BaseException):
 
     def __init__(self, number: int) -> None:
         self.number = number
+
+
+def _stop_behind(error: BaseException | None) -> _Stopped | None:
+    """The stop that an error came of: code of `threading` that a signal interrupts may fail over its lock."""
+    while error is not None and not isinstance(error, _Stopped):
+        error = error.__context__
+    return error
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:

@@ -52,6 +52,7 @@ class FitLoop:
             Share, hidden share and features of the pixels of each cell; contiguous.
         """
         assert planes.flags.c_contiguous
+        assert planes.dtype == np.float32
         self._library.illum_cell_moments(planes.ctypes.data, *planes.shape[2:], _planes(out))
 
     def sum_cells(self, cells: Planes, out: Planes) -> None:
@@ -87,7 +88,7 @@ class FitLoop:
         features : (6, 4, rows, columns) float32
         """
         out = np.empty(features.shape[1:])
-        features = np.ascontiguousarray(features)
+        features = np.ascontiguousarray(features, np.float32)
         self._library.illum_interpolated(_weighted(weighted), features.ctypes.data, _planes(out))
         return out
 
@@ -106,6 +107,7 @@ def fit_loop() -> FitLoop | None:
 def _planes(array: Planes) -> _Planes:
     plane, row, column = array.strides
     size = array.itemsize
+    assert array.dtype == np.float64
     assert column == size
     return _Planes(array.ctypes.data, plane // size, row // size)
 

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from chromium import chromium as chromium
+from illumcli.compiled import SWITCH
 
 # No test asserts a time: a machine may be slow. A run repeats the examples of the one before, so that a
 # change is judged by what it changed; `--hypothesis-profile explore` draws new ones.
@@ -22,6 +23,14 @@ settings.load_profile("repeatable")
 
 ROOT = Path(__file__).parents[1]
 MESHES = ROOT.parent / "shared" / "meshes"
+
+
+def needs_loop(loop, monkeypatch):
+    """Skip a test where a loop in C is not compiled, unless it must be; it is not switched off."""
+    monkeypatch.delenv(SWITCH, raising=False)
+    if loop() is None:
+        assert os.environ.get("ILLUM_REQUIRE_PACKETS") != "1"
+        pytest.skip("no compiled loop")
 
 
 @pytest.fixture(autouse=True, scope="session")

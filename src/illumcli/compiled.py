@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from numpy.typing import NDArray
+
+Loop = TypeVar("Loop")
 
 SWITCH = "ILLUM_PACKETS"
 """Environment variable; 0 turns the compiled loops off."""
@@ -42,3 +46,27 @@ def compiled_library(module: str, name: str, interface: int) -> ctypes.CDLL | No
         return library if library.illum_interface() == interface else None
     except (OSError, AttributeError):
         return None
+
+
+def compiled_loop(kind: Callable[[ctypes.CDLL], Loop], module: str, name: str, interface: int) -> Loop | None:
+    """What `kind` makes of a library, once a process; None without the library, or if loops are switched off.
+
+    Parameters
+    ----------
+    module, name, interface
+        As for `compiled_library`.
+    """
+    return None if are_switched_off() else cast("Loop | None", _loaded(kind, module, name, interface))
+
+
+@cache
+def _loaded(kind: Callable[[ctypes.CDLL], object], module: str, name: str, interface: int) -> object:
+    library = compiled_library(module, name, interface)
+    return None if library is None else kind(library)
+
+
+def declare(library: ctypes.CDLL, **arguments: list[Any]) -> None:
+    """Declare the types of the arguments of functions `illum_NAME` that return nothing."""
+    for name, types in arguments.items():
+        function = getattr(library, f"illum_{name}")
+        function.argtypes, function.restype = types, None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
+from conftest import needs_loop
 from illumcli.baking import compiled_cells
 from illumcli.baking.cells import nearest
 from illumcli.baking.compiled_cells import MOST_WINDOWS, cell_loop
@@ -18,10 +17,7 @@ from illumcli.geometry.scene_geometry import SceneGeometry
 
 @pytest.fixture(autouse=True)
 def _needs_the_loop(monkeypatch):
-    monkeypatch.delenv(SWITCH, raising=False)
-    if cell_loop() is None:
-        assert os.environ.get("ILLUM_REQUIRE_PACKETS") != "1"
-        pytest.skip("no compiled loop")
+    needs_loop(cell_loop, monkeypatch)
 
 
 def both(monkeypatch, compute):
@@ -83,8 +79,4 @@ def test_the_loop_has_room_for_all_windows():
 def test_a_library_of_another_interface_is_not_used(monkeypatch):
     assert cell_loop() is not None
     monkeypatch.setattr(compiled_cells, "INTERFACE", -1)
-    compiled_cells._cell_loop.cache_clear()
-    try:
-        assert cell_loop() is None
-    finally:
-        compiled_cells._cell_loop.cache_clear()
+    assert cell_loop() is None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
+from conftest import needs_loop
 from illumcli.compiled import SWITCH
 from illumcli.geometry.corner_normals import corner_normals
 from illumcli.geometry.mesh import Mesh
@@ -25,10 +24,7 @@ F = np.float32
 
 @pytest.fixture(autouse=True)
 def _needs_the_loop(monkeypatch):
-    monkeypatch.delenv(SWITCH, raising=False)
-    if sample_loop() is None:
-        assert os.environ.get("ILLUM_REQUIRE_PACKETS") != "1"
-        pytest.skip("no compiled loop")
+    needs_loop(sample_loop, monkeypatch)
 
 
 def same_bits(first, second):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
+from conftest import needs_loop
 from illumcli.compiled import SWITCH
 from illumcli.visibility import compiled_fits
 from illumcli.visibility.compiled_fits import fit_loop
@@ -16,10 +15,7 @@ from illumcli.visibility.sheets import Area
 
 @pytest.fixture(autouse=True)
 def _needs_the_loop(monkeypatch):
-    monkeypatch.delenv(SWITCH, raising=False)
-    if fit_loop() is None:
-        assert os.environ.get("ILLUM_REQUIRE_PACKETS") != "1"
-        pytest.skip("no compiled loop")
+    needs_loop(fit_loop, monkeypatch)
 
 
 def pixels(rng, rows, columns):
@@ -70,8 +66,4 @@ def test_bilinear_means_have_the_same_bits(monkeypatch, rows, columns):
 def test_a_library_of_another_interface_is_not_used(monkeypatch):
     assert fit_loop() is not None
     monkeypatch.setattr(compiled_fits, "INTERFACE", -1)
-    compiled_fits._fit_loop.cache_clear()
-    try:
-        assert fit_loop() is None
-    finally:
-        compiled_fits._fit_loop.cache_clear()
+    assert fit_loop() is None

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.compiled import are_switched_off, compiled_library
+from illumcli.compiled import compiled_loop, declare
 from illumcli.records import Record
 from illumcli.visibility.regression import Planes
 
@@ -80,11 +79,12 @@ class CellLoop:
 
     def __init__(self, library: ctypes.CDLL) -> None:
         points, place, number = ctypes.POINTER(_Points), ctypes.c_void_p, ctypes.c_int64
-        library.illum_point_moments.argtypes = [points, place]
-        library.illum_point_fits.argtypes = [points, ctypes.POINTER(_Windows)]
-        library.illum_nearest_cells.argtypes = [ctypes.POINTER(_Search), number, number, place]
-        for name in ("point_moments", "point_fits", "nearest_cells"):
-            getattr(library, f"illum_{name}").restype = None
+        declare(
+            library,
+            point_moments=[points, place],
+            point_fits=[points, ctypes.POINTER(_Windows)],
+            nearest_cells=[ctypes.POINTER(_Search), number, number, place],
+        )
         self._library = library
 
     def moments(self, of: CellPoints, out: NDArray[np.float64]) -> None:
@@ -127,15 +127,9 @@ class CellLoop:
         )
 
 
-@cache
-def _cell_loop() -> CellLoop | None:
-    library = compiled_library(__file__, "cells", INTERFACE)
-    return None if library is None else CellLoop(library)
-
-
 def cell_loop() -> CellLoop | None:
     """The compiled loop, if there is one and it is not switched off."""
-    return None if are_switched_off() else _cell_loop()
+    return compiled_loop(CellLoop, __file__, "cells", INTERFACE)
 
 
 def _addresses(*arrays: NDArray[np.generic]) -> list[int]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Ids, Vectors
-from illumcli.compiled import CVectors, are_switched_off, compiled_library
+from illumcli.compiled import CVectors, compiled_loop, declare
 from illumcli.geometry.scene_geometry import CornerVectors
 
 INTERFACE = 3
@@ -51,15 +50,14 @@ class SampleLoop:
     """The compiled loop."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
-        address = ctypes.c_void_p
-        library.illum_camera_rays.argtypes = [
-            ctypes.POINTER(_Pinhole), address, ctypes.c_int64, address, address, address
-        ]  # fmt: skip
-        library.illum_surface.argtypes = [ctypes.POINTER(_SurfaceHits), ctypes.POINTER(_Surface)]
-        library.illum_ray_origins.argtypes = [address, address, address, ctypes.c_int64, address]
-        library.illum_normals.argtypes = [ctypes.POINTER(_NormalHits), address]
-        for name in ("camera_rays", "surface", "ray_origins", "normals"):
-            getattr(library, f"illum_{name}").restype = None
+        address, size = ctypes.c_void_p, ctypes.c_int64
+        declare(
+            library,
+            camera_rays=[ctypes.POINTER(_Pinhole), address, size, address, address, address],
+            surface=[ctypes.POINTER(_SurfaceHits), ctypes.POINTER(_Surface)],
+            ray_origins=[address, address, address, size, address],
+            normals=[ctypes.POINTER(_NormalHits), address],
+        )
         self._library = library
 
     def camera_rays(
@@ -161,12 +159,6 @@ class SampleLoop:
         return out
 
 
-@cache
-def _sample_loop() -> SampleLoop | None:
-    library = compiled_library(__file__, "samples", INTERFACE)
-    return None if library is None else SampleLoop(library)
-
-
 def sample_loop() -> SampleLoop | None:
     """The compiled loop, if there is one and it is not switched off."""
-    return None if are_switched_off() else _sample_loop()
+    return compiled_loop(SampleLoop, __file__, "samples", INTERFACE)

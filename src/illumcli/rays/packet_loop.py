@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from illumcli.arrays import F, Floats, Vectors, take_rows
-from illumcli.compiled import CVectors, compiled_library
+from illumcli.compiled import CVectors, compiled_library, declare
 from illumcli.rays.embree_library import embree_library, loaded_library
 from illumcli.rays.embree_tree import EmbreeTree, native_widths
 from illumcli.rays.pattern_rays import CompactTable, PatternRays, PatternResults
@@ -101,11 +101,12 @@ def packet_library() -> ctypes.CDLL | None:
     library = compiled_library(__file__, "packets", INTERFACE)
     if library is None:
         return None
-    library.illum_occluded.argtypes = [ctypes.POINTER(_Rays), ctypes.c_void_p]
-    library.illum_closest.argtypes = [ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)]
-    library.illum_patterns.argtypes = [ctypes.POINTER(_Patterns), ctypes.POINTER(_PatternResults)]
-    for function in (library.illum_occluded, library.illum_closest, library.illum_patterns):
-        function.restype = None
+    declare(
+        library,
+        occluded=[ctypes.POINTER(_Rays), ctypes.c_void_p],
+        closest=[ctypes.POINTER(_Rays), ctypes.POINTER(_Hits)],
+        patterns=[ctypes.POINTER(_Patterns), ctypes.POINTER(_PatternResults)],
+    )
     return library
 
 

@@ -8,12 +8,11 @@ core's first cache: a quarter of the time on one thread.
 from __future__ import annotations
 
 import ctypes
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from illumcli.compiled import are_switched_off, compiled_library
+from illumcli.compiled import compiled_loop, declare
 from illumcli.visibility.regression import Planes
 
 INTERFACE = 2
@@ -34,13 +33,14 @@ class FitLoop:
     def __init__(self, library: ctypes.CDLL) -> None:
         size, planes = ctypes.c_int64, ctypes.POINTER(_Planes)
         weighted = ctypes.POINTER(_Weighted)
-        library.illum_cell_moments.argtypes = [ctypes.c_void_p, size, size, planes]
-        library.illum_sum_cells.argtypes = [planes, size, size, planes]
-        library.illum_window_fits.argtypes = [planes, size, size, size, planes]
-        library.illum_finer.argtypes = [weighted, planes]
-        library.illum_interpolated.argtypes = [weighted, ctypes.c_void_p, planes]
-        for name in ("cell_moments", "sum_cells", "window_fits", "finer", "interpolated"):
-            getattr(library, f"illum_{name}").restype = None
+        declare(
+            library,
+            cell_moments=[ctypes.c_void_p, size, size, planes],
+            sum_cells=[planes, size, size, planes],
+            window_fits=[planes, size, size, size, planes],
+            finer=[weighted, planes],
+            interpolated=[weighted, ctypes.c_void_p, planes],
+        )
         self._library = library
 
     def cell_moments(self, planes: NDArray[np.float32], out: Planes) -> None:
@@ -93,15 +93,9 @@ class FitLoop:
         return out
 
 
-@cache
-def _fit_loop() -> FitLoop | None:
-    library = compiled_library(__file__, "regression", INTERFACE)
-    return None if library is None else FitLoop(library)
-
-
 def fit_loop() -> FitLoop | None:
     """The compiled loop, if there is one and it is not switched off."""
-    return None if are_switched_off() else _fit_loop()
+    return compiled_loop(FitLoop, __file__, "regression", INTERFACE)
 
 
 def _planes(array: Planes) -> _Planes:

@@ -152,9 +152,16 @@ def camera_rays(
     eye = render_space.from_world(camera.position)
     if camera.projection == "perspective":
         pinhole = {
-            **{"right": right, "up": up, "forward": forward, "eye": eye},
-            **{"right_eye": right @ eye, "up_eye": up @ eye, "forward_eye": forward @ eye},
-            **{"slope": np.tan(np.radians(camera.fov) / 2), "width": width, "height": height},
+            "right": right,
+            "up": up,
+            "forward": forward,
+            "eye": eye,
+            "right_eye": right @ eye,
+            "up_eye": up @ eye,
+            "forward_eye": forward @ eye,
+            "slope": np.tan(np.radians(camera.fov) / 2),
+            "width": width,
+            "height": height,
         }
         loop = sample_loop()
         return Rays(*(loop.camera_rays(pinhole, points) if loop else _pinhole_rays(pinhole, points)))

@@ -65,8 +65,8 @@ def _shadow_nodes(name: str, light: Light, at_samples: bool, implied: Mapping[st
     """
     colorless = light.without_color()
     order = {"ray_order": "ray_order"} if light.shadows else {}
-    arriving = partial(incident.incident, colorless)
-    nodes = [Node.of(arriving, f"incident:{name}", **(order if at_samples else {}))]
+    order_of_incident = order if at_samples else {}
+    nodes = [Node.of(partial(incident.incident, colorless), f"incident:{name}", **order_of_incident)]
     if not light.shadows:
         nodes.append(Node.of(stages.no_shadow, f"shadow:{name}"))
     if at_samples:  # the samples that need shadow rays are the points where models are evaluated
